@@ -1,0 +1,50 @@
+"""Where the configuration files that come with lashbench are found.
+
+Installed as a wheel they lie inside the package, in a checkout (an editable
+install) in `configs/` beside it. This module finds and lists files; it never
+interprets one.
+"""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+from typing import Literal
+
+from daq.errors import ConfigurationError
+
+__all__ = ["config_path", "config_names"]
+
+Kind = Literal["units", "benches", "recipes"]
+
+
+def _root() -> Path:
+    package = Path(str(files("daq")))
+    installed = package / "_configs"
+    return installed if installed.is_dir() else package.parent / "configs"
+
+
+def config_names(kind: Kind) -> list[str]:
+    """Names of the files of one kind that come with lashbench, without suffix, sorted."""
+    return sorted(path.stem for path in (_root() / kind).glob("*.toml"))
+
+
+def config_path(kind: Kind, name_or_path: str) -> Path:
+    """The file meant by a bare name that comes with lashbench, or by a path.
+
+    Raises
+    ------
+    ConfigurationError
+        If it is neither; the message lists the names that exist.
+    """
+    named = _root() / kind / f"{name_or_path.lower()}.toml"
+    if name_or_path.lower() in config_names(kind):
+        return named
+    path = Path(name_or_path)
+    if path.is_file():
+        return path
+    what = "is a directory" if path.is_dir() else "was not found"
+    raise ConfigurationError(
+        f"{kind[:-1] if kind != 'benches' else 'bench'} {name_or_path!r} {what}; "
+        f"give the path of a TOML file or one of: {', '.join(config_names(kind))}"
+    )

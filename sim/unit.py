@@ -1,0 +1,255 @@
+"""The unit under test: its physical parameters, read from a TOML file and checked whole.
+
+Owns the names, units and bounds of the paper's Table 1 and the bookkeeping of
+backlash between the stages. It builds no equations.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from daq.configs import config_path
+from daq.errors import ConfigurationError
+
+__all__ = ["StageBacklash", "Unit", "load_unit", "stage_backlash", "unit_from_mapping"]
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class Motor(_Section):
+    """Armature circuit and rotor, equations (2) and (5)."""
+
+    L_a: Positive
+    """Armature inductance, H."""
+    R_m: Positive
+    """Armature resistance, ohm."""
+    k_b: Positive
+    """Back-EMF constant, V.s/rad."""
+    k_t: Positive
+    """Torque constant, N.m/A."""
+    J_m: Positive
+    """Rotor inertia with pinion 1, kg.m^2."""
+    B_m: NonNegative
+    """Viscous friction of the rotor, N.m.s/rad."""
+    T_f_m: NonNegative
+    """Dry friction of the rotor, N.m."""
+
+
+class Electronics(_Section):
+    """Amplifier, tachometer and filter, equations (1), (3) and (4)."""
+
+    k_a: Positive
+    """Amplifier gain."""
+    k_ts: Positive
+    """Tachometer gain, V.s/rad."""
+    filter_numerator: Positive
+    """Numerator of G_f, 1/s^2."""
+    filter_denominator: tuple[Positive, NonNegative, Positive]
+    """Coefficients of s^2, s and 1 in the denominator of G_f."""
+
+
+class Stage1(_Section):
+    """First gear stage and shaft 1, equations (5) to (10)."""
+
+    N_1: Positive
+    """Gear ratio."""
+    k_g1: Positive
+    """Mesh stiffness at gear 1, N.m/rad."""
+    J_g1: Positive
+    """Gear 1, kg.m^2."""
+    k_s1: Positive
+    """Stiffness of shaft 1, N.m/rad; each half is 2 k_s1."""
+    J_s1: Positive
+    """Lumped inertia in the middle of shaft 1, kg.m^2."""
+    J_p2: Positive
+    """Pinion 2, kg.m^2."""
+
+
+class Stage2(_Section):
+    """Second gear stage, equations (10) to (13)."""
+
+    N: Positive
+    """Revolution ratio seen by pinion 2: N_2 + 1 where gear 2 is fixed, else N_2."""
+    k_2: Positive
+    """Mesh stiffness at the output, N.m/rad (with shaft 2 in series where there is one)."""
+
+
+class Load(_Section):
+    """The load, equation (14)."""
+
+    J_L: Positive
+    """Inertia, kg.m^2."""
+    T_f_L: NonNegative
+    """Dry friction, N.m."""
+
+
+class Backlash(_Section):
+    """Play of the whole gear train."""
+
+    b_t_deg: NonNegative
+    """Total backlash seen at the output, full angular play, degrees."""
+
+
+class Limits(_Section):
+    """What this unit may be driven with; a bench may tighten it."""
+
+    source_vpk: Positive
+    source_offset_v: NonNegative
+    start_hz: Positive
+    stop_hz: Positive
+
+
+class Unit(_Section):
+    """A geared servo under test. Symbols are the paper's; SI units, degrees for backlash."""
+
+    schema_: Literal[1] = Field(alias="schema")
+    name: Annotated[str, Field(min_length=1, max_length=64)]
+    motor: Motor
+    electronics: Electronics
+    stage1: Stage1
+    stage2: Stage2
+    load: Load
+    backlash: Backlash
+    limits: Limits
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """All scalar physical parameters by symbol."""
+        sections = (
+            self.motor,
+            self.electronics,
+            self.stage1,
+            self.stage2,
+            self.load,
+            self.backlash,
+        )
+        return {
+            name: value
+            for section in sections
+            for name, value in section.model_dump().items()
+            if isinstance(value, float)
+        }
+
+    def with_parameters(self, **changes: float) -> Unit:
+        """A copy with some parameters changed by symbol, checked like a file.
+
+        Raises
+        ------
+        ConfigurationError
+            If a symbol does not exist or a value is not allowed.
+        """
+        document = self.model_dump(by_alias=True)
+        known = self.parameters
+        for symbol, value in changes.items():
+            if symbol not in known:
+                raise ConfigurationError(
+                    f"unit {self.name}: there is no parameter {symbol!r}; "
+                    f"use one of: {', '.join(sorted(known))}"
+                )
+            for section in document.values():
+                if isinstance(section, dict) and symbol in section:
+                    section[symbol] = float(value)
+        return unit_from_mapping(document, source=f"unit {self.name}")
+
+
+def unit_from_mapping(document: dict[str, Any], source: str) -> Unit:
+    """Check a parsed unit file; every fault is named in one message.
+
+    Raises
+    ------
+    ConfigurationError
+        Names `source`, then key and fault for each thing that is wrong.
+    """
+    try:
+        return Unit.model_validate(_lists_as_tuples(document))
+    except ValidationError as error:
+        faults = "; ".join(
+            f"{'.'.join(str(part) for part in fault['loc'])}: {fault['msg']}"
+            + ("" if fault["type"] == "missing" else f" (got {fault['input']!r})")
+            for fault in error.errors()
+        )
+        raise ConfigurationError(f"{source}: {faults}") from error
+
+
+def load_unit(name_or_path: str) -> Unit:
+    """Read a unit by the name of one that comes with lashbench, or by path.
+
+    Raises
+    ------
+    ConfigurationError
+        If the file is not there, is not TOML, or any value in it is wrong.
+    """
+    path = config_path("units", name_or_path)
+    return unit_from_mapping(_read_toml(path), source=str(path))
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigurationError(f"{path}: cannot be read ({error}); give a TOML file") from error
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigurationError(f"{path}: is not valid TOML ({error})") from error
+
+
+def _lists_as_tuples(value: Any) -> Any:
+    # TOML has integers where a person means a real number, and lists where the
+    # model has tuples; both are meant, so only these two are converted.
+    if isinstance(value, dict):
+        return {
+            key: (item if key == "schema" else _lists_as_tuples(item))
+            for key, item in value.items()
+        }
+    if isinstance(value, list):
+        return tuple(_lists_as_tuples(item) for item in value)
+    if isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    return value
+
+
+@dataclass(frozen=True, slots=True)
+class StageBacklash:
+    """Backlash of both stages, equations (15), (16) and (20)."""
+
+    b1_deg: float
+    """Full play at gear 1 with the pinion held, degrees."""
+    b2_deg: float
+    """Full play at the output gear, degrees."""
+
+    @property
+    def half_plays_rad(self) -> tuple[float, float]:
+        """Half of each play in rad, equation (16): delta_i = pi b_i / 360."""
+        return math.pi * self.b1_deg / 360.0, math.pi * self.b2_deg / 360.0
+
+
+def stage_backlash(ratio: float, b_t_deg: float, N: float) -> StageBacklash:
+    """Split the total backlash by the contribution ratio, equations (15) and (20).
+
+    Parameters
+    ----------
+    ratio
+        Contribution ratio r = (b_1/N)/b_t of stage 1, 0 to 1.
+    b_t_deg
+        Total backlash at the output, degrees.
+    N
+        Ratio of stage 2.
+
+    Raises
+    ------
+    ConfigurationError
+        If the ratio is outside 0 to 1.
+    """
+    if not 0.0 <= ratio <= 1.0:
+        raise ConfigurationError(f"contribution ratio {ratio} is outside 0 to 1")
+    return StageBacklash(b1_deg=ratio * b_t_deg * N, b2_deg=(1.0 - ratio) * b_t_deg)
