@@ -6,7 +6,7 @@ session drives any of them. Nothing here talks to a wire.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
@@ -81,6 +81,13 @@ class Analyser(Protocol):
 
     Every method raises `LinkError` when the connection is lost, `BenchTimeout`
     when a wait runs out and `InstrumentError` when the instrument complains.
+    """
+
+    on_wait: Callable[[], None] | None
+    """Called at least five times a second in every wait except those of `make_safe`.
+
+    May raise, which ends the wait and comes out of the method that waited: this
+    is how a session interrupts a point that takes long. None does nothing.
     """
 
     def identify(self) -> Identity:
