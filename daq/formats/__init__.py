@@ -1,0 +1,85 @@
+"""Exchange formats of a frequency response, chosen by the suffix of the file.
+
+Each format is one module with ``read(path)`` and, where it can be written,
+``write(response, path)``; it is imported when a file of its kind is met, so
+that a heavy library is loaded by those who need it. No format interprets
+what it reads, and none takes half of a file.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+
+from daq.errors import InputError
+from daq.frf import FrequencyResponse
+
+__all__ = ["READABLE", "WRITABLE", "check_writable", "read_response", "write_response"]
+
+READABLE = {
+    ".csv": "daq.formats.csv",
+    ".h5": "daq.formats.hdf5",
+    ".hdf5": "daq.formats.hdf5",
+    ".uff": "daq.formats.uff",
+    ".unv": "daq.formats.uff",
+    ".mat": "daq.formats.mat",
+    ".sdf": "daq.formats.sdf",
+    ".dat": "daq.formats.sdf",
+}
+"""Module that reads files of each suffix."""
+
+WRITABLE = {suffix: module for suffix, module in READABLE.items() if module != "daq.formats.sdf"}
+"""Module that writes files of each suffix; SDF is the analyser's own and only read."""
+
+
+def read_response(path: str | Path) -> FrequencyResponse:
+    """Read a frequency response from a file; its suffix names the format.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing or any part of it is wrong; nothing of it is taken.
+    InputError
+        If the suffix is not that of a format that can be read.
+    """
+    response: FrequencyResponse = import_module(_module(path, READABLE, "read")).read(Path(path))
+    return response
+
+
+def write_response(response: FrequencyResponse, path: str | Path) -> None:
+    """Write a frequency response to a file; its suffix names the format.
+
+    The file appears whole or not at all, and replaces one of the same name.
+
+    Raises
+    ------
+    InputError
+        If the suffix is not that of a format that can be written, or the file
+        cannot be made where it is wanted.
+    """
+    import_module(_module(path, WRITABLE, "write")).write(response, Path(path))
+
+
+def check_writable(path: str | Path) -> None:
+    """Find out before long work whether a response could be written to a path.
+
+    Raises
+    ------
+    InputError
+        If the suffix is not that of a format that can be written, or the place
+        is not one where a file can be made.
+    """
+    from daq.formats.atomic import checked_target
+
+    _module(path, WRITABLE, "write")
+    checked_target(Path(path))
+
+
+def _module(path: str | Path, known: dict[str, str], verb: str) -> str:
+    suffix = Path(path).suffix.lower()
+    if suffix not in known:
+        raise InputError(
+            f"{path}: cannot {verb} files that end in {suffix or 'nothing'!r}; "
+            f"use one of: {', '.join(known)}"
+        )
+    return known[suffix]
