@@ -1,0 +1,6 @@
+"""Ways to reach an instrument, all behind one small interface and opened by URL.
+
+`base` says what a transport is; `visa`, `prologix` and `transcript` are the
+kinds there are; `address` and `open` turn a URL into one. A transport moves
+messages and knows nothing of what they mean.
+"""
