@@ -1,0 +1,168 @@
+"""Opening the SQLite file of a bench's history, and saying plainly what is wrong with it.
+
+Owns the connection settings on which "committed means kept" rests: write-ahead
+log, and a flush to the disk at every commit (`synchronous=FULL`), so that a
+committed point outlives a killed process and a power cut. It knows no tables.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import sqlalchemy as sa
+from sqlalchemy import event
+from sqlalchemy.exc import DBAPIError
+from sqlalchemy.pool import QueuePool
+
+from daq.errors import FileFormatError, InputError, LashbenchError, MeasurementError
+from daq.store_schema import SCHEMA_VERSION, migrate, schema_version
+
+__all__ = ["engine_of", "open_engine", "telling_faults"]
+
+_MAGIC = b"SQLite format 3\x00"
+_BUSY_S = 5.0
+WRITES = "lashbench_writes"
+
+
+def open_engine(path: Path, *, create: bool, read_only: bool) -> sa.Engine:
+    """Open a history, checked whole; an older one is brought up to date if it may be written.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it may not be read or written.
+    FileFormatError
+        If the file is not a history, is damaged, or is newer than this program.
+    """
+    exists = _check_place(path, create=create, read_only=read_only)
+    engine = engine_of(path, mode=_mode(path, exists, read_only))
+    try:
+        with telling_faults(path):
+            _check_content(engine, path, create=create, read_only=read_only)
+    except BaseException:
+        engine.dispose()
+        raise
+    return engine
+
+
+def engine_of(path: Path, mode: str) -> sa.Engine:
+    """An engine on a file in one of SQLite's URI modes; nothing is opened yet."""
+    uri = f"{path.absolute().as_uri()}?{mode}"
+
+    def connect() -> sqlite3.Connection:
+        # The driver's own transaction handling commits before DDL; ours begins by hand.
+        return sqlite3.connect(
+            uri, uri=True, timeout=_BUSY_S, isolation_level=None, check_same_thread=False
+        )
+
+    engine = sa.create_engine("sqlite://", creator=connect, poolclass=QueuePool, pool_size=4)
+
+    @event.listens_for(engine, "connect")
+    def _settle(connection: sqlite3.Connection, _record: object) -> None:
+        if mode == "mode=rw" or mode == "mode=rwc":
+            connection.execute("PRAGMA journal_mode = WAL")
+            connection.execute("PRAGMA synchronous = FULL")
+        connection.execute("PRAGMA foreign_keys = ON")
+
+    @event.listens_for(engine, "begin")
+    def _begin(connection: sa.Connection) -> None:
+        writes = connection.get_execution_options().get(WRITES, False)
+        connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
+
+    return engine
+
+
+@contextmanager
+def telling_faults(path: Path) -> Iterator[None]:
+    """Turn what SQLite says into one line that names the file and what to do.
+
+    Raises
+    ------
+    MeasurementError
+        If the disk is full or fails, or another program holds the file.
+    InputError
+        If the file may not be read or written.
+    FileFormatError
+        If the file is damaged or is no database.
+    """
+    try:
+        yield
+    except (DBAPIError, sqlite3.Error) as error:
+        raise _plain(path, error) from error
+
+
+def _plain(path: Path, error: DBAPIError | sqlite3.Error) -> LashbenchError:
+    cause = error.orig if isinstance(error, DBAPIError) else error
+    # The low byte of the extended code is the kind of fault.
+    code = (getattr(cause, "sqlite_errorcode", None) or 0) & 0xFF
+    if code in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
+        return MeasurementError(
+            f"{path}: the disk refused the data ({cause}); what was committed is kept, make room"
+        )
+    if code in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
+        return MeasurementError(
+            f"{path}: held by another program for more than {_BUSY_S:g} s; close that one"
+        )
+    if code in (sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_PERM):
+        return InputError(f"{path}: may not be opened or written here ({cause})")
+    if code in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB):
+        return FileFormatError(f"{path}: is damaged ({cause}); restore a copy, nothing was changed")
+    return FileFormatError(f"{path}: does not hold what a history must ({cause})")
+
+
+def _check_place(path: Path, *, create: bool, read_only: bool) -> bool:
+    if path.is_dir():
+        raise InputError(f"{path}: is a directory; give the file of a history")
+    try:
+        if path.exists() and not path.is_file():
+            raise InputError(f"{path}: is not a regular file; give the file of a history")
+        if path.is_file() and path.stat().st_size > 0:
+            with path.open("rb") as file:
+                if file.read(len(_MAGIC)) != _MAGIC:
+                    raise FileFormatError(f"{path}: is not a history (no SQLite file)")
+            if not read_only:
+                with path.open("r+b"):
+                    pass
+            return True
+    except OSError as error:
+        raise InputError(f"{path}: may not be used ({error.strerror or error})") from error
+    if not create:
+        raise InputError(f"{path}: there is no history; measure first, or give its file")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: there is no directory {path.parent}; make it first")
+    return False
+
+
+def _mode(path: Path, exists: bool, read_only: bool) -> str:
+    if not read_only:
+        return "mode=rw" if exists else "mode=rwc"
+    # A log beside the file must be taken into account, which needs the shared
+    # memory file; without a log the file alone is the whole truth, and can be
+    # read even where nothing may be written.
+    log = path.with_name(path.name + "-wal")
+    return "mode=ro" if log.exists() and log.stat().st_size > 0 else "mode=ro&immutable=1"
+
+
+def _check_content(engine: sa.Engine, path: Path, *, create: bool, read_only: bool) -> None:
+    with engine.connect() as connection:
+        fault = connection.exec_driver_sql("PRAGMA quick_check(1)").scalar_one()
+        if fault != "ok":
+            raise FileFormatError(
+                f"{path}: is damaged ({fault}); restore a copy, nothing was changed"
+            )
+        version = schema_version(connection, str(path))
+    if version == SCHEMA_VERSION:
+        return
+    if version == 0 and not create:
+        raise FileFormatError(f"{path}: is empty, no history")
+    if read_only:
+        raise FileFormatError(
+            f"{path}: has the layout {version} of an older lashbench and may not be written; "
+            "open it once where it may be"
+        )
+    with engine.execution_options(**{WRITES: True}).begin() as connection:
+        # Asked again under the lock: another program may have been first.
+        migrate(connection, schema_version(connection, str(path)))

@@ -1,0 +1,127 @@
+"""What the history of a bench holds, as records: headers, points, events.
+
+Owns the shapes only. Nothing here knows of SQL or of files.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+from daq.analyser import Identity, SourceState, SweepPoint
+from daq.errors import FileFormatError, InputError
+from daq.plan import SweepPlan
+
+__all__ = [
+    "Measurement",
+    "MeasurementHeader",
+    "MeasurementState",
+    "SessionEvent",
+    "StoredPoint",
+    "plan_from_text",
+    "plan_text",
+]
+
+MeasurementState = Literal["complete", "interrupted", "aborted"]
+"""How a measurement stands. One that is still running, or whose program was
+killed, is "interrupted": the state is right whenever the machine stops."""
+
+
+@dataclass(frozen=True, slots=True)
+class MeasurementHeader:
+    """All that is known of a measurement before its first point.
+
+    Parameters
+    ----------
+    unit, serial
+        Name and serial number of the unit under test.
+    plan
+        What is to be measured.
+    address
+        How the instrument was reached.
+    software
+        Name and version of the program that measures.
+    operator, notes
+        Free text.
+    configurations
+        Text of the unit, bench and recipe files as they were used, by kind.
+    """
+
+    unit: str
+    serial: str
+    plan: SweepPlan
+    address: str
+    software: str
+    operator: str = ""
+    notes: str = ""
+    configurations: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """A stored measurement without its points."""
+
+    id: int
+    header: MeasurementHeader
+    instrument: Identity | None
+    state: MeasurementState
+    source_state: SourceState
+    started: str
+    """ISO 8601, UTC."""
+    ended: str | None
+    """ISO 8601, UTC; None while it runs or if its program was killed."""
+    readback: Mapping[str, str]
+    """What the instrument said of its settings before the first point."""
+    points: int
+    """Points in force, superseded ones not counted."""
+    flagged: int
+    """Points in force that carry a flag."""
+
+
+@dataclass(frozen=True, slots=True)
+class StoredPoint:
+    """A committed point."""
+
+    id: int
+    source_vpk: float
+    requested_hz: float
+    """Frequency asked for by the plan; `point.frequency_hz` is the one that was driven."""
+    point: SweepPoint
+    taken: str
+    """ISO 8601, UTC."""
+    superseded_by: int | None = None
+    """Identifier of the point that replaced this one, None while it is in force."""
+
+
+@dataclass(frozen=True, slots=True)
+class SessionEvent:
+    """One line of a session's journal."""
+
+    time: str
+    kind: str
+    text: str
+    data: Mapping[str, Any] = field(default_factory=dict)
+
+
+def plan_text(plan: SweepPlan) -> str:
+    """A plan as JSON, the same text for the same plan; numbers keep all their digits."""
+    return json.dumps(asdict(plan), sort_keys=True, allow_nan=False)
+
+
+def plan_from_text(text: str) -> SweepPlan:
+    """Read what `plan_text` wrote.
+
+    Raises
+    ------
+    FileFormatError
+        If the text is not a plan.
+    """
+    try:
+        document = json.loads(text)
+        for name in ("frequencies_hz", "levels_vpk"):
+            document[name] = tuple(document[name])
+        return SweepPlan(**document)
+    except (ValueError, TypeError, KeyError, InputError) as error:
+        raise FileFormatError(f"history: a stored sweep plan cannot be read ({error})") from error
