@@ -1,4 +1,4 @@
-"""Where the configuration files that come with lashbench are found.
+"""Where the files that come with lashbench are found: units, benches, recipes, sample data.
 
 Installed as a wheel they lie inside the package, in a checkout (an editable
 install) in `configs/` beside it. This module finds and lists files; it never
@@ -13,7 +13,7 @@ from typing import Literal
 
 from daq.errors import ConfigurationError
 
-__all__ = ["config_path", "config_names"]
+__all__ = ["config_names", "config_path", "sample_names", "sample_path"]
 
 Kind = Literal["units", "benches", "recipes"]
 
@@ -37,14 +37,36 @@ def config_path(kind: Kind, name_or_path: str) -> Path:
     ConfigurationError
         If it is neither; the message lists the names that exist.
     """
-    named = _root() / kind / f"{name_or_path.lower()}.toml"
     if name_or_path.lower() in config_names(kind):
-        return named
+        return _root() / kind / f"{name_or_path.lower()}.toml"
     path = Path(name_or_path)
-    if path.is_file():
-        return path
-    what = "is a directory" if path.is_dir() else "was not found"
+    try:
+        if path.is_file():
+            return path
+        what = "is a directory" if path.is_dir() else "was not found"
+    except (OSError, ValueError):
+        what = "is no file name"
     raise ConfigurationError(
         f"{kind[:-1] if kind != 'benches' else 'bench'} {name_or_path!r} {what}; "
         f"give the path of a TOML file or one of: {', '.join(config_names(kind))}"
     )
+
+
+def sample_names() -> list[str]:
+    """Names of the sample responses that come with lashbench, sorted."""
+    return sorted(path.stem for path in (_root() / "samples").glob("*.csv"))
+
+
+def sample_path(name: str) -> Path:
+    """The file of a sample response.
+
+    Raises
+    ------
+    ConfigurationError
+        If there is none of that name.
+    """
+    if name not in sample_names():
+        raise ConfigurationError(
+            f"sample {name!r} was not found; use one of: {', '.join(sample_names())}"
+        )
+    return _root() / "samples" / f"{name}.csv"

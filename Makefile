@@ -1,0 +1,50 @@
+# Everything runs in .venv, which is made on first use and again when the
+# requirements change. `make` alone lists what there is.
+
+PYTHON ?= python3
+BIN := .venv/bin
+READY := .venv/.ready
+
+.PHONY: help demo test check bench lock clean
+
+help:
+	@echo "make demo    the whole job without hardware; results in demo/"
+	@echo "make test    all checks and tests"
+	@echo "make check   style, types, floors and links; under a minute"
+	@echo "make bench   benchmarks"
+	@echo "make lock    write down the installed versions in requirements.lock"
+	@echo "make clean   remove what the other targets left, except .venv"
+
+demo: $(READY)
+	@$(BIN)/lashbench demo
+
+test: check
+	@$(BIN)/python -m pytest
+
+check: $(READY)
+	@$(BIN)/ruff check --quiet .
+	@$(BIN)/ruff format --quiet --check .
+	@$(BIN)/mypy --no-error-summary
+	@$(BIN)/lint-imports --no-logo > .venv/lint-imports.log || { cat .venv/lint-imports.log; exit 1; }
+	@$(BIN)/python tests/links.py
+
+bench: $(READY)
+	@for script in tests/benchmarks/bench_*.py; do $(BIN)/python "$$script" || exit 1; done
+
+lock: $(READY)
+	@$(BIN)/python -m pip freeze --exclude-editable > requirements.lock
+	@touch $(READY)
+
+clean:
+	@rm -rf build dist demo .pytest_cache .hypothesis .mypy_cache .ruff_cache .import_linter_cache
+	@find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
+
+$(READY): pyproject.toml requirements.lock
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo "lashbench needs Python 3.11 or newer; $(PYTHON) is not. Try: make PYTHON=python3.11" >&2; \
+	  exit 1; }
+	@echo "setting up .venv" >&2
+	@$(PYTHON) -m venv .venv
+	@$(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check \
+	  --constraint requirements.lock --editable '.[dev]'
+	@touch $@

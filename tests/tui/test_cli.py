@@ -1,0 +1,161 @@
+"""The frame of the command line: verbs, streams, exit codes, and what help may cost."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from daq import errors
+from tui import cli, output
+
+HEAVY = ("scipy", "numba", "matplotlib", "textual", "h5py", "sqlalchemy", "pyvisa", "serial")
+
+
+@pytest.mark.parametrize(
+    "words", [[], ["--help"], ["--version"], *([verb, "--help"] for verb in cli.VERBS)]
+)
+def test_help_loads_none_of_the_heavy_libraries(words):
+    program = (
+        "import sys; from tui.cli import main; code = main(sys.argv[1:]);"
+        f"loaded = sorted(set({HEAVY!r}) & set(sys.modules));"
+        "sys.exit(f'loaded {loaded}' if loaded else code)"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", program, *words], capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 0, run.stderr
+    assert run.stderr == ""
+    assert run.stdout.strip()
+
+
+@pytest.mark.parametrize("verb", cli.VERBS)
+def test_every_verb_explains_itself_and_all_its_options(verb, capsys):
+    assert cli.main([verb, "--help"]) == 0
+    text = capsys.readouterr().out
+    assert cli.VERBS[verb][1] in text
+    for line in text.splitlines():
+        words = line.strip("│* ").split()
+        if words and words[0].startswith("--"):
+            assert len(words) > 2, f"{verb} {words[0]} has no explanation"
+
+
+def test_the_console_script_is_the_entry_point():
+    script = Path(sys.executable).with_name("lashbench")
+    run = subprocess.run([script, "--version"], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == cli.version("lashbench")
+
+
+@pytest.fixture
+def broken_verb(monkeypatch):
+    """A verb that raises what it is given."""
+
+    def install(error):
+        def broken(*, console: output.Injected) -> None:
+            """Break."""
+            console.note("narration")
+            raise error
+
+        module = type(sys)("broken_verb")
+        module.broken = broken
+        monkeypatch.setitem(sys.modules, "broken_verb", module)
+        monkeypatch.setitem(cli.VERBS, "broken", ("broken_verb:broken", "Break."))
+
+    return install
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (errors.AnalysisError("no peak"), 1),
+        (errors.InstrumentError("-222"), 1),
+        (errors.ConfigurationError("key x"), 2),
+        (errors.FileFormatError("line 4"), 2),
+        (errors.LinkError("refused"), 3),
+        (errors.ProtocolError("garbled"), 3),
+        (errors.BenchTimeout("*OPC?"), 4),
+        (errors.LimitError("9 V"), 5),
+        (KeyboardInterrupt(), 130),
+        (ZeroDivisionError("division\nby zero"), 1),
+    ],
+)
+def test_an_error_is_one_line_and_its_exit_code(broken_verb, capsys, error, code):
+    broken_verb(error)
+    assert cli.main(["broken", "--quiet"]) == code
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    assert " ".join(str(error).split()) in err
+    assert ("internal error" in err) == isinstance(error, ZeroDivisionError)
+
+    assert cli.main(["--debug", "broken"]) == code
+    err = capsys.readouterr().err
+    assert "Traceback" in err
+    assert err.startswith("narration\n")
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "simulat",
+        "simulate",
+        "simulate --unit adss --ratio half",
+        "--bogus",
+        "extract",
+        "extract one.csv two.csv",
+        "extract nowhere.csv",
+        "estimate --unit adss",
+        "estimate --unit adss --arf-hz 128",
+        "estimate --unit adss --arf-hz 128 --rf-hz nan",
+        "estimate --unit adss --arf-hz 128 --rf-hz 137 --total-backlash-unknown",
+        "estimate x.csv --unit adss --arf-hz 128 --rf-hz 137",
+        "estimate x.csv --unit nosuchunit",
+        "reproduce --plots /dev/null",
+        "reproduce --json=maybe",
+    ],
+)
+def test_a_usage_error_is_one_line_and_exit_2(line, capsys):
+    assert cli.main(line.split()) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("error: ")
+    assert err.count("\n") == 1
+
+
+def test_a_reader_that_has_seen_enough_is_no_error():
+    program = (
+        "import sys, types; from tui import cli, output;"
+        "talk = types.ModuleType('talk'); sys.modules['talk'] = talk;"
+        "exec('def talk(*, console: Injected): console.data(\"x\" * 10**6)',"
+        "{'Injected': output.Injected}, talk.__dict__);"
+        "cli.VERBS['talk'] = ('talk:talk', 'Talk.'); sys.exit(cli.main(['talk']))"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as run:
+        run.stdout.close()
+        assert run.stderr.read() == b""
+        assert run.wait() == 0
+
+
+def test_json_has_null_for_what_is_no_number():
+    np = pytest.importorskip("numpy")
+    content = {
+        "a": float("nan"),
+        "b": [np.float64(1.5), float("inf")],
+        "c": np.array([1.0, np.nan]),
+        "d": (np.int64(2), np.bool_(True), None, "µ"),
+    }
+    assert json.loads(output.as_json(content)) == {
+        "a": None,
+        "b": [1.5, None],
+        "c": [1.0, None],
+        "d": [2, True, None, "µ"],
+    }
+
+
+def test_a_table_is_aligned():
+    assert output.aligned(["a", "bb"], [["long", "1"], ["x", "-"]]) == (
+        "a     bb\n----  --\nlong   1\nx      -"
+    )

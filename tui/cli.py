@@ -1,0 +1,105 @@
+"""The command line: which verbs there are, and what becomes of their errors.
+
+Owns the entry point, the table of verbs and the exit codes. A verb lives in
+its own module under `tui.commands` and is imported when it is called, so that
+help costs none of the scientific libraries. Nothing here computes.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from importlib.metadata import version
+
+from cyclopts import App, CycloptsError, Parameter
+
+from daq.errors import LashbenchError
+from tui.output import Console
+
+__all__ = ["VERBS", "build_app", "main"]
+
+VERBS = {
+    "simulate": ("tui.commands.simulate:simulate", "Simulate a sweep and write the response."),
+    "extract": ("tui.commands.extract:extract", "Read ARF, RF and damping out of a response."),
+    "estimate": ("tui.commands.estimate:estimate", "Tell the backlash of each gear stage."),
+    "reproduce": ("tui.commands.reproduce:reproduce", "Compute the paper's tables and figures."),
+    "demo": ("tui.commands.demo:demo", "Do the whole job without hardware."),
+}
+"""Every verb: the function that does it, and its line in the help."""
+
+_SUMMARY = "Bench application for geared servos: how much backlash sits in each gear stage."
+_EPILOGUE = "Every command also takes --quiet (no narration) and --debug (trace of an error)."
+_USAGE = 2
+_INTERRUPTED = 130
+
+
+def build_app() -> App:
+    """Build the parser with all verbs, none of them imported."""
+    app = App(
+        name="lashbench",
+        help=_SUMMARY,
+        help_epilogue=_EPILOGUE,
+        version=lambda: version("lashbench"),
+        default_parameter=Parameter(negative=()),
+        result_action="return_value",
+    )
+    for name, (target, summary) in VERBS.items():
+        app.command(target, name=name, help=summary)
+    return app
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code.
+
+    Parameters
+    ----------
+    arguments
+        Words after the program's name; those of the process if left out.
+    """
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    debug, words = _switch("--debug", words)
+    quiet, words = _switch("--quiet", words)
+    try:
+        return _run(words, Console(quiet))
+    except KeyboardInterrupt:
+        return _fail("interrupted", _INTERRUPTED, debug)
+    except BrokenPipeError:
+        # Whoever read our output has seen enough; keep the interpreter from
+        # complaining about it once more at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except CycloptsError as error:
+        return _fail(f"{error} See: lashbench --help", _USAGE, debug)
+    except LashbenchError as error:
+        return _fail(str(error), error.exit_code, debug)
+    except Exception as error:
+        text = f"internal error: {type(error).__name__}: {error}; run with --debug and report it"
+        return _fail(text, 1, debug)
+
+
+def _run(words: list[str], console: Console) -> int:
+    command, bound, injected = build_app().parse_args(
+        words, exit_on_error=False, print_error=False, help_on_error=False
+    )
+    for name in injected:
+        bound.arguments[name] = console
+    code = command(*bound.args, **bound.kwargs)
+    return code if isinstance(code, int) else 0
+
+
+def _switch(name: str, words: list[str]) -> tuple[bool, list[str]]:
+    # Taken out before parsing, so that it may stand anywhere on the line.
+    return name in words, [word for word in words if word != name]
+
+
+def _fail(message: str, code: int, debug: bool) -> int:
+    if debug:
+        traceback.print_exc()
+    print(f"error: {' '.join(message.split())}", file=sys.stderr)  # noqa: T201
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

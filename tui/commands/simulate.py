@@ -1,0 +1,98 @@
+"""``lashbench simulate``: a simulated response to a file.
+
+Owns the options of the verb. What a sweep or an effect may be is decided by
+the floors below.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from tui.options import Real, UnitName, Whole, parameter_settings
+from tui.output import Injected
+
+__all__ = ["simulate"]
+
+
+def simulate(
+    *,
+    unit: UnitName,
+    ratio: Real,
+    level: list[Real],
+    start: Real,
+    stop: Real,
+    points: Whole,
+    spacing: Literal["lin", "log"] = "lin",
+    direction: Literal["up", "down"] = "up",
+    settle_cycles: Whole = 20,
+    integrate_cycles: Whole = 30,
+    from_rest: bool = False,
+    effect: list[str] | None = None,
+    set_: Annotated[list[str] | None, Parameter(name="--set")] = None,
+    seed: Whole = 0,
+    out: Path,
+    console: Injected,
+) -> None:
+    """Simulate a stepped-sine sweep and write the response to a file.
+
+    Parameters
+    ----------
+    ratio
+        Contribution ratio of stage 1 to the total backlash, 0 to 1.
+    level
+        Source level in V peak; repeat it for several.
+    start
+        Lowest frequency in Hz.
+    stop
+        Highest frequency in Hz.
+    points
+        Number of frequencies at each level.
+    spacing
+        Linear or logarithmic grid.
+    direction
+        Order in which the frequencies are visited.
+    settle_cycles
+        Drive cycles waited at each point.
+    integrate_cycles
+        Drive cycles averaged at each point.
+    from_rest
+        Start every point from rest, as the paper does; without it the motion
+        carries on from point to point as in a real sweep.
+    effect
+        Extension of the model, ID:param=value[,param=value]; repeat it for several.
+    set_
+        Another value for one of the unit's parameters, PARAM=VALUE in SI
+        units; repeat it for several.
+    seed
+        Start of the random numbers.
+    out
+        File to write: csv, h5, uff or mat by its suffix.
+    """
+    from daq.formats import check_writable, write_response
+    from daq.plan import SweepPlan, spaced_frequencies
+    from sim.effects import parse_effect
+    from sim.response import simulate as simulated
+    from sim.unit import load_unit
+
+    check_writable(out)
+    subject = load_unit(unit).with_parameters(**parameter_settings(set_ or []))
+    plan = SweepPlan(
+        frequencies_hz=spaced_frequencies(start, stop, points, spacing),
+        levels_vpk=tuple(level),
+        direction=direction,
+        settle_cycles=settle_cycles,
+        integrate_cycles=integrate_cycles,
+        from_rest=from_rest,
+    )
+    effects = tuple(parse_effect(text) for text in effect or [])
+    console.note(
+        f"simulating {subject.name}: {plan.points} points, {plan.duration_s:.0f} s of motion"
+    )
+    began = time.perf_counter()
+    response = simulated(subject, ratio, plan, effects=effects, seed=seed)
+    write_response(response, out)
+    console.note(f"wrote {out} after {time.perf_counter() - began:.1f} s")

@@ -1,0 +1,104 @@
+"""Options that several verbs share, and the strict reading of their values.
+
+Owns how text on a command line becomes a number or a setting. It loads no
+unit, opens no file and decides nothing about physical limits.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter, Token
+
+from daq.errors import InputError
+
+__all__ = ["Json", "Plots", "Real", "UnitName", "Whole", "parameter_settings", "prepare_directory"]
+
+_WHOLE = re.compile(r"[+-]?[0-9]+\Z")
+
+
+def _whole(_type: object, tokens: Sequence[Token]) -> int:
+    # The framework would round 1.5 to 2 and read 0x10; a count is meant as it is typed.
+    text = tokens[0].value
+    if not _WHOLE.match(text):
+        raise ValueError(f"{text!r} is not a whole number")
+    return int(text)
+
+
+def _real(_type: object, tokens: Sequence[Token]) -> float:
+    return real_number(tokens[0].value)
+
+
+def real_number(text: str) -> float:
+    """A finite decimal number.
+
+    Raises
+    ------
+    ValueError
+        If the text is anything else; "nan", "inf" and "1_000" are.
+    """
+    try:
+        value = float(text) if text.isascii() and "_" not in text else math.nan
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ValueError(f"{text!r} is not a finite number")
+    return value
+
+
+Whole = Annotated[int, Parameter(converter=_whole, n_tokens=1)]
+"""A count, as digits."""
+
+Real = Annotated[float, Parameter(converter=_real, n_tokens=1)]
+"""A finite number."""
+
+UnitName = Annotated[str, Parameter(name="--unit", help="adss, edss or the path of a unit file.")]
+"""The unit under test."""
+
+Json = Annotated[bool, Parameter(name="--json", help="Print one JSON document on stdout.")]
+"""Whether the result is for a program."""
+
+Plots = Annotated[Path | None, Parameter(name="--plots", help="Directory for figures (PNG).")]
+"""Where figures go, made if it is not there."""
+
+
+def parameter_settings(settings: Sequence[str]) -> dict[str, float]:
+    """Read ``SYMBOL=VALUE`` settings of a unit's parameters.
+
+    Raises
+    ------
+    InputError
+        If one has another form, or a symbol comes twice.
+    """
+    values: dict[str, float] = {}
+    for setting in settings:
+        symbol, equals, number = (part.strip() for part in setting.partition("="))
+        if not symbol or not equals:
+            raise InputError(f"--set {setting!r} is not PARAM=VALUE; give for instance J_L=0.003")
+        if symbol in values:
+            raise InputError(f"--set {symbol} is given twice; give it once")
+        try:
+            values[symbol] = real_number(number)
+        except ValueError as error:
+            raise InputError(f"--set {symbol}: {error}") from error
+    return values
+
+
+def prepare_directory(path: Path) -> Path:
+    """Make a directory for results, before the work that fills it.
+
+    Raises
+    ------
+    InputError
+        If there is a file of that name, or it cannot be made.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: cannot be used as a directory ({reason})") from error
+    return path

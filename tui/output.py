@@ -1,0 +1,91 @@
+"""Where everything that a verb says goes: data to stdout, narration to stderr.
+
+Owns both streams of the command line. It knows nothing of what it prints and
+is the only place, with `tui.cli` for errors, that writes to them.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+__all__ = ["Console", "Injected", "aligned", "as_json"]
+
+
+@dataclass(frozen=True, slots=True)
+class Console:
+    """The two streams of a run.
+
+    Parameters
+    ----------
+    quiet
+        Leave out narration and progress; data and errors remain.
+    """
+
+    quiet: bool = False
+
+    def data(self, text: str) -> None:
+        """Print a line or block of the result to stdout."""
+        self._clear()
+        print(text, flush=True)  # noqa: T201
+
+    def document(self, content: Mapping[str, Any]) -> None:
+        """Print the one JSON document of a run to stdout."""
+        self.data(as_json(content))
+
+    def note(self, text: str) -> None:
+        """Print a line of narration to stderr."""
+        if not self.quiet:
+            self._clear()
+            print(text, file=sys.stderr, flush=True)  # noqa: T201
+
+    def progress(self, fraction: float, text: str = "") -> None:
+        """Show how far the work is, in place; only where somebody watches a terminal."""
+        if not self.quiet and sys.stderr.isatty():
+            line = f"{100 * min(max(fraction, 0.0), 1.0):3.0f} %  {text}"
+            print(f"\r\x1b[K{line[:78]}", end="", file=sys.stderr, flush=True)  # noqa: T201
+
+    def _clear(self) -> None:
+        if not self.quiet and sys.stderr.isatty():
+            print("\r\x1b[K", end="", file=sys.stderr, flush=True)  # noqa: T201
+
+
+Injected = Annotated[Console, Parameter(parse=False, show=False)]
+"""A parameter of a verb that `tui.cli` fills in; it is no option."""
+
+
+def as_json(content: Mapping[str, Any]) -> str:
+    """A JSON document; what is not a finite number becomes null."""
+    return json.dumps(_plain(content), indent=1, allow_nan=False, ensure_ascii=False)
+
+
+def _plain(value: Any) -> Any:
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [_plain(item) for item in value]
+    return value
+
+
+def aligned(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A plain-text table: the first column to the left, the others to the right."""
+    table = [list(headers), *(list(row) for row in rows)]
+    widths = [max(len(row[column]) for row in table) for column in range(len(headers))]
+    rule = ["-" * width for width in widths]
+    return "\n".join(
+        "  ".join(
+            cell.ljust(width) if column == 0 else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in [table[0], rule, *table[1:]]
+    )
