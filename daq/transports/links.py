@@ -6,6 +6,7 @@ can die into `LinkError`. It knows nothing of messages or adapters.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import select
 import socket
@@ -155,13 +156,14 @@ class SerialLink:
         port = self._open()
         try:
             while True:
-                first = bytes(port.read(1))
-                if first:
-                    return first + bytes(port.read(port.in_waiting))
-                if self._is_file and not os.path.exists(self.name):
-                    raise LinkError(f"{self.name}: the port is gone; was the adapter unplugged?")
+                if waiting := port.in_waiting:
+                    return bytes(port.read(waiting))
                 if deadline.expired:
                     return b""
+                if first := bytes(port.read(1)):
+                    return first
+                if self._is_file and not os.path.exists(self.name):
+                    raise LinkError(f"{self.name}: the port is gone; was the adapter unplugged?")
         except self._faults as error:
             raise self._lost(error) from error
 
@@ -169,10 +171,9 @@ class SerialLink:
         """Let go; may be called twice."""
         port, self._port = self._port, None
         if port is not None:
-            try:
+            # A port that is already lost has nothing left that could be let go.
+            with contextlib.suppress(*self._faults):
                 port.close()
-            except self._faults as error:
-                raise self._lost(error) from error
 
     def _open(self) -> Any:
         if self._port is None:

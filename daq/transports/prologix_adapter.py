@@ -1,0 +1,254 @@
+"""The adapter side of a Prologix-like GPIB controller: dialects, escaping, its own commands.
+
+Owns the conversation with the adapter itself (lines that start with ``++``):
+finding out which one it is before anything could be written to its memory,
+setting it up and reading that back. It sends nothing to the instrument.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from daq.errors import LinkError, ProtocolError
+from daq.transports.base import Deadline
+from daq.transports.links import Link
+
+__all__ = ["AR488", "OTHER", "PROLOGIX", "Adapter", "Dialect", "dialect_of", "escape"]
+
+READ_TIMEOUT_MS = 500
+"""How long the adapter itself waits for a byte from the instrument. Short, since a reply that
+is late stays in the instrument and is asked for again; no adapter allows more than 3 s."""
+
+MARGIN_S = 0.5
+"""How much longer the host waits than the adapter: two time-outs must not cross."""
+
+_ESCAPED = re.compile(rb"([\r\n\x1b+])")
+_PATIENCE_S = 1.5
+"""Wait for one answer of the adapter; an Arduino that resets on opening is deaf for about 2 s."""
+
+_QUIET_S = 0.1
+"""Silence after which an adapter is taken to have said all."""
+
+
+def escape(message: bytes) -> bytes:
+    """Protect CR, LF, ESC and ``+`` from the adapter by an ESC before each."""
+    return _ESCAPED.sub(rb"\x1b\1", message)
+
+
+@dataclass(frozen=True, slots=True)
+class Dialect:
+    """How one kind of adapter differs from the others."""
+
+    name: str
+    saves_on_change: bool
+    """``++savecfg 0`` stops it from wearing its memory out. On an AR488 the same
+    line *writes* the memory, so it is sent only where it is known to help."""
+    echoes: bool
+    """It may be in a verbose mode that echoes, and may answer ``*idn?`` itself."""
+
+
+PROLOGIX = Dialect("Prologix", saves_on_change=True, echoes=False)
+AR488 = Dialect("AR488", saves_on_change=False, echoes=True)
+OTHER = Dialect("other", saves_on_change=False, echoes=False)
+
+
+def dialect_of(version: str) -> Dialect | None:
+    """The dialect that a version text gives away, None if it is no version text."""
+    if "prologix" in version.lower():
+        return PROLOGIX
+    if "ar488" in version.lower():
+        return AR488
+    if "gpib" in version.lower() and any(sign.isdigit() for sign in version):
+        return OTHER
+    return None
+
+
+class Adapter:
+    """A Prologix-like adapter on a link, set up for one instrument address.
+
+    Parameters
+    ----------
+    link
+        The open pipe to it.
+    gpib_address
+        Primary address of the instrument, 0 to 30.
+    deadline
+        Bound of finding and setting it up.
+
+    Raises
+    ------
+    LinkError
+        If nothing that names itself a GPIB adapter answers ``++ver``, or a
+        setting does not read back.
+    """
+
+    def __init__(self, link: Link, gpib_address: int, deadline: Deadline) -> None:
+        self.link = link
+        self.gpib_address = gpib_address
+        self._unread = bytearray()
+        self.version, self.dialect = self._find(deadline)
+        self.set_up(deadline)
+
+    # Bytes
+
+    def send(self, data: bytes, deadline: Deadline) -> None:
+        """Send one line, which is already escaped where it has to be."""
+        self.link.send(data + b"\n", deadline)
+
+    def gather(self, deadline: Deadline) -> bool:
+        """Wait for bytes and keep them; False if none came by the deadline."""
+        came = self.link.receive(deadline)
+        self._unread += came
+        return bool(came)
+
+    def taken(self, count: int) -> bytes | None:
+        """`count` of the bytes kept, None if there are not so many yet."""
+        if len(self._unread) < count:
+            return None
+        first = bytes(self._unread[:count])
+        del self._unread[:count]
+        return first
+
+    def taken_line(self) -> bytes | None:
+        """The bytes kept up to the first line feed, without it; None if there is none yet."""
+        if b"\n" not in self._unread:
+            return None
+        line, _, rest = bytes(self._unread).partition(b"\n")
+        self._unread = bytearray(rest)
+        return line
+
+    def kept(self) -> int:
+        """How many bytes are kept."""
+        return len(self._unread)
+
+    def unread(self) -> bytes:
+        """What came and was not taken, without waiting; taken by this call."""
+        while self.gather(Deadline.after(0.0)):
+            pass
+        lying = bytes(self._unread)
+        self._unread.clear()
+        return lying
+
+    # The adapter's own commands
+
+    def ask(self, command: str, deadline: Deadline) -> str | None:
+        """One line of answer to an adapter command, None if it stays silent."""
+        self.send(command.encode("ascii"), deadline)
+        return self._next_line(deadline)
+
+    def resynchronise(self, deadline: Deadline) -> bool:
+        """Drop everything up to the adapter's own version text; False if it stays silent.
+
+        The adapter works its lines off in order, so nothing older can follow.
+        """
+        self.send(b"++ver", deadline)
+        while (line := self._next_line(deadline)) is not None:
+            # A cut reply without line feed stands before the version on the same line.
+            if line.endswith(self.version):
+                return True
+        self._unread.clear()
+        return False
+
+    def has_forgotten(self, deadline: Deadline) -> bool:
+        """Whether it lost its settings, as after a reset by its own power or cable."""
+        wanted = {"++addr": str(self.gpib_address), "++auto": "0", "++mode": "1"}
+        return any(
+            (self.ask(command, deadline) or "").split(" ")[0] != value
+            for command, value in wanted.items()
+        )
+
+    def set_up(self, deadline: Deadline) -> None:
+        """Make it a silent controller for one address; every line is read back.
+
+        Raises
+        ------
+        LinkError
+            If a setting does not read back as sent.
+        """
+        if self.dialect.saves_on_change:
+            self.send(b"++savecfg 0", deadline)
+        self.send(b"++mode 1", deadline)
+        settings = {
+            "++mode": "1",
+            "++auto": "0",
+            "++eoi": "1",
+            "++eos": "3",
+            "++eot_enable": "0",
+            "++read_tmo_ms": str(READ_TIMEOUT_MS),
+            "++addr": str(self.gpib_address),
+        }
+        if self.dialect.echoes:
+            settings["++idn"] = "0"
+        for command, value in settings.items():
+            if command != "++mode":  # repeated, it sends an AR488's instrument to local and back
+                self.send(f"{command} {value}".encode("ascii"), deadline)
+            answer = self.ask(command, deadline)
+            if answer is None or answer.split(" ")[0] != value:
+                raise LinkError(
+                    f"{self.link.name}: adapter {self.version!r} was sent '{command} {value}' "
+                    f"and reads back {answer!r}; is it the adapter that the URL means?"
+                )
+
+    def close(self) -> None:
+        """Let go of the link."""
+        self.link.close()
+
+    def _next_line(self, deadline: Deadline) -> str | None:
+        while (line := self.taken_line()) is None:
+            if not self.gather(deadline):
+                return None
+        return _text(line)
+
+    def _find(self, deadline: Deadline) -> tuple[str, Dialect]:
+        heard = ""
+        while not deadline.expired:
+            self.send(b"++ver", deadline)
+            patience = deadline.within(_PATIENCE_S)
+            while (line := self._next_line(patience)) is not None:
+                heard = line
+                found = dialect_of(line)
+                if found is not None:
+                    return self._settled(line, found, deadline)
+        heard = heard or _text(self.unread())
+        raise LinkError(
+            f"{self.link.name}: no GPIB adapter answered '++ver' within {deadline.span_s:g} s "
+            f"({f'it said {heard[:60]!r}' if heard else 'silent'}); is it a Prologix, AR488 or "
+            "alike, and is the port right?"
+        )
+
+    def _settled(self, version: str, dialect: Dialect, deadline: Deadline) -> tuple[str, Dialect]:
+        # Answers to a `++ver` that was sent while it was starting up may still come.
+        self._hear_out(deadline)
+        # Any text may be stored in an AR488 as its version; `real` asks for the truth, and
+        # other adapters answer it with a complaint or the same text again.
+        if dialect is OTHER:
+            truth = self.ask("++ver real", deadline.within(_PATIENCE_S))
+            if truth is not None and dialect_of(truth) is AR488:
+                dialect = AR488
+            self._hear_out(deadline)
+        if dialect.echoes:
+            self._silence_echo(version, deadline)
+        return re.sub(r"^(> ?)+", "", version), dialect
+
+    def _silence_echo(self, version: str, deadline: Deadline) -> None:
+        for _ in range(2):
+            answer = self.ask("++addr", deadline.within(_PATIENCE_S)) or ""
+            if answer.split(" ")[0].isdigit():
+                return
+            self.send(b"++verbose", deadline)  # a toggle: the echo shows that it was on
+            self._hear_out(deadline)
+        raise ProtocolError(
+            f"{self.link.name}: adapter {version!r} echoes what it is sent and cannot be "
+            "silenced; send it '++verbose' from a terminal program"
+        )
+
+    def _hear_out(self, deadline: Deadline) -> None:
+        while self.gather(deadline.within(_QUIET_S)):
+            pass
+        self._unread.clear()
+
+
+def _text(line: bytes) -> str:
+    # Stray NUL bytes have been seen from adapters; nothing else is forgiven.
+    return line.replace(b"\0", b"").decode("ascii", errors="replace").strip()
