@@ -70,6 +70,7 @@ def paper_gains(
     frequencies_hz: Sequence[float],
     *,
     starts: int = 8,
+    start_spread: float = 1e-3,
     seed: int = 0,
     source_vpk: float = PAPER_LEVEL_VPK,
     settle_cycles: int = 60,
@@ -80,11 +81,13 @@ def paper_gains(
     """Simulate the paper's measurement from several starts at rest.
 
     Each (start, frequency) is one run: from rest, settled, then the Fourier
-    coefficient of V_o over V_i read off once. The paper says no more of its
-    start than "at rest". A train at rest may stand anywhere in its play, and
-    the source may come on at any phase; so a start is a source phase drawn
-    from the whole turn and, for each mesh, an angle drawn from its play. The
-    first start is the plain one: phase zero, every mesh in the middle.
+    coefficient of V_o over V_i read off once. The first start is the plain
+    one: source phase zero, every mesh in the middle of its play. The others
+    stand off it by a source phase and, for each mesh, an angle, drawn evenly
+    from `start_spread` of half a turn and of half the play. A small spread
+    repeats one procedure and shows what chaos alone makes of it; a spread of
+    1 lets the train stand anywhere in its play and the source come on at any
+    phase, which also finds responses that exist side by side.
 
     Parameters
     ----------
@@ -94,6 +97,8 @@ def paper_gains(
         Drive frequencies, Hz.
     starts
         Number of runs per frequency.
+    start_spread
+        How far the starts lie apart, 0 to 1.
     seed
         Seed of the starts.
     source_vpk
@@ -112,7 +117,7 @@ def paper_gains(
     """
     numbers = _numbers(unit, backlash)
     frequencies = np.asarray(frequencies_hz, dtype=float)
-    phases, states = _starts(numbers, starts, np.random.default_rng(seed))
+    phases, states = _starts(numbers, starts, start_spread, np.random.default_rng(seed))
     gains = np.empty((starts, frequencies.size), dtype=np.complex128)
 
     def run(frequency: float) -> NDArray[np.complex128]:
@@ -145,10 +150,10 @@ def _numbers(unit: Unit, backlash: StageBacklash) -> _Numbers:
 
 
 def _starts(
-    numbers: _Numbers, starts: int, generator: np.random.Generator
+    numbers: _Numbers, starts: int, spread: float, generator: np.random.Generator
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Source phases (starts,) in rad, and states at rest (13, starts)."""
-    phases, in_mesh_1, in_mesh_2 = generator.uniform(-1.0, 1.0, (3, starts))
+    phases, in_mesh_1, in_mesh_2 = generator.uniform(-spread, spread, (3, starts))
     phases[0] = in_mesh_1[0] = in_mesh_2[0] = 0.0
     states = np.zeros((_STATES, starts))
     # th_m stays 0, so th_d1 = -th_g1 (7); shaft 1 is relaxed; th_d2 = th_p2/N - th_L (12).
