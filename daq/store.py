@@ -20,9 +20,11 @@ from sqlalchemy.dialects.sqlite import insert
 
 from daq import store_schema as table
 from daq.analyser import Identity, SourceState, SweepPoint
-from daq.errors import InputError
+from daq.errors import FileFormatError, InputError
+from daq.frf import FrequencyResponse
 from daq.store_file import WRITES, open_engine, telling_faults
 from daq.store_records import (
+    Estimate,
     Measurement,
     MeasurementHeader,
     MeasurementState,
@@ -30,7 +32,7 @@ from daq.store_records import (
     StoredPoint,
     plan_text,
 )
-from daq.store_rows import measurement_of, point_of, point_row
+from daq.store_rows import measurement_of, point_of, point_row, response_of
 
 __all__ = ["Store"]
 
@@ -174,6 +176,21 @@ class Store:
                 ended=_now(),
             )
 
+    def add_estimate(
+        self, measurement: int, software: str, document: Mapping[str, Any]
+    ) -> Estimate:
+        """Keep what an analysis said of a measurement; earlier ones stay."""
+        estimate = Estimate(measurement, _now(), software, dict(document))
+        row = {
+            "measurement_id": measurement,
+            "made": estimate.made,
+            "software": software,
+            "document": dict(document),
+        }
+        with self._writing() as connection:
+            _inserted(connection, table.estimates, row)
+        return estimate
+
     # ------------------------------------------------------------ reading
 
     def measurement(self, measurement: int) -> Measurement:
@@ -209,6 +226,19 @@ class Store:
         with self._reading() as connection:
             return [point_of(row) for row in connection.execute(query.order_by(columns.id))]
 
+    def response(self, measurement: int) -> FrequencyResponse:
+        """The points in force of one measurement as a frequency response.
+
+        Raises
+        ------
+        InputError
+            If there is no such measurement, or it has no point yet.
+        """
+        found, points = self.measurement(measurement), self.points(measurement)
+        if not points:
+            raise InputError(f"measurement {measurement} in {self.path} has no point yet")
+        return response_of(found, points)
+
     def events(self, measurement: int) -> list[SessionEvent]:
         """The session's journal, in order."""
         columns = table.events.c
@@ -220,6 +250,15 @@ class Store:
         with self._reading() as connection:
             return [SessionEvent(*row) for row in connection.execute(query)]
 
+    def latest_estimates(self) -> dict[int, Estimate]:
+        """The last estimate of each measurement that has one, by its identifier."""
+        columns = table.estimates.c
+        query = sa.select(
+            columns.measurement_id, columns.made, columns.software, columns.document
+        ).order_by(columns.id)
+        with self._reading() as connection:
+            return {row.measurement_id: Estimate(*row) for row in connection.execute(query)}
+
     # ------------------------------------------------------------ inside
 
     @contextmanager
@@ -230,7 +269,12 @@ class Store:
     @contextmanager
     def _reading(self) -> Iterator[sa.Connection]:
         with telling_faults(self.path), self._engine.begin() as connection:
-            yield connection
+            try:
+                yield connection
+            except (ValueError, TypeError, KeyError) as error:
+                raise FileFormatError(
+                    f"{self.path}: holds a record that cannot be read ({error}); restore a copy"
+                ) from error
 
     def _update(self, connection: sa.Connection, measurement: int, **values: Any) -> None:
         columns = table.measurements.c

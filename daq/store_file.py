@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import sqlalchemy as sa
@@ -62,9 +62,7 @@ def engine_of(path: Path, mode: str) -> sa.Engine:
 
     @event.listens_for(engine, "connect")
     def _settle(connection: sqlite3.Connection, _record: object) -> None:
-        if mode == "mode=rw" or mode == "mode=rwc":
-            connection.execute("PRAGMA journal_mode = WAL")
-            connection.execute("PRAGMA synchronous = FULL")
+        connection.execute("PRAGMA synchronous = FULL")
         connection.execute("PRAGMA foreign_keys = ON")
 
     @event.listens_for(engine, "begin")
@@ -92,12 +90,16 @@ def telling_faults(path: Path) -> Iterator[None]:
         yield
     except (DBAPIError, sqlite3.Error) as error:
         raise _plain(path, error) from error
+    except UnicodeDecodeError as error:
+        # SQLite quotes damaged text in its complaint, which then cannot be decoded.
+        raise FileFormatError(f"{path}: is damaged (text that is not UTF-8)") from error
 
 
 def _plain(path: Path, error: DBAPIError | sqlite3.Error) -> LashbenchError:
-    cause = error.orig if isinstance(error, DBAPIError) else error
+    origin = error.orig if isinstance(error, DBAPIError) else error
     # The low byte of the extended code is the kind of fault.
-    code = (getattr(cause, "sqlite_errorcode", None) or 0) & 0xFF
+    code = (getattr(origin, "sqlite_errorcode", None) or 0) & 0xFF
+    cause = " ".join(str(origin).split())
     if code in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
         return MeasurementError(
             f"{path}: the disk refused the data ({cause}); what was committed is kept, make room"
@@ -150,10 +152,15 @@ def _check_content(engine: sa.Engine, path: Path, *, create: bool, read_only: bo
     with engine.connect() as connection:
         fault = connection.exec_driver_sql("PRAGMA quick_check(1)").scalar_one()
         if fault != "ok":
+            first = " ".join(fault.split())
             raise FileFormatError(
-                f"{path}: is damaged ({fault}); restore a copy, nothing was changed"
+                f"{path}: is damaged ({first}); restore a copy, nothing was changed"
             )
         version = schema_version(connection, str(path))
+    if not read_only and (version or create):
+        # Only now: it alters the file, which must be ours.
+        with closing(engine.raw_connection()) as raw, closing(raw.cursor()) as cursor:
+            cursor.execute("PRAGMA journal_mode = WAL")
     if version == SCHEMA_VERSION:
         return
     if version == 0 and not create:

@@ -15,6 +15,7 @@ from daq.errors import FileFormatError, InputError
 from daq.plan import SweepPlan
 
 __all__ = [
+    "Estimate",
     "Measurement",
     "MeasurementHeader",
     "MeasurementState",
@@ -103,6 +104,17 @@ class SessionEvent:
     kind: str
     text: str
     data: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """What an analysis said of a measurement, kept so that the history can show it."""
+
+    measurement: int
+    made: str
+    """ISO 8601, UTC."""
+    software: str
+    document: Mapping[str, Any]
 
 
 def plan_text(plan: SweepPlan) -> str:

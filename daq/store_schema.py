@@ -14,6 +14,7 @@ from daq.errors import FileFormatError
 __all__ = [
     "APPLICATION_ID",
     "SCHEMA_VERSION",
+    "estimates",
     "events",
     "instruments",
     "measurements",
@@ -90,6 +91,15 @@ _STEPS: tuple[tuple[str, ...], ...] = (
             text TEXT NOT NULL,
             data TEXT NOT NULL)""",
         "CREATE INDEX events_of ON events (measurement_id)",
+    ),
+    (
+        """CREATE TABLE estimates (
+            id INTEGER PRIMARY KEY,
+            measurement_id INTEGER NOT NULL REFERENCES measurements (id),
+            made TEXT NOT NULL,
+            software TEXT NOT NULL,
+            document TEXT NOT NULL)""",
+        "CREATE INDEX estimates_of ON estimates (measurement_id)",
     ),
 )
 
@@ -168,6 +178,15 @@ events = sa.Table(
     sa.Column("kind", sa.Text),
     sa.Column("text", sa.Text),
     sa.Column("data", sa.JSON),
+)
+estimates = sa.Table(
+    "estimates",
+    _metadata,
+    sa.Column("id", sa.Integer, primary_key=True),
+    sa.Column("measurement_id", sa.Integer),
+    sa.Column("made", sa.Text),
+    sa.Column("software", sa.Text),
+    sa.Column("document", sa.JSON),
 )
 
 
