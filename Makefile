@@ -45,6 +45,6 @@ $(READY): pyproject.toml requirements.lock
 	  exit 1; }
 	@echo "setting up .venv" >&2
 	@$(PYTHON) -m venv .venv
-	@$(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check \
+	@$(BIN)/python -m pip install -qq --no-compile --disable-pip-version-check \
 	  --constraint requirements.lock --editable '.[dev]'
 	@touch $@
