@@ -61,22 +61,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug, words = _switch("--debug", words)
     quiet, words = _switch("--quiet", words)
+    console = Console(quiet)
     try:
-        return _run(words, Console(quiet))
-    except KeyboardInterrupt:
-        return _fail("interrupted", _INTERRUPTED, debug)
+        return _run(words, console)
     except BrokenPipeError:
         # Whoever read our output has seen enough; keep the interpreter from
         # complaining about it once more at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except CycloptsError as error:
-        return _fail(f"{error} See: lashbench --help", _USAGE, debug)
-    except LashbenchError as error:
-        return _fail(str(error), error.exit_code, debug)
-    except Exception as error:
-        text = f"internal error: {type(error).__name__}: {error}; run with --debug and report it"
-        return _fail(text, 1, debug)
+    except (KeyboardInterrupt, Exception) as error:
+        if debug:
+            traceback.print_exc()
+        message, code = _verdict(error, words)
+        console.error(message)
+        return code
 
 
 def _run(words: list[str], console: Console) -> int:
@@ -94,11 +92,16 @@ def _switch(name: str, words: list[str]) -> tuple[bool, list[str]]:
     return name in words, [word for word in words if word != name]
 
 
-def _fail(message: str, code: int, debug: bool) -> int:
-    if debug:
-        traceback.print_exc()
-    print(f"error: {' '.join(message.split())}", file=sys.stderr)  # noqa: T201
-    return code
+def _verdict(error: BaseException, words: list[str]) -> tuple[str, int]:
+    """The line and the exit code that an error means."""
+    if isinstance(error, KeyboardInterrupt):
+        return "interrupted", _INTERRUPTED
+    if isinstance(error, LashbenchError):
+        return str(error), error.exit_code
+    if isinstance(error, CycloptsError):
+        verb = f"{words[0]} " if words and words[0] in VERBS else ""
+        return f"{str(error).rstrip('. ')}; see lashbench {verb}--help", _USAGE
+    return f"internal error: {type(error).__name__}: {error}; run with --debug and report it", 1
 
 
 if __name__ == "__main__":

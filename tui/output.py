@@ -1,7 +1,7 @@
 """Where everything that a verb says goes: data to stdout, narration to stderr.
 
-Owns both streams of the command line. It knows nothing of what it prints and
-is the only place, with `tui.cli` for errors, that writes to them.
+Owns both streams of the command line and knows nothing of what it prints; no
+other module writes to them.
 """
 
 from __future__ import annotations
@@ -44,6 +44,11 @@ class Console:
         if not self.quiet:
             self._clear()
             print(text, file=sys.stderr, flush=True)  # noqa: T201
+
+    def error(self, text: str) -> None:
+        """Print an error to stderr, as one line whatever it holds."""
+        self._clear()
+        print(f"error: {' '.join(text.split())}", file=sys.stderr, flush=True)  # noqa: T201
 
     def progress(self, fraction: float, text: str = "") -> None:
         """Show how far the work is, in place; only where somebody watches a terminal."""
