@@ -87,10 +87,10 @@ class PrologixTransport:
         An adapter gives up in silence when a byte is late, and what is left of
         the reply stays in the instrument. `before` bytes of it were used up.
         """
-        came = self._adapter.gather(Deadline.after(_ONE_READ_S))
         if deadline.expired:
             raise self._silence(before + self._adapter.kept(), deadline)
-        if not came:
+        came = self._adapter.gather(Deadline.after(_ONE_READ_S))
+        if not came and not deadline.expired:
             self._adapter.send(b"++read eoi", deadline)
 
     def serial_poll(self, deadline: Deadline) -> int:

@@ -1,0 +1,174 @@
+"""Where an instrument is, as a URL: strict reading of every form, with all forms in the refusal.
+
+Owns the address records and their grammar. It opens nothing.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import parse_qsl, unquote
+
+from daq.errors import ConfigurationError
+
+__all__ = [
+    "FORMS",
+    "Address",
+    "HostedAddress",
+    "PrologixSerial",
+    "PrologixTcp",
+    "ReplayFile",
+    "VisaAddress",
+    "parse_address",
+]
+
+FORMS = (
+    "sim:",
+    "TCPIP::HOST::PORT::SOCKET",
+    "TCPIP::HOST::inst0::INSTR",
+    "GPIB0::11::INSTR",
+    "prologix:DEVICE?addr=11",
+    "prologix-tcp:HOST:PORT?addr=11",
+    "replay:FILE",
+)
+"""Every form of URL, by example."""
+
+DEFAULT_GPIB_ADDRESS = 11
+"""The analyser's own preset."""
+
+_VISA = re.compile(
+    r"""
+    GPIB\d* :: (?P<pad>\d{1,2}) (:: (?P<sad>\d{1,3}))? (::INSTR)?
+    | TCPIP\d* :: [^:\s]+ :: (?P<port>\d{1,5}) ::SOCKET
+    | TCPIP\d* :: [^:\s]+ (:: [A-Za-z]\w*(,\d+)*)? ::INSTR
+    """,
+    re.IGNORECASE | re.VERBOSE | re.ASCII,
+)
+_SCHEME = re.compile(r"([a-z][a-z0-9-]*):(?!:)(.*)", re.DOTALL)
+_HOST_PORT = re.compile(r"(\[[0-9A-Fa-f:.%]+\]|[^\s:/?\[\]]+):(\d{1,5})", re.ASCII)
+
+
+@dataclass(frozen=True, slots=True)
+class HostedAddress:
+    """A transport that a floor above provides under a scheme of its own, such as ``sim:``."""
+
+    scheme: str
+    rest: str
+    """What follows the colon, for the provider to read."""
+
+
+@dataclass(frozen=True, slots=True)
+class VisaAddress:
+    """A VISA resource name."""
+
+    resource: str
+
+
+@dataclass(frozen=True, slots=True)
+class PrologixSerial:
+    """An adapter on a serial port (or behind a pyserial URL)."""
+
+    device: str
+    gpib_address: int = DEFAULT_GPIB_ADDRESS
+
+
+@dataclass(frozen=True, slots=True)
+class PrologixTcp:
+    """An adapter on the network."""
+
+    host: str
+    port: int
+    gpib_address: int = DEFAULT_GPIB_ADDRESS
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayFile:
+    """A transcript that answers in an instrument's place."""
+
+    path: Path
+
+
+Address = HostedAddress | VisaAddress | PrologixSerial | PrologixTcp | ReplayFile
+
+
+def parse_address(url: str, hosted: tuple[str, ...] = ("sim",)) -> Address:
+    """Read an instrument URL.
+
+    Parameters
+    ----------
+    url
+        One of `FORMS`. VISA names may be in any case, schemes are lower case.
+    hosted
+        Schemes that the caller itself provides a transport for.
+
+    Raises
+    ------
+    ConfigurationError
+        If it has none of the forms; the message says what is wrong and lists them.
+    """
+    text = url.strip()
+    if "::" in text and not text.startswith(("prologix:", "prologix-tcp:", "replay:")):
+        return _visa(url, text)
+    match = _SCHEME.fullmatch(text)
+    if match is None:
+        raise _refusal(url, "has no scheme")
+    scheme, rest = match.groups()
+    if scheme in hosted:
+        return HostedAddress(scheme, rest)
+    if scheme == "replay":
+        if not rest:
+            raise _refusal(url, "names no file")
+        return ReplayFile(Path(rest))
+    if scheme == "prologix":
+        return _prologix_serial(url, rest)
+    if scheme == "prologix-tcp":
+        return _prologix_tcp(url, rest)
+    raise _refusal(url, f"has the unknown scheme {scheme!r}")
+
+
+def _visa(url: str, text: str) -> VisaAddress:
+    match = _VISA.fullmatch(text)
+    if match is None:
+        raise _refusal(url, "is no VISA name of a kind that is served here")
+    for name, low, high in (("pad", 0, 30), ("sad", 96, 126), ("port", 1, 65535)):
+        value = match.group(name)
+        if value is not None and not low <= int(value) <= high:
+            raise _refusal(url, f"has {value} where {low} to {high} is allowed")
+    return VisaAddress(text)
+
+
+def _prologix_serial(url: str, rest: str) -> PrologixSerial:
+    device, gpib_address = _with_gpib_address(url, rest)
+    if not device or any(sign.isspace() for sign in device):
+        raise _refusal(url, "names no serial device")
+    return PrologixSerial(device, gpib_address)
+
+
+def _prologix_tcp(url: str, rest: str) -> PrologixTcp:
+    place, gpib_address = _with_gpib_address(url, rest)
+    match = _HOST_PORT.fullmatch(place)
+    if match is None or not 1 <= int(match.group(2)) <= 65535:
+        raise _refusal(url, "needs HOST:PORT with a port from 1 to 65535")
+    return PrologixTcp(match.group(1).strip("[]"), int(match.group(2)), gpib_address)
+
+
+def _with_gpib_address(url: str, rest: str) -> tuple[str, int]:
+    place, mark, query = rest.partition("?")
+    gpib_address = DEFAULT_GPIB_ADDRESS
+    if mark:
+        try:
+            options = parse_qsl(query, keep_blank_values=True, strict_parsing=True)
+        except ValueError as error:
+            raise _refusal(url, "has nothing readable after '?'") from error
+        if [key for key, _ in options] != ["addr"]:
+            raise _refusal(url, "may have one option only, 'addr'")
+        value = options[0][1]
+        if not re.fullmatch(r"\d{1,2}", value, re.ASCII) or int(value) > 30:
+            raise _refusal(url, f"has GPIB address {value!r}; it is a number from 0 to 30")
+        gpib_address = int(value)
+    return unquote(place), gpib_address
+
+
+def _refusal(url: str, fault: str) -> ConfigurationError:
+    return ConfigurationError(f"instrument {url!r} {fault}; use one of: {', '.join(FORMS)}")

@@ -1,0 +1,105 @@
+"""From a URL to an open transport, recorded on the way if that is wanted.
+
+Owns nothing but the choice. Transports that live on a floor above, such as
+the simulated analyser's, come in as factories by scheme.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from daq.errors import LashbenchError
+from daq.transports.address import (
+    HostedAddress,
+    PrologixSerial,
+    PrologixTcp,
+    ReplayFile,
+    VisaAddress,
+    parse_address,
+)
+from daq.transports.base import Deadline, Transport
+
+__all__ = ["TransportFactory", "open_transport"]
+
+TransportFactory = Callable[[str], Transport]
+"""Opens a transport from what follows ``scheme:`` in the URL."""
+
+_OPENING_S = 10.0
+"""Bound of opening; an Arduino that resets takes two of it, a Prologix that restarts five."""
+
+
+def open_transport(
+    url: str,
+    factories: Mapping[str, TransportFactory] | None = None,
+    *,
+    record: Path | None = None,
+    opening_s: float = _OPENING_S,
+) -> Transport:
+    """Open the transport that a URL names; docs/instrument.md explains the forms.
+
+    Parameters
+    ----------
+    url
+        See `daq.transports.address.FORMS`.
+    factories
+        Transports provided by the caller, by scheme (``"sim"``).
+    record
+        File to record the dialogue to; must not exist yet.
+    opening_s
+        Bound of opening, s.
+
+    Raises
+    ------
+    ConfigurationError
+        If the URL has no known form.
+    LinkError
+        If nothing answers there.
+    FileFormatError
+        If a transcript to be replayed is damaged.
+    InputError
+        If the transcript to be recorded cannot be written.
+    """
+    provided = dict(factories or {})
+    address = parse_address(url, hosted=tuple(provided))
+    transport: Transport
+    match address:
+        case HostedAddress(scheme=scheme, rest=rest):
+            transport = provided[scheme](rest)
+        case VisaAddress(resource=resource):
+            from daq.transports.visa import open_visa
+
+            transport = open_visa(resource, Deadline.after(opening_s))
+        case PrologixSerial() | PrologixTcp():
+            transport = _open_prologix(address, url, opening_s)
+        case ReplayFile(path=path):
+            from daq.transports.transcript import Replay
+
+            transport = Replay(path)
+    if record is None:
+        return transport
+    from daq.transports.transcript import Recorder
+
+    try:
+        return Recorder(transport, record)
+    except LashbenchError:
+        transport.close()
+        raise
+
+
+def _open_prologix(address: PrologixSerial | PrologixTcp, url: str, opening_s: float) -> Transport:
+    from daq.transports.links import Link, SerialLink, TcpLink
+    from daq.transports.prologix import PrologixTransport
+    from daq.transports.prologix_adapter import Adapter
+
+    deadline = Deadline.after(opening_s)
+    link: Link
+    if isinstance(address, PrologixSerial):
+        link = SerialLink(address.device)
+    else:
+        link = TcpLink(address.host, address.port, deadline)
+    try:
+        return PrologixTransport(Adapter(link, address.gpib_address, deadline), url)
+    except LashbenchError:
+        link.close()
+        raise

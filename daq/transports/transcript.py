@@ -1,0 +1,242 @@
+"""A dialogue on file: recording what crosses a wire, and answering from such a record.
+
+Owns the transcript format, one JSON object a line, each on disk before the
+call returns. `Recorder` adds nothing to the dialogue and hides nothing of it;
+`Replay` answers the recorded dialogue and no other, and says at which line
+and how a dialogue departs from it.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from daq import errors
+from daq.errors import FileFormatError, InputError, LashbenchError, ProtocolError
+from daq.transports.base import Deadline, Transport
+
+__all__ = ["Recorder", "Replay"]
+
+_VERSION = 1
+_RAISED = {name: getattr(errors, name) for name in errors.__all__}
+_Result = TypeVar("_Result")
+
+
+class Recorder:
+    """A transport that writes down everything that passes through it.
+
+    Parameters
+    ----------
+    transport
+        The wire; closed with the recorder.
+    path
+        New file; an existing one is refused, since a transcript is evidence.
+
+    Raises
+    ------
+    InputError
+        If the file exists or cannot be written.
+    """
+
+    def __init__(self, transport: Transport, path: Path) -> None:
+        self._transport = transport
+        self.address = transport.address
+        self._started_s = time.monotonic()
+        try:
+            self._file = path.open("x", encoding="ascii", newline="\n")
+        except OSError as error:
+            raise InputError(
+                f"{path}: the transcript cannot be written ({error.strerror}); give a new file"
+            ) from error
+        self._note({"transcript": _VERSION, "address": self.address, "started": _now()})
+
+    def write(self, line: str, deadline: Deadline) -> None:
+        """Send one message."""
+        self._record("write", lambda: self._transport.write(line, deadline), line=line)
+
+    def read(self, deadline: Deadline) -> str:
+        """One text reply."""
+        return self._record("read", lambda: self._transport.read(deadline))
+
+    def read_block(self, deadline: Deadline) -> bytes:
+        """The payload of one block."""
+        return self._record("block", lambda: self._transport.read_block(deadline))
+
+    def serial_poll(self, deadline: Deadline) -> int | None:
+        """The status byte."""
+        return self._record("poll", lambda: self._transport.serial_poll(deadline))
+
+    def device_clear(self, deadline: Deadline) -> bool:
+        """Clear the instrument."""
+        return self._record("clear", lambda: self._transport.device_clear(deadline))
+
+    def pause(self, seconds: float) -> None:
+        """Let time pass; not part of the dialogue."""
+        self._transport.pause(seconds)
+
+    def close(self) -> None:
+        """Close the wire and the file."""
+        self._transport.close()
+        self._file.close()
+
+    def _record(self, act: str, call: Callable[[], _Result], **asked: str) -> _Result:
+        entry: dict[str, Any] = {"act": act, **asked}
+        try:
+            result = call()
+        except LashbenchError as error:
+            self._note(entry | {"raised": type(error).__name__, "message": str(error)})
+            raise
+        if isinstance(result, bytes):
+            self._note(entry | {"base64": base64.b64encode(result).decode("ascii")})
+        elif result is not None or act == "poll":
+            self._note(entry | {"gave": result})
+        else:
+            self._note(entry)
+        return result
+
+    def _note(self, entry: dict[str, Any]) -> None:
+        if self._file.closed:  # closed while a last attempt to go safe is still under way
+            return
+        stamp = {"t_s": round(time.monotonic() - self._started_s, 6)}
+        self._file.write(json.dumps(entry | stamp) + "\n")
+        self._file.flush()
+
+
+class Replay:
+    """A transport that answers from a transcript, without an instrument and without waiting.
+
+    Parameters
+    ----------
+    path
+        Written by a `Recorder`.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is no transcript, or any line of it is damaged; a last line
+        that was cut off by a crash is left out.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.address = f"replay:{path}"
+        self._path = path
+        self._entries = _entries(path)
+        self._next = 0
+
+    def write(self, line: str, deadline: Deadline) -> None:
+        """Compare with the record; nothing is sent."""
+        self._answer("write", line)
+
+    def read(self, deadline: Deadline) -> str:
+        """The recorded text reply."""
+        return str(self._answer("read"))
+
+    def read_block(self, deadline: Deadline) -> bytes:
+        """The recorded block."""
+        answer = self._answer("block")
+        return answer if isinstance(answer, bytes) else b""
+
+    def serial_poll(self, deadline: Deadline) -> int | None:
+        """The recorded status byte."""
+        answer = self._answer("poll")
+        return answer if isinstance(answer, int) else None
+
+    def device_clear(self, deadline: Deadline) -> bool:
+        """What the recorded clear did."""
+        return bool(self._answer("clear"))
+
+    def pause(self, seconds: float) -> None:
+        """Time does not pass in a replay."""
+
+    def close(self) -> None:
+        """Nothing to let go of."""
+
+    @property
+    def unused(self) -> int:
+        """How many recorded acts have not been asked for yet."""
+        return len(self._entries) - self._next
+
+    def _answer(self, act: str, line: str | None = None) -> Any:
+        asked = act if line is None else f"{act} {line!r}"
+        if self._next >= len(self._entries):
+            raise ProtocolError(
+                f"{self._path}: the recording ends after {len(self._entries)} acts, "
+                f"but the dialogue goes on with {asked}"
+            )
+        number, entry = self._entries[self._next]
+        recorded = entry["act"] if "line" not in entry else f"{entry['act']} {entry['line']!r}"
+        if recorded != asked:
+            raise ProtocolError(
+                f"{self._path}, line {number}: the recording has {recorded}, "
+                f"the dialogue has {asked}; it departs here"
+            )
+        self._next += 1
+        if "raised" in entry:
+            raise _RAISED[entry["raised"]](entry["message"])
+        if "base64" in entry:
+            return base64.b64decode(entry["base64"], validate=True)
+        return entry.get("gave")
+
+
+_GIVES: dict[str, tuple[type, ...]] = {
+    "write": (),
+    "read": (str,),
+    "block": (bytes,),
+    "poll": (int, type(None)),
+    "clear": (bool,),
+}
+
+
+def _entries(path: Path) -> list[tuple[int, dict[str, Any]]]:
+    try:
+        text = path.read_text(encoding="ascii")
+    except (OSError, UnicodeDecodeError) as error:
+        raise FileFormatError(f"{path}: cannot be read as a transcript ({error})") from error
+    lines = text.splitlines(keepends=True)
+    if lines and not lines[-1].endswith("\n"):
+        lines.pop()  # the recording process was killed while it wrote this line
+    documents = [(number, _document(path, number, line)) for number, line in enumerate(lines, 1)]
+    if not documents or documents[0][1].get("transcript") != _VERSION:
+        raise FileFormatError(
+            f'{path}: is not a transcript; its first line should hold "transcript": {_VERSION}'
+        )
+    for number, entry in documents[1:]:
+        _check(path, number, entry)
+    return documents[1:]
+
+
+def _document(path: Path, number: int, line: str) -> dict[str, Any]:
+    try:
+        document = json.loads(line)
+    except ValueError as error:
+        raise FileFormatError(f"{path}, line {number}: is not JSON ({error})") from error
+    if not isinstance(document, dict):
+        raise FileFormatError(f"{path}, line {number}: is not a JSON object")
+    return document
+
+
+def _check(path: Path, number: int, entry: dict[str, Any]) -> None:
+    act = entry.get("act")
+    if act not in _GIVES or (act == "write") != isinstance(entry.get("line"), str):
+        raise FileFormatError(f"{path}, line {number}: holds no act that a transcript knows")
+    if "raised" in entry:
+        if entry["raised"] not in _RAISED or not isinstance(entry.get("message"), str):
+            raise FileFormatError(f"{path}, line {number}: holds no error that lashbench knows")
+        return
+    if act == "block":
+        try:
+            base64.b64decode(entry["base64"], validate=True)
+        except (KeyError, TypeError, ValueError) as error:
+            raise FileFormatError(f"{path}, line {number}: holds no block") from error
+    elif act != "write" and not isinstance(entry.get("gave", ...), _GIVES[act]):
+        raise FileFormatError(f"{path}, line {number}: holds no answer to a {act}")
+
+
+def _now() -> str:
+    from datetime import UTC, datetime
+
+    return datetime.now(UTC).isoformat(timespec="seconds")
