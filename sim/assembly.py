@@ -1,0 +1,226 @@
+"""From a list of physical elements to matrices and switching laws.
+
+Owns the form that the engine steps, a linear system with a few scalar,
+memoryless, piecewise-linear feedbacks, and the bookkeeping that builds it. It
+knows neither gears nor gimbals, and never touches time.
+
+    x'  = A x + b u + f + sum_j g_j p_j          y_j = c_j x + d_j u
+    V_o = o x                                    p_j = law_j(y_j)
+
+A mesh with play enters as its closed stiffness in A and a bounded force p_j
+that takes the play back out. With the play at zero nothing but the linear
+system remains, and while a mesh is in contact p_j is constant: both cases are
+then stepped exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.errors import ConfigurationError
+
+__all__ = ["Assembly", "Law", "Nonlinearity", "PiecewiseLinearSystem"]
+
+Along = Mapping[str, float]
+"""A direction over coordinates: the torque tau acts as tau * coefficient on each of them."""
+
+
+class Law(IntEnum):
+    """The scalar laws p = law(y) that the engine knows; `parameters` are theirs, in order."""
+
+    PLAY = 0
+    """p = k clip(y, -d, d) + c y' while \\|y\\| < d. Parameters d; k and c are fixed."""
+    FRICTION = 1
+    """p = -(T + T_s exp(-(y/w)^2)) sign(y), set-valued at rest. Parameters T, T_s, w."""
+    EXCESS = 2
+    """p = clip(y, -limit, limit) - y. Parameter limit."""
+    CUBIC = 3
+    """p = -k y^3. Parameter k."""
+
+
+@dataclass(frozen=True, slots=True)
+class Nonlinearity:
+    """One scalar feedback p = law(y) of a piecewise-linear system.
+
+    `inlet` is g, `outlet` is c (both shape (n,)), `feedthrough` is d, `rate`
+    the row that gives y' where the law needs it.
+    """
+
+    name: str
+    law: Law
+    inlet: NDArray[np.float64]
+    outlet: NDArray[np.float64]
+    feedthrough: float
+    rate: NDArray[np.float64]
+    stiffness: float
+    damping: float
+    parameters: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class PiecewiseLinearSystem:
+    """What the engine steps; shapes for n states.
+
+    `A` (n, n), `b` (n,) input, `f` (n,) constant forcing, `o` (n,) output row,
+    `states` the names, `energy` a symmetric (n, n) matrix such that
+    x' energy x / 2 is the stored energy with every mesh closed.
+    """
+
+    A: NDArray[np.float64]
+    b: NDArray[np.float64]
+    f: NDArray[np.float64]
+    o: NDArray[np.float64]
+    nonlinearities: tuple[Nonlinearity, ...]
+    states: tuple[str, ...]
+    energy: NDArray[np.float64]
+
+    def transfer(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Linear response V_o/u with every mesh closed and no friction, shape of the input."""
+        s = 2j * np.pi * np.asarray(frequency_hz, dtype=float)
+        eye = np.eye(len(self.b))
+        x = np.linalg.solve(s[..., None, None] * eye - self.A, self.b[:, None].astype(complex))
+        return np.asarray(np.squeeze(self.o @ x, axis=-1))
+
+
+@dataclass(slots=True)
+class Assembly:
+    """Collects elements by name and turns them into a `PiecewiseLinearSystem`.
+
+    Coordinates are angles with an inertia; signals are first-order states
+    (currents, voltages). Every torque is given along a direction over
+    coordinates, so that one law serves springs between any of them.
+    """
+
+    inertias: dict[str, float] = field(default_factory=dict)
+    signals: list[str] = field(default_factory=list)
+    _torques: list[tuple[Along, Along, float, float]] = field(default_factory=list)
+    _couplings: list[tuple[str, str, float]] = field(default_factory=list)
+    _inputs: dict[str, float] = field(default_factory=dict)
+    _constants: dict[str, float] = field(default_factory=dict)
+    _laws: list[tuple[str, Law, Along, Along, float, float, float, tuple[float, ...]]] = field(
+        default_factory=list
+    )
+
+    def add_inertia(self, coordinate: str, J: float) -> None:
+        """Add a coordinate with inertia J in kg.m^2."""
+        if coordinate in self.inertias:
+            raise ConfigurationError(f"coordinate {coordinate!r} is given twice; name it once")
+        if not J > 0:
+            raise ConfigurationError(f"inertia of {coordinate!r} is {J} kg.m^2; it must be above 0")
+        self.inertias[coordinate] = J
+
+    def add_signal(self, signal: str) -> None:
+        """Add a first-order state that has no inertia."""
+        self.signals.append(signal)
+
+    def add_torque(self, along: Along, stiffness: float = 0.0, damping: float = 0.0) -> None:
+        """A linear spring and damper along one direction."""
+        self._torques.append((along, along, stiffness, damping))
+
+    def add_coupling(self, target: str, source: str, coefficient: float) -> None:
+        """Let `target`' (a signal's rate or a rate's torque) gain coefficient * `source`.
+
+        `source` and a signal `target` are state names; a coordinate as `target`
+        means a torque on it.
+        """
+        self._couplings.append((target, source, coefficient))
+
+    def add_input(self, signal: str, coefficient: float) -> None:
+        """Let the rate of a signal gain coefficient * u."""
+        self._inputs[signal] = self._inputs.get(signal, 0.0) + coefficient
+
+    def add_constant_torque(self, coordinate: str, torque: float) -> None:
+        """A constant torque in N.m."""
+        self._constants[coordinate] = self._constants.get(coordinate, 0.0) + torque
+
+    def add_law(
+        self,
+        name: str,
+        law: Law,
+        acts_on: Along,
+        looks_at: Along,
+        *,
+        feedthrough: float = 0.0,
+        stiffness: float = 0.0,
+        damping: float = 0.0,
+        parameters: tuple[float, ...] = (),
+    ) -> None:
+        """Add a scalar law from a combination of states to torques or signal rates.
+
+        `looks_at` and `acts_on` are over state names; in `acts_on` a coordinate
+        means a torque, a signal means its rate. For `Law.PLAY` the closed
+        stiffness and damping are added along the same direction.
+        """
+        if law is Law.PLAY:
+            self.add_torque(looks_at, stiffness, damping)
+        self._laws.append(
+            (name, law, acts_on, looks_at, feedthrough, stiffness, damping, parameters)
+        )
+
+    def build(self, output: Along) -> PiecewiseLinearSystem:
+        """Matrices and laws, with `output` as the row of V_o over state names."""
+        coordinates = list(self.inertias)
+        states = [*self.signals, *coordinates, *(f"{q}'" for q in coordinates)]
+        index = {name: i for i, name in enumerate(states)}
+        n = len(states)
+        A = np.zeros((n, n))
+        b = np.zeros(n)
+        f = np.zeros(n)
+        energy = np.zeros((n, n))
+
+        def row(along: Along, prime: str = "") -> NDArray[np.float64]:
+            vector = np.zeros(n)
+            for name, coefficient in along.items():
+                vector[index[name + prime]] += coefficient
+            return vector
+
+        def forcing(along: Along) -> NDArray[np.float64]:
+            vector = np.zeros(n)
+            for name, coefficient in along.items():
+                if name in self.inertias:
+                    vector[index[f"{name}'"]] += coefficient / self.inertias[name]
+                else:
+                    vector[index[name]] += coefficient
+            return vector
+
+        for q, J in self.inertias.items():
+            A[index[q], index[f"{q}'"]] = 1.0
+            energy[index[f"{q}'"], index[f"{q}'"]] = J
+        for acts, looks, stiffness, damping in self._torques:
+            A -= np.outer(forcing(acts), stiffness * row(looks) + damping * row(looks, "'"))
+            energy += stiffness * np.outer(row(looks), row(looks))
+        for target, source, coefficient in self._couplings:
+            A += np.outer(forcing({target: coefficient}), row({source: 1.0}))
+        for signal, coefficient in self._inputs.items():
+            b += forcing({signal: coefficient})
+        for coordinate, torque in self._constants.items():
+            f += forcing({coordinate: torque})
+
+        nonlinearities = tuple(
+            Nonlinearity(
+                name=name,
+                law=law,
+                inlet=forcing(acts),
+                outlet=row(looks),
+                feedthrough=feedthrough,
+                rate=row(looks, "'") if law is Law.PLAY else np.zeros(n),
+                stiffness=stiffness,
+                damping=damping,
+                parameters=(*parameters, 0.0, 0.0, 0.0)[:3],  # type: ignore[arg-type]
+            )
+            for name, law, acts, looks, feedthrough, stiffness, damping, parameters in self._laws
+        )
+        return PiecewiseLinearSystem(
+            A=A,
+            b=b,
+            f=f,
+            o=row(output),
+            nonlinearities=nonlinearities,
+            states=tuple(states),
+            energy=energy,
+        )

@@ -1,0 +1,351 @@
+"""The catalogue of effects: what a real drive may have that the paper model lacks.
+
+Owns, for each effect, its identifier, its parameters with their physical range,
+how it changes the unit or the drivetrain, and what it means to the person at
+the bench. An effect only adds or alters elements; it never touches the engine,
+and none is ever part of the paper model itself. How settings of effects are
+read and applied is `sim.effects`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any, Literal
+
+from sim.drivetrain import Drivetrain
+from sim.elements import (
+    ConstantTorque,
+    Damper,
+    HardeningSpring,
+    Inertia,
+    Spring,
+)
+from sim.unit import Unit
+
+__all__ = ["CATALOGUE", "Effect", "EffectParameter"]
+
+
+@dataclass(frozen=True, slots=True)
+class EffectParameter:
+    """One physical parameter of an effect.
+
+    `range` gives the plausible span for a unit, in `unit_symbol`; values
+    outside `allowed` have no physical meaning and are refused.
+    """
+
+    name: str
+    unit_symbol: str
+    range: Callable[[Unit], tuple[float, float]]
+    allowed: tuple[float, float] = (0.0, math.inf)
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """One entry of the catalogue.
+
+    `site` says whether the fault sits in the mechanics ("plant") or in the
+    measuring chain ("chain"). Exactly one of `on_unit` and `on_drivetrain`
+    is given.
+    """
+
+    id: str
+    parameters: tuple[EffectParameter, ...]
+    site: Literal["plant", "chain"]
+    meaning: str
+    bench_cause: str
+    on_unit: Callable[[Unit, Mapping[str, float]], Unit] | None = None
+    on_drivetrain: Callable[[Drivetrain, Unit, Mapping[str, float]], Drivetrain] | None = None
+
+
+def _table_1(symbol: str) -> Callable[[Unit, Mapping[str, float]], Unit]:
+    return lambda unit, values: unit.with_parameters(**{symbol: values[symbol]})
+
+
+def _around(symbol: str, low: float, high: float) -> Callable[[Unit], tuple[float, float]]:
+    """A range as multiples of the datasheet's value."""
+    return lambda unit: (low * unit.parameters[symbol], high * unit.parameters[symbol])
+
+
+def _span(low: float, high: float) -> Callable[[Unit], tuple[float, float]]:
+    return lambda unit: (low, high)
+
+
+def _load_critical(unit: Unit) -> float:
+    """Damping that would be critical for the load on shaft 1, N.m.s/rad: a natural scale."""
+    stiffness = unit.stage1.k_s1 * unit.stage2.N**2
+    return 2.0 * math.sqrt(stiffness * unit.load.J_L)
+
+
+def _shaft_critical(unit: Unit) -> float:
+    return _load_critical(unit) / unit.stage2.N**2
+
+
+def _add_load_damper(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrain:
+    return d.adding(load_viscous=Damper({"th_L": 1.0}, v["B_L"]))
+
+
+def _add_shaft_dampers(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrain:
+    return d.adding(
+        shaft_gear_damper=Damper({"th_g1": 1.0, "th_s1": -1.0}, 2.0 * v["c_s1"]),
+        shaft_pinion_damper=Damper({"th_s1": 1.0, "th_p2": -1.0}, 2.0 * v["c_s1"]),
+    )
+
+
+def _harden_shaft(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrain:
+    k = 2.0 * unit.stage1.k_s1
+    return d.adding(
+        gear_half_hardening=HardeningSpring("harden1", {"th_g1": 1.0, "th_s1": -1.0}, k, v["h"]),
+        pinion_half_hardening=HardeningSpring("harden2", {"th_s1": 1.0, "th_p2": -1.0}, k, v["h"]),
+    )
+
+
+def _add_payload(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrain:
+    omega = 2.0 * math.pi * v["f_p"]
+    twist = {"th_L": 1.0, "th_p": -1.0}
+    return d.adding(
+        payload=Inertia("th_p", v["J_p"]),
+        payload_spring=Spring(twist, v["J_p"] * omega**2),
+        payload_damper=Damper(twist, 2.0 * v["zeta_p"] * v["J_p"] * omega),
+    )
+
+
+def _amplifier(**fields: str) -> Callable[[Drivetrain, Unit, Mapping[str, float]], Drivetrain]:
+    def change(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrain:
+        values = {name: v[parameter] for name, parameter in fields.items()}
+        amplifier = replace(d.elements["motor"].amplifier, **values)  # type: ignore[attr-defined]
+        return d.replacing("motor", amplifier=amplifier)
+
+    return change
+
+
+def _scaled(*symbols: str) -> Callable[[Unit, Mapping[str, float]], Unit]:
+    return lambda unit, v: unit.with_parameters(
+        **{symbol: v["scale"] * unit.parameters[symbol] for symbol in symbols}
+    )
+
+
+def _move_corner(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrain:
+    d2, d1, d0 = unit.electronics.filter_denominator
+    scale = v["scale"]
+    return d.replacing(
+        "tachometer",
+        numerator=unit.electronics.filter_numerator * scale**2,
+        denominator=(d2, d1 * scale, d0 * scale**2),
+    )
+
+
+def _times(scale: Callable[[Unit], float], low: float, high: float) -> Callable[[Unit], Any]:
+    return lambda unit: (low * scale(unit), high * scale(unit))
+
+
+def _drive_voltage(unit: Unit) -> float:
+    return unit.electronics.k_a * unit.limits.source_vpk
+
+
+def _stall_torque(unit: Unit) -> float:
+    """Torque at the load for 1 V at the amplifier, a natural scale of load torques, N.m."""
+    motor = unit.motor
+    ratio = unit.stage1.N_1 * unit.stage2.N
+    return unit.electronics.k_a * motor.k_t / motor.R_m * ratio
+
+
+def _shaft_at_load(unit: Unit) -> float:
+    return unit.stage1.k_s1 * unit.stage2.N**2
+
+
+_P = EffectParameter
+_TORQUE, _DAMPING, _STIFFNESS = "N.m", "N.m.s/rad", "N.m/rad"
+
+_ALL = (
+    Effect(
+        "load-viscous-damping",
+        (_P("B_L", _DAMPING, _times(_load_critical, 3e-4, 0.1)),),
+        "plant",
+        "The load is braked in proportion to its speed.",
+        "grease or a seal dragging on the load, or eddy currents",
+        on_drivetrain=_add_load_damper,
+    ),
+    Effect(
+        "shaft-damping",
+        (_P("c_s1", _DAMPING, _times(_shaft_critical, 1e-3, 0.3)),),
+        "plant",
+        "Shaft 1 loses energy as it twists.",
+        "a press fit or coupling that works on shaft 1",
+        on_drivetrain=_add_shaft_dampers,
+    ),
+    Effect(
+        "mesh1-damping",
+        (_P("c_g1", _DAMPING, _span(1e-3, 10.0)),),
+        "plant",
+        "Gear 1 loses energy while its teeth touch.",
+        "thick or fresh grease in gear stage 1",
+        on_drivetrain=lambda d, unit, v: d.replacing("mesh1", c=v["c_g1"]),
+    ),
+    Effect(
+        "mesh2-damping",
+        (_P("c_2", _DAMPING, _span(1e-2, 100.0)),),
+        "plant",
+        "Gear 2 loses energy while its teeth touch.",
+        "thick or fresh grease in gear stage 2",
+        on_drivetrain=lambda d, unit, v: d.replacing("mesh2", c=v["c_2"]),
+    ),
+    Effect(
+        "load-coulomb-friction",
+        (_P("T_f_L", _TORQUE, _around("T_f_L", 0.0, 40.0)),),
+        "plant",
+        "The dry friction of the load differs from its datasheet.",
+        "a preloaded or dirty bearing of the load",
+        on_unit=_table_1("T_f_L"),
+    ),
+    Effect(
+        "load-stribeck-friction",
+        (
+            _P("T_s_L", _TORQUE, _around("T_f_L", 0.3, 40.0)),
+            _P("omega_s", "rad/s", _span(0.003, 3.0), (1e-6, math.inf)),
+        ),
+        "plant",
+        "The friction of the load peaks near standstill and falls as it moves.",
+        "a lubricated bearing that runs dry at low speed",
+        on_drivetrain=lambda d, unit, v: d.replacing(
+            "load_friction", T_s=v["T_s_L"], omega_s=v["omega_s"]
+        ),
+    ),
+    Effect(
+        "motor-coulomb-friction",
+        (_P("T_f_m", _TORQUE, _around("T_f_m", 0.0, 6.0)),),
+        "plant",
+        "The dry friction of the motor differs from its datasheet.",
+        "worn brushes, or a preloaded motor bearing",
+        on_unit=_table_1("T_f_m"),
+    ),
+    Effect(
+        "motor-viscous-friction",
+        (_P("B_m", _DAMPING, _around("B_m", 0.0, 30.0)),),
+        "plant",
+        "The viscous friction of the motor differs from its datasheet.",
+        "stiff grease in the motor bearings, cold running",
+        on_unit=_table_1("B_m"),
+    ),
+    Effect(
+        "load-inertia",
+        (_P("J_L", "kg.m^2", _around("J_L", 0.5, 2.0), (1e-12, math.inf)),),
+        "plant",
+        "The inertia of the load differs from its datasheet.",
+        "another payload, or a counterweight moved or missing",
+        on_unit=_table_1("J_L"),
+    ),
+    Effect(
+        "shaft-stiffness",
+        (_P("k_s1", _STIFFNESS, _around("k_s1", 0.5, 2.0), (1e-9, math.inf)),),
+        "plant",
+        "Shaft 1 is softer or stiffer than its datasheet.",
+        "a loose clamp, a crack, or another shaft",
+        on_unit=_table_1("k_s1"),
+    ),
+    Effect(
+        "shaft-hardening",
+        (_P("h", "1/rad^2", _span(10.0, 1e6)),),
+        "plant",
+        "Shaft 1 gets stiffer the more it twists.",
+        "a spline or coupling that closes up under torque",
+        on_drivetrain=_harden_shaft,
+    ),
+    Effect(
+        "total-backlash",
+        (_P("b_t_deg", "deg", _around("b_t_deg", 0.2, 4.0)),),
+        "plant",
+        "The total backlash differs from the value it was given.",
+        "wear, or a centre distance that was changed since it was measured",
+        on_unit=_table_1("b_t_deg"),
+    ),
+    Effect(
+        "cable-stiffness",
+        (_P("K_c", _STIFFNESS, _times(_shaft_at_load, 0.005, 2.0)),),
+        "plant",
+        "A spring ties the load to ground.",
+        "a stiff cable bundle or hose across the joint",
+        on_drivetrain=lambda d, unit, v: d.adding(cable=Spring({"th_L": 1.0}, v["K_c"])),
+    ),
+    Effect(
+        "load-torque-bias",
+        (_P("T_b", _TORQUE, _times(_stall_torque, 0.02, 2.0), (-math.inf, math.inf)),),
+        "plant",
+        "A constant torque pulls on the load.",
+        "an imbalance, a hanging cable or a tilted base",
+        on_drivetrain=lambda d, unit, v: d.adding(bias=ConstantTorque("th_L", v["T_b"])),
+    ),
+    Effect(
+        "payload-flexibility",
+        (
+            _P("J_p", "kg.m^2", _around("J_L", 0.02, 0.5), (1e-12, math.inf)),
+            _P("f_p", "Hz", _times(lambda unit: unit.limits.start_hz, 2.0, 30.0), (1e-3, 1e5)),
+            _P("zeta_p", "1", _span(0.005, 0.1)),
+        ),
+        "plant",
+        "Something on the load swings on a spring of its own.",
+        "a loose bracket, lens or cable clamp on the load",
+        on_drivetrain=_add_payload,
+    ),
+    Effect(
+        "amplifier-gain",
+        (_P("k_a", "1", _around("k_a", 0.5, 2.0), (1e-9, math.inf)),),
+        "chain",
+        "The gain of the amplifier differs from its datasheet.",
+        "a trimmer that was turned, or a changed supply",
+        on_unit=_table_1("k_a"),
+    ),
+    Effect(
+        "amplifier-saturation",
+        (_P("V_sat", "V", _times(_drive_voltage, 0.1, 1.0), (1e-6, math.inf)),),
+        "chain",
+        "The amplifier clips.",
+        "a low supply voltage or a current limit that is set too low",
+        on_drivetrain=_amplifier(V_sat="V_sat"),
+    ),
+    Effect(
+        "amplifier-lag",
+        (_P("tau_a", "s", _span(2e-5, 5e-3)),),
+        "chain",
+        "The amplifier answers late.",
+        "a noise filter or an ageing output stage in the amplifier",
+        on_drivetrain=_amplifier(tau_a="tau_a"),
+    ),
+    Effect(
+        "motor-resistance",
+        (_P("R_m", "ohm", _around("R_m", 0.5, 2.0), (1e-9, math.inf)),),
+        "plant",
+        "The resistance of the motor differs from its datasheet.",
+        "a hot winding, worn brushes or a bad contact in the motor lead",
+        on_unit=_table_1("R_m"),
+    ),
+    Effect(
+        "motor-constant",
+        (_P("scale", "1", _span(0.5, 2.0), (1e-9, math.inf)),),
+        "plant",
+        "Torque constant and back-EMF constant are both off by one factor.",
+        "magnets that lost or differ in strength",
+        on_unit=_scaled("k_t", "k_b"),
+    ),
+    Effect(
+        "tachometer-gain",
+        (_P("k_ts", "V.s/rad", _around("k_ts", 0.5, 2.0), (1e-9, math.inf)),),
+        "chain",
+        "The gain of the tachometer differs from its datasheet.",
+        "a loaded tachometer output or a changed tachometer",
+        on_unit=_table_1("k_ts"),
+    ),
+    Effect(
+        "filter-corner",
+        (_P("scale", "1", _span(0.5, 2.0), (1e-6, math.inf)),),
+        "chain",
+        "The corner frequency of the tachometer's filter is off.",
+        "a filter part of another value, or drift of it",
+        on_drivetrain=_move_corner,
+    ),
+)
+
+CATALOGUE: Mapping[str, Effect] = MappingProxyType({effect.id: effect for effect in _ALL})
+"""Every effect by identifier."""

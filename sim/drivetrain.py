@@ -1,0 +1,95 @@
+"""The two-stage geared servo of the paper, as an assembly of elements.
+
+Owns the topology, equations (1) to (20). ADSS and EDSS differ in numbers only,
+so does any other two-stage drive. The paper model is kept exactly, undamped;
+effects are added to it (`sim.effects`) and never folded into it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from sim.assembly import Assembly, PiecewiseLinearSystem
+from sim.elements import (
+    Amplifier,
+    Damper,
+    DryFriction,
+    Element,
+    Inertia,
+    Mesh,
+    Motor,
+    Spring,
+    Tachometer,
+)
+from sim.unit import Unit, stage_backlash
+
+__all__ = ["Drivetrain", "paper_drivetrain"]
+
+
+@dataclass(frozen=True, slots=True)
+class Drivetrain:
+    """Named elements; an effect returns a new one with elements added or replaced."""
+
+    elements: Mapping[str, Element]
+
+    def adding(self, **elements: Element) -> Drivetrain:
+        """A copy with further elements; a name that exists already is an error of the caller."""
+        twice = set(elements) & set(self.elements)
+        if twice:
+            raise ValueError(f"elements {sorted(twice)} exist already; use replacing()")
+        return Drivetrain({**self.elements, **elements})
+
+    def replacing(self, name: str, **fields: object) -> Drivetrain:
+        """A copy in which some fields of one element differ."""
+        element = replace(self.elements[name], **fields)  # type: ignore[type-var]
+        return Drivetrain({**self.elements, name: element})
+
+    def system(self) -> PiecewiseLinearSystem:
+        """The piecewise-linear system from amplifier input voltage to V_o."""
+        assembly = Assembly()
+        for element in self.elements.values():
+            element.enter(assembly)
+        return assembly.build(output={"V_o": 1.0})
+
+
+def paper_drivetrain(unit: Unit, ratio: float) -> Drivetrain:
+    """The paper's model of a unit at one contribution ratio.
+
+    Angles: th_m motor, th_g1 gear 1, th_s1 middle of shaft 1, th_p2 pinion 2,
+    th_L load.
+
+    Raises
+    ------
+    ConfigurationError
+        If the ratio is outside 0 to 1.
+    """
+    motor, electronics, load = unit.motor, unit.electronics, unit.load
+    stage1, stage2 = unit.stage1, unit.stage2
+    backlash = stage_backlash(ratio, unit.backlash.b_t_deg, stage2.N)
+    delta_1, delta_2 = backlash.half_plays_rad
+    return Drivetrain(
+        {
+            "tachometer": Tachometer(
+                "th_m",
+                electronics.k_ts,
+                electronics.filter_numerator,
+                electronics.filter_denominator,
+            ),
+            "motor": Motor(
+                "th_m", motor.L_a, motor.R_m, motor.k_b, motor.k_t, Amplifier(electronics.k_a)
+            ),
+            "rotor": Inertia("th_m", motor.J_m),
+            "gear1": Inertia("th_g1", stage1.J_g1),
+            "shaft": Inertia("th_s1", stage1.J_s1),
+            "pinion2": Inertia("th_p2", stage1.J_p2),
+            "load": Inertia("th_L", load.J_L),
+            "rotor_viscous": Damper({"th_m": 1.0}, motor.B_m),
+            "shaft_gear_half": Spring({"th_g1": 1.0, "th_s1": -1.0}, 2.0 * stage1.k_s1),
+            "shaft_pinion_half": Spring({"th_s1": 1.0, "th_p2": -1.0}, 2.0 * stage1.k_s1),
+            "mesh1": Mesh("mesh1", {"th_m": 1.0 / stage1.N_1, "th_g1": -1.0}, stage1.k_g1, delta_1),
+            "mesh2": Mesh("mesh2", {"th_p2": 1.0 / stage2.N, "th_L": -1.0}, stage2.k_2, delta_2),
+            "motor_friction": DryFriction("motor_friction", "th_m", motor.T_f_m),
+            "load_friction": DryFriction("load_friction", "th_L", load.T_f_L),
+        }
+    )

@@ -1,0 +1,219 @@
+"""The physical elements that a drivetrain is made of.
+
+Each is a small frozen record of physical parameters that knows how to enter an
+`Assembly`. Coordinates are named, so elements join wherever names meet. An
+element never steps time and never looks at another element.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from sim.assembly import Assembly, Law
+
+__all__ = [
+    "Amplifier",
+    "ConstantTorque",
+    "Damper",
+    "DryFriction",
+    "Element",
+    "HardeningSpring",
+    "Inertia",
+    "Mesh",
+    "Motor",
+    "Spring",
+    "Tachometer",
+]
+
+Along = Mapping[str, float]
+
+
+class Element(Protocol):
+    """Anything that can enter an assembly."""
+
+    def enter(self, assembly: Assembly) -> None:
+        """Add this element's states, torques and laws to the assembly."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Inertia:
+    """A rotating mass: J w' = sum of torques."""
+
+    coordinate: str
+    J: float
+
+    def enter(self, assembly: Assembly) -> None:
+        """Add the coordinate."""
+        assembly.add_inertia(self.coordinate, self.J)
+
+
+@dataclass(frozen=True, slots=True)
+class Spring:
+    """A linear torsion spring, N.m/rad; one coordinate alone means to ground."""
+
+    along: Along
+    k: float
+
+    def enter(self, assembly: Assembly) -> None:
+        """Add the spring."""
+        assembly.add_torque(self.along, stiffness=self.k)
+
+
+@dataclass(frozen=True, slots=True)
+class Damper:
+    """A viscous damper, N.m.s/rad; one coordinate alone means to ground."""
+
+    along: Along
+    c: float
+
+    def enter(self, assembly: Assembly) -> None:
+        """Add the damper."""
+        assembly.add_torque(self.along, damping=self.c)
+
+
+@dataclass(frozen=True, slots=True)
+class HardeningSpring:
+    """The cubic part k h x^3 of a spring k x (1 + h x^2); add a `Spring` for the linear part."""
+
+    name: str
+    along: Along
+    k: float
+    h: float
+
+    def enter(self, assembly: Assembly) -> None:
+        """Add the cubic torque."""
+        assembly.add_law(
+            self.name, Law.CUBIC, self.along, self.along, parameters=(self.k * self.h,)
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Mesh:
+    """A gear mesh: spring k behind a play of +-half_play, equations (6) and (11).
+
+    A damper c on the rate of the same deflection acts while the mesh is in contact.
+    """
+
+    name: str
+    along: Along
+    k: float
+    half_play: float
+    c: float = 0.0
+
+    def enter(self, assembly: Assembly) -> None:
+        """Add the closed mesh, and the bounded force that takes the play back out."""
+        assembly.add_law(
+            self.name,
+            Law.PLAY,
+            self.along,
+            self.along,
+            stiffness=self.k,
+            damping=self.c,
+            parameters=(self.half_play,),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class DryFriction:
+    """Dry friction T sign(w) that truly sticks; T_s adds a peak at rest (Stribeck)."""
+
+    name: str
+    coordinate: str
+    T: float
+    T_s: float = 0.0
+    omega_s: float = 1.0
+
+    def enter(self, assembly: Assembly) -> None:
+        """Add the friction torque."""
+        assembly.add_law(
+            self.name,
+            Law.FRICTION,
+            {self.coordinate: 1.0},
+            {f"{self.coordinate}'": 1.0},
+            parameters=(self.T, self.T_s, self.omega_s),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class ConstantTorque:
+    """A constant torque in N.m, as of an imbalance or a hanging cable."""
+
+    coordinate: str
+    torque: float
+
+    def enter(self, assembly: Assembly) -> None:
+        """Add the torque."""
+        assembly.add_constant_torque(self.coordinate, self.torque)
+
+
+@dataclass(frozen=True, slots=True)
+class Amplifier:
+    """Input voltage to motor voltage, equation (1), with optional lag and clip.
+
+    The lag comes before the clip: the output stage is what saturates.
+    """
+
+    k_a: float
+    tau_a: float = 0.0
+    V_sat: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Motor:
+    """A DC motor on its amplifier, equations (2) and (5) without the friction."""
+
+    coordinate: str
+    L_a: float
+    R_m: float
+    k_b: float
+    k_t: float
+    amplifier: Amplifier
+
+    def enter(self, assembly: Assembly) -> None:
+        """Add the armature current, the torque, and the amplifier's own state and clip."""
+        amplifier = self.amplifier
+        assembly.add_signal("i_a")
+        assembly.add_coupling("i_a", "i_a", -self.R_m / self.L_a)
+        assembly.add_coupling("i_a", f"{self.coordinate}'", -self.k_b / self.L_a)
+        assembly.add_coupling(self.coordinate, "i_a", self.k_t)
+        if amplifier.tau_a > 0.0:
+            assembly.add_signal("V_m")
+            assembly.add_coupling("V_m", "V_m", -1.0 / amplifier.tau_a)
+            assembly.add_input("V_m", amplifier.k_a / amplifier.tau_a)
+            assembly.add_coupling("i_a", "V_m", 1.0 / self.L_a)
+            looks_at, feedthrough = {"V_m": 1.0}, 0.0
+        else:
+            assembly.add_input("i_a", amplifier.k_a / self.L_a)
+            looks_at, feedthrough = {}, amplifier.k_a
+        if amplifier.V_sat is not None:
+            assembly.add_law(
+                "amplifier",
+                Law.EXCESS,
+                {"i_a": 1.0 / self.L_a},
+                looks_at,
+                feedthrough=feedthrough,
+                parameters=(amplifier.V_sat,),
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Tachometer:
+    """Tachometer and its second-order filter, equations (3) and (4)."""
+
+    coordinate: str
+    k_ts: float
+    numerator: float
+    denominator: tuple[float, float, float]
+
+    def enter(self, assembly: Assembly) -> None:
+        """Add the filter's output `V_o` and its rate."""
+        d2, d1, d0 = self.denominator
+        assembly.add_signal("V_o")
+        assembly.add_signal("V_o'")
+        assembly.add_coupling("V_o", "V_o'", 1.0)
+        assembly.add_coupling("V_o'", "V_o", -d0 / d2)
+        assembly.add_coupling("V_o'", "V_o'", -d1 / d2)
+        assembly.add_coupling("V_o'", f"{self.coordinate}'", self.numerator * self.k_ts / d2)

@@ -1,0 +1,393 @@
+"""Simulated frequency responses: a servo taken through a sweep plan, as a bench would.
+
+Owns what lies between a drivetrain and a `FrequencyResponse`: levels and
+frequencies in order, the state carried on or put to rest, the start, and the
+error bar of every point. It judges nothing.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.errors import AnalysisError
+from daq.frf import DB_PER_NEPER, FrequencyResponse, PointFlag
+from daq.plan import SweepPlan
+from sim.assembly import Law, PiecewiseLinearSystem
+from sim.effects import EffectSetting, drivetrain_with
+from sim.engine import HARMONICS, LONGEST_STEP_S, Stretch, advance
+from sim.unit import Unit
+
+__all__ = [
+    "DwellRecord",
+    "PERIODIC_SCATTER",
+    "Servo",
+    "SteppedServo",
+    "simulate",
+    "simulate_cycles",
+]
+
+PERIODIC_SCATTER = 0.01
+"""A point is period-1 if no cycle's coefficient departs from the mean by more than this share."""
+
+
+@dataclass(frozen=True, slots=True)
+class Servo:
+    """One machine to simulate: a system and where its motion starts.
+
+    `seed` draws the start: every mesh rests somewhere inside its play. Servos
+    that share their linear part are stepped side by side, so vary play,
+    friction and seed freely: they cost least.
+    """
+
+    system: PiecewiseLinearSystem
+    seed: int = 0
+
+    @classmethod
+    def of(
+        cls, unit: Unit, ratio: float, effects: Sequence[EffectSetting] = (), seed: int = 0
+    ) -> Servo:
+        """The servo of a unit at one contribution ratio with some effects."""
+        return cls(drivetrain_with(unit, ratio, effects).system(), seed)
+
+
+def simulate(
+    unit: Unit,
+    ratio: float,
+    plan: SweepPlan,
+    *,
+    effects: Sequence[EffectSetting] = (),
+    seed: int = 0,
+    longest_step_s: float = LONGEST_STEP_S,
+) -> FrequencyResponse:
+    """Simulate a sweep of one unit.
+
+    Parameters
+    ----------
+    unit, ratio, effects
+        The machine: its parameters, contribution ratio 0 to 1, and what is
+        added to the paper model.
+    plan
+        Levels, frequencies, direction, cycles. The state carries on from point
+        to point within a level unless ``plan.from_rest``; each level starts anew.
+    seed
+        Draws where in its play each mesh rests at the start. The same seed
+        gives the same response to the last bit on one machine.
+
+    Returns
+    -------
+    FrequencyResponse
+        Rows in the order of the levels given, frequencies ascending. Error bars are one
+        standard error of the mean over the integrated cycles.
+
+    Raises
+    ------
+    ConfigurationError
+        If the ratio or an effect is not allowed.
+    AnalysisError
+        If the motion grew without bound.
+    """
+    servo = Servo.of(unit, ratio, effects, seed)
+    (cycles,) = simulate_cycles([servo], plan, longest_step_s=longest_step_s)
+    provenance = {
+        "kind": "simulated",
+        "software": f"lashbench {_version()}",
+        "contribution_ratio": float(ratio),
+        "effects": [{"id": e.id, **e.values} for e in effects],
+        "parameters": unit.parameters,
+        "seed": int(seed),
+        "longest_step_s": float(longest_step_s),
+        "dc_offset_v": plan.dc_offset_v,
+    }
+    return response_of_cycles(cycles, plan, unit.name, provenance)
+
+
+def simulate_cycles(
+    servos: Sequence[Servo],
+    plan: SweepPlan,
+    *,
+    longest_step_s: float = LONGEST_STEP_S,
+    workers: int | None = None,
+) -> list[NDArray[np.complex128]]:
+    """Fourier coefficients of every integrated cycle, for many servos at once.
+
+    Returns
+    -------
+    list of ndarray
+        One per servo, (levels, points, cycles, 4): V_o's coefficients over the
+        source level, harmonics 0 to 3, points in ascending frequency.
+
+    Raises
+    ------
+    AnalysisError
+        If a motion grew without bound.
+    """
+    levels = len(plan.levels_vpk)
+    groups = list(_groups(servos, levels, workers or _cores()))
+    with ThreadPoolExecutor(workers or _cores()) as pool:
+        done = list(pool.map(lambda group: _sweep([servos[i] for i in group], plan,
+                                                  longest_step_s), groups))  # fmt: skip
+    results: list[NDArray[np.complex128]] = [np.empty(0, complex)] * len(servos)
+    for group, cycles in zip(groups, done, strict=True):
+        for position, index in enumerate(group):
+            results[index] = cycles[position]
+    return results
+
+
+def response_of_cycles(
+    cycles: NDArray[np.complex128],
+    plan: SweepPlan,
+    unit: str,
+    provenance: dict[str, object],
+) -> FrequencyResponse:
+    """The response that a bench would read from per-cycle coefficients.
+
+    `cycles` is (levels, points, cycles, 4) over the source level.
+    """
+    levels, points = cycles.shape[:2]
+    gain, along, across, worst = scatter_of_cycles(cycles[..., 1])
+    level = np.repeat(np.asarray(plan.levels_vpk, dtype=float), points)
+    magnitude = np.abs(gain).ravel()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gain_std_db = DB_PER_NEPER * along.ravel() / magnitude
+        phase_std_deg = np.degrees(across.ravel() / magnitude)
+    return FrequencyResponse.from_arrays(
+        np.tile(np.asarray(plan.frequencies_hz, dtype=float), levels),
+        level,
+        gain.ravel(),
+        unit=unit,
+        gain_std_db=gain_std_db,
+        phase_std_deg=phase_std_deg,
+        dc_v=cycles[..., 0].real.mean(axis=2).ravel() * level,
+        harmonic2=cycles[..., 2].mean(axis=2).ravel(),
+        harmonic3=cycles[..., 3].mean(axis=2).ravel(),
+        flags=np.where(worst.ravel() > PERIODIC_SCATTER, int(PointFlag.NOT_PERIODIC), 0),
+        direction=plan.direction,
+        settle_cycles=plan.settle_cycles,
+        integrate_cycles=plan.integrate_cycles,
+        from_rest=plan.from_rest,
+        provenance=provenance,
+    )
+
+
+def scatter_of_cycles(
+    coefficients: NDArray[np.complex128],
+) -> tuple[NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Mean over cycles, and its standard error along and across the mean.
+
+    Parameters
+    ----------
+    coefficients
+        (..., cycles).
+
+    Returns
+    -------
+    mean, along, across, worst
+        Each (...). `along` and `across` are one standard error of the mean in
+        the direction of the mean phasor and at right angles to it (NaN for a
+        single cycle); `worst` is the largest departure of a cycle from the
+        mean, as a share of the mean.
+    """
+    count = coefficients.shape[-1]
+    mean = coefficients.mean(axis=-1)
+    magnitude = np.abs(mean)
+    direction = np.where(magnitude > 0, mean / np.where(magnitude > 0, magnitude, 1.0), 1.0)
+    turned = (coefficients - mean[..., None]) * np.conj(direction)[..., None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        worst = np.where(magnitude > 0, np.abs(turned).max(axis=-1) / magnitude, np.inf)
+    if count < 2:
+        unknown = np.full(mean.shape, np.nan)
+        return mean, unknown, unknown.copy(), worst
+    share = np.sqrt(count)
+    along = turned.real.std(axis=-1, ddof=1) / share
+    across = turned.imag.std(axis=-1, ddof=1) / share
+    return mean, along, across, worst
+
+
+@dataclass(frozen=True, slots=True)
+class DwellRecord:
+    """What one dwell at one frequency showed at the analyser's two inputs.
+
+    `source_cycles` (cycles,): complex amplitude of channel 1 in each cycle, V.
+    `output_cycles` (cycles, 4): Fourier coefficients of V_o in V; column 0 is
+    the mean, columns 1 to 3 the complex amplitudes of those harmonics.
+    Peaks are the largest magnitudes seen, V.
+    """
+
+    source_cycles: NDArray[np.complex128]
+    output_cycles: NDArray[np.complex128]
+    source_peak_v: float
+    output_peak_v: float
+
+
+class SteppedServo:
+    """A servo on the bench: driven dwell by dwell, its state carried on in between."""
+
+    def __init__(
+        self,
+        unit: Unit,
+        ratio: float,
+        effects: Sequence[EffectSetting] = (),
+        seed: int = 0,
+        longest_step_s: float = LONGEST_STEP_S,
+    ) -> None:
+        self._servo = Servo.of(unit, ratio, effects, seed)
+        self._longest_step_s = longest_step_s
+        self.rest()
+
+    def rest(self) -> None:
+        """Let the motion die and the meshes settle where the seed puts them."""
+        self._state = _start([self._servo], levels=1)
+
+    def dwell(
+        self,
+        frequency_hz: float,
+        source_vpk: float,
+        offset_v: float = 0.0,
+        settle_cycles: int = 20,
+        integrate_cycles: int = 30,
+    ) -> DwellRecord:
+        """Drive at one frequency, source_vpk sin(2 pi f t) + offset_v, and record the cycles.
+
+        Raises
+        ------
+        AnalysisError
+            If the motion grew without bound.
+        """
+        one = np.ones(1)
+        stretch = Stretch(
+            frequency_hz, source_vpk * one, 0.0 * one, offset_v * one, settle_cycles,
+            integrate_cycles,
+        )  # fmt: skip
+        system = self._servo.system
+        (motion,) = advance(
+            system, _parameters([self._servo], 1), self._state, [stretch], self._longest_step_s
+        )
+        _require_finite(motion.coefficients, frequency_hz)
+        self._state = motion.state
+        return DwellRecord(
+            source_cycles=np.full(integrate_cycles, source_vpk, dtype=complex),
+            output_cycles=motion.coefficients[..., 0],
+            source_peak_v=source_vpk + abs(offset_v),
+            output_peak_v=float(motion.peak[0]),
+        )
+
+
+def _sweep(
+    servos: Sequence[Servo], plan: SweepPlan, longest_step_s: float
+) -> NDArray[np.complex128]:
+    """(servos, levels, points, cycles, 4) of servos that share their linear part."""
+    levels = np.asarray(plan.levels_vpk, dtype=float)
+    amplitude = np.tile(levels, len(servos))
+    zero = np.zeros_like(amplitude)
+    visited = plan.visited_hz
+    stretches = [
+        Stretch(f, amplitude, zero, zero + plan.dc_offset_v, plan.settle_cycles,
+                plan.integrate_cycles)
+        for f in visited
+    ]  # fmt: skip
+    system = servos[0].system
+    parameters, start = _parameters(servos, len(levels)), _start(servos, len(levels))
+    shape = (len(visited), plan.integrate_cycles, HARMONICS, len(amplitude))
+    kept = np.empty(shape, dtype=complex)
+    if plan.from_rest:
+        motions = (next(advance(system, parameters, start, [s], longest_step_s)) for s in stretches)
+    else:
+        motions = advance(system, parameters, start, stretches, longest_step_s)
+    for i, motion in enumerate(motions):
+        _require_finite(motion.coefficients, visited[i])
+        kept[i] = motion.coefficients / amplitude
+    if plan.direction == "down":
+        kept = kept[::-1]
+    lanes = kept.reshape(*shape[:3], len(servos), len(levels))
+    return np.ascontiguousarray(lanes.transpose(3, 4, 0, 1, 2))
+
+
+def _start(servos: Sequence[Servo], levels: int) -> NDArray[np.float64]:
+    """States (n, servos x levels) at rest, each mesh somewhere inside its play."""
+    system = servos[0].system
+    meshes = [law for law in system.nonlinearities if law.law is Law.PLAY]
+    columns = []
+    for servo in servos:
+        halves = [law.parameters[0] for law in servo.system.nonlinearities if law.law is Law.PLAY]
+        rng = np.random.default_rng(servo.seed)
+        where = rng.uniform(-1.0, 1.0, size=(levels, len(halves))) * halves
+        # The smallest angles that put each mesh there leave every spring but
+        # the meshes unwound only if they are compliant; springs are excluded
+        # by solving for the meshes' deflections and zero elastic energy elsewhere.
+        columns.append(_at_rest(system, meshes, where))
+    return np.concatenate(columns, axis=1)
+
+
+def _at_rest(
+    system: PiecewiseLinearSystem, meshes: Sequence, where: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    n = len(system.b)
+    if not meshes:
+        return np.zeros((n, len(where)))
+    outlets = np.array([mesh.outlet for mesh in meshes])
+    # What stores energy besides the meshes: rows that must stay zero.
+    elastic = system.energy - sum(
+        mesh.stiffness * np.outer(mesh.outlet, mesh.outlet) for mesh in meshes
+    )
+    rows = np.vstack([outlets, elastic / max(np.abs(elastic).max(), 1e-300)])
+    wanted = np.vstack([where.T, np.zeros((n, len(where)))])
+    return np.linalg.lstsq(rows, wanted, rcond=None)[0]
+
+
+def _parameters(servos: Sequence[Servo], levels: int) -> NDArray[np.float64]:
+    """Law parameters (m, 3, servos x levels)."""
+    per_servo = [
+        np.array([law.parameters for law in servo.system.nonlinearities]).reshape(-1, 3)
+        for servo in servos
+    ]
+    return np.repeat(np.stack(per_servo, axis=-1), levels, axis=-1)
+
+
+def _groups(servos: Sequence[Servo], levels: int, workers: int) -> Iterable[list[int]]:
+    """Indices of servos that share their linear part, in lots that fill lanes and cores."""
+    alike: dict[bytes, list[int]] = {}
+    for index, servo in enumerate(servos):
+        alike.setdefault(_linear_key(servo.system), []).append(index)
+    for members in alike.values():
+        share = -(-len(members) // workers) if len(alike) < workers else len(members)
+        size = max(min(share, _LANES_PER_LOT // levels), 1)
+        for start in range(0, len(members), size):
+            yield members[start : start + size]
+
+
+def _linear_key(system: PiecewiseLinearSystem) -> bytes:
+    parts = [system.A, system.b, system.f, system.o]
+    for law in system.nonlinearities:
+        stribeck = float(law.law is Law.FRICTION and law.parameters[1] != 0.0)
+        fixed = np.array([law.law, law.feedthrough, law.stiffness, law.damping, stribeck])
+        parts += [law.inlet, law.outlet, law.rate, fixed]
+    return b"".join(np.ascontiguousarray(part, dtype=float).tobytes() for part in parts)
+
+
+def _require_finite(values: NDArray[np.complex128], frequency_hz: float) -> None:
+    if not np.all(np.isfinite(values)):
+        raise AnalysisError(
+            f"the simulated motion at {frequency_hz:g} Hz grew without bound; "
+            "check the parameters, or take a shorter step"
+        )
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _version() -> str:
+    try:
+        return version("lashbench")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+_LANES_PER_LOT = 64
