@@ -128,9 +128,10 @@ def write(response: FrequencyResponse, path: Path) -> None:
         [kept.frequency_hz, kept.source_vpk, kept.gain_db, kept.phase_deg, kept.gain_std_db]
     )
     for row in np.flatnonzero(~np.all(np.isfinite(columns[:, :3]), axis=1)):
+        why = "is zero: nothing moved" if kept.gain[row] == 0 else "is no finite number"
         raise InputError(
-            f"{path}: the reading at {kept.frequency_hz[row]} Hz and {kept.source_vpk[row]} V "
-            "has no finite gain; measure it again or mark it as spoilt"
+            f"{path}: the gain at {kept.frequency_hz[row]:g} Hz and {kept.source_vpk[row]:g} V "
+            f"{why}; drive it harder or mark the reading as spoilt"
         )
     comments = _comments(kept, response.take(spoilt))
     try:

@@ -12,10 +12,16 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from daq.errors import InputError
 from tui.options import Real, UnitName, Whole, parameter_settings
 from tui.output import Injected
 
 __all__ = ["simulate"]
+
+_MOST_CYCLES = 10_000_000
+"""Cycles that are kept until their mean is taken: 64 bytes each."""
+_LONGEST_S = 1e5
+"""Motion that takes hours to simulate: nobody means a longer one."""
 
 
 def simulate(
@@ -79,6 +85,13 @@ def simulate(
     from sim.unit import load_unit
 
     check_writable(out)
+    if seed < 0:
+        raise InputError(f"--seed {seed} is negative; give 0 or more")
+    if points * len(level) * integrate_cycles > _MOST_CYCLES:
+        raise InputError(
+            f"{points} points of {integrate_cycles} cycles at {len(level)} levels are more than "
+            f"{_MOST_CYCLES} cycles; give fewer"
+        )
     subject = load_unit(unit).with_parameters(**parameter_settings(set_ or []))
     plan = SweepPlan(
         frequencies_hz=spaced_frequencies(start, stop, points, spacing),
@@ -88,6 +101,11 @@ def simulate(
         integrate_cycles=integrate_cycles,
         from_rest=from_rest,
     )
+    if plan.duration_s > _LONGEST_S:
+        raise InputError(
+            f"the sweep lasts {plan.duration_s:.3g} s, more than {_LONGEST_S:.0f} s; "
+            "give fewer points or cycles, or a higher start"
+        )
     effects = tuple(parse_effect(text) for text in effect or [])
     console.note(
         f"simulating {subject.name}: {plan.points} points, {plan.duration_s:.0f} s of motion"

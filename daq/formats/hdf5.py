@@ -1,0 +1,113 @@
+"""Frequency responses as HDF5, with the attributes that generic viewers of NeXus files follow.
+
+Owns that layout: one group with one data set per array, each with its unit,
+and the rest of the response as a JSON document in the root. Decibels and
+degrees are written as well, for viewers; they are not read back.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from daq.errors import FileFormatError
+from daq.formats.atomic import replacing
+from daq.formats.record import (
+    ARRAYS,
+    ROW_LIMIT,
+    arrays_of,
+    checked_file,
+    document_of,
+    response_from,
+)
+from daq.frf import FrequencyResponse
+
+if TYPE_CHECKING:
+    import h5py
+
+__all__ = ["read", "write"]
+
+_GROUP = "entry/data"
+_KIND = "an HDF5 file that lashbench wrote"
+_DOCUMENT_LIMIT_BYTES = 64 << 20
+
+
+def read(path: Path) -> FrequencyResponse:
+    """Read an HDF5 file that `write` made.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is damaged, not one of ours, or holds anything but plain
+        arrays of numbers where they are due.
+    """
+    import h5py
+
+    checked_file(path, _KIND)
+    try:
+        with h5py.File(path, "r") as file:
+            document = _document(file, path)
+            arrays = {name: _array(file, name, path) for name in ARRAYS}
+    except (OSError, KeyError, RuntimeError, ValueError, TypeError) as error:
+        # h5py reports damage in any of these ways.
+        reason = " ".join(str(error).split())
+        raise FileFormatError(f"{path}: cannot be read as HDF5 ({reason}); give {_KIND}") from error
+    return response_from(arrays, document, path)
+
+
+def write(response: FrequencyResponse, path: Path) -> None:
+    """Write an HDF5 file, whole or not at all; nothing of the response is lost.
+
+    Raises
+    ------
+    InputError
+        If a value is none that a reading can have, the provenance has no form
+        in JSON, or no file can be made at `path`.
+    """
+    import h5py
+
+    arrays, document = arrays_of(response, path), document_of(response, path)
+    shown = {"gain_db": (response.gain_db, "dB"), "phase_deg": (response.phase_deg, "deg")}
+    with replacing(path) as partial, h5py.File(partial, "w") as file:
+        file.attrs.update({"NX_class": "NXroot", "default": "entry"})
+        # A data set of its own: attributes are limited to 64 KiB.
+        file.create_dataset("document", data=np.frombuffer(document.encode("ascii"), np.uint8))
+        group = file.create_group(_GROUP)
+        file["entry"].attrs.update({"NX_class": "NXentry", "default": "data"})
+        group.attrs.update({"NX_class": "NXdata", "signal": "gain_db", "axes": ["frequency_hz"]})
+        for name, values in arrays.items():
+            group.create_dataset(name, data=values).attrs["units"] = ARRAYS[name][1]
+        for name, (column, unit) in shown.items():
+            group.create_dataset(name, data=column).attrs["units"] = unit
+
+
+def _document(file: h5py.File, path: Path) -> str:
+    held = _plain_dataset(file, "document", path)
+    if held.dtype != np.uint8 or held.ndim != 1 or held.size > _DOCUMENT_LIMIT_BYTES:
+        raise FileFormatError(f"{path}: its document is not a text; give {_KIND}")
+    return bytes(held[()]).decode("ascii")
+
+
+def _array(file: h5py.File, name: str, path: Path) -> Any:
+    held = _plain_dataset(file, f"{_GROUP}/{name}", path)
+    if held.ndim != 1 or held.size > ROW_LIMIT:
+        raise FileFormatError(f"{path}: {name} has the shape {held.shape}; give {_KIND}")
+    return held[()]
+
+
+def _plain_dataset(file: h5py.File, name: str, path: Path) -> h5py.Dataset:
+    import h5py
+
+    held = file
+    for part in name.split("/"):
+        # A link may lead out of the file, and so may the storage of a data set.
+        if not isinstance(held, h5py.Group) or not isinstance(
+            held.get(part, getlink=True), h5py.HardLink
+        ):
+            raise FileFormatError(f"{path}: {name} is missing; give {_KIND}")
+        held = held[part]
+    if not isinstance(held, h5py.Dataset) or held.is_virtual or held.external:
+        raise FileFormatError(f"{path}: {name} is not an array held in the file; give {_KIND}")
+    return held
