@@ -29,7 +29,7 @@ check: $(READY)
 	@$(BIN)/python tests/links.py
 
 bench: $(READY)
-	@for script in tests/benchmarks/bench_*.py; do $(BIN)/python "$$script" || exit 1; done
+	@for script in $(wildcard tests/benchmarks/*.py); do $(BIN)/python $$script || exit 1; done
 
 lock: $(READY)
 	@$(BIN)/python -m pip freeze --exclude-editable > requirements.lock

@@ -70,4 +70,4 @@ def estimate(
     if json:
         console.document(result.to_json())
     else:
-        console.data(result.summary())
+        console.data("\n".join(result.summary()))

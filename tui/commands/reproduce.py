@@ -27,4 +27,4 @@ def reproduce(*, json: Json = False, plots: Plots = None, console: Injected) -> 
     if json:
         console.document(result.to_json())
     else:
-        console.data(result.summary())
+        console.data("\n".join(result.summary()))
