@@ -41,20 +41,27 @@ PERIODIC_SCATTER = 0.01
 class Servo:
     """One machine to simulate: a system and where its motion starts.
 
-    `seed` draws the start: every mesh rests somewhere inside its play. Servos
+    `seed` draws the start: every mesh rests somewhere inside its play, at most
+    `start_spread` of the way from its middle to either end. Servos
     that share their linear part are stepped side by side, so vary play,
     friction and seed freely: they cost least.
     """
 
     system: PiecewiseLinearSystem
     seed: int = 0
+    start_spread: float = 1.0
 
     @classmethod
     def of(
-        cls, unit: Unit, ratio: float, effects: Sequence[EffectSetting] = (), seed: int = 0
+        cls,
+        unit: Unit,
+        ratio: float,
+        effects: Sequence[EffectSetting] = (),
+        seed: int = 0,
+        start_spread: float = 1.0,
     ) -> Servo:
         """The servo of a unit at one contribution ratio with some effects."""
-        return cls(drivetrain_with(unit, ratio, effects).system(), seed)
+        return cls(drivetrain_with(unit, ratio, effects).system(), seed, start_spread)
 
 
 def simulate(
@@ -317,7 +324,7 @@ def _start(servos: Sequence[Servo], levels: int) -> NDArray[np.float64]:
     for servo in servos:
         halves = [law.parameters[0] for law in servo.system.nonlinearities if law.law is Law.PLAY]
         rng = np.random.default_rng(servo.seed)
-        where = rng.uniform(-1.0, 1.0, size=(levels, len(halves))) * halves
+        where = rng.uniform(-1.0, 1.0, size=(levels, len(halves))) * halves * servo.start_spread
         # The smallest angles that put each mesh there leave every spring but
         # the meshes unwound only if they are compliant; springs are excluded
         # by solving for the meshes' deflections and zero elastic energy elsewhere.
