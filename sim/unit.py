@@ -10,7 +10,7 @@ import math
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -113,7 +113,8 @@ class Limits(_Section):
 class Unit(_Section):
     """A geared servo under test. Symbols are the paper's; SI units, degrees for backlash."""
 
-    schema_: Literal[1] = Field(alias="schema")
+    # Not Literal[1]: true equals 1 there.
+    schema_: Annotated[int, Field(alias="schema", ge=1, le=1)]
     name: Annotated[str, Field(min_length=1, max_length=64)]
     motor: Motor
     electronics: Electronics

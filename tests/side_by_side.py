@@ -1,0 +1,64 @@
+"""The engine and the oracle, asked the same question in the same words; for the tests alone."""
+
+import numpy as np
+from oracle import rk4
+from sim.effects import drivetrain_with
+from sim.engine import Stretch, advance
+from sim.unit import load_unit, stage_backlash
+
+ADSS, EDSS = load_unit("adss"), load_unit("edss")
+FRICTIONLESS = {"T_f_m": 0.0, "T_f_L": 0.0}
+
+
+def half_plays(unit, ratio):
+    return stage_backlash(ratio, unit.backlash.b_t_deg, unit.stage2.N).half_plays_rad
+
+
+def law_parameters(system, lanes=1):
+    one = np.array([law.parameters for law in system.nonlinearities]).reshape(-1, 3, 1)
+    return np.repeat(one, lanes, axis=-1)
+
+
+def drive(system, state, frequency_hz, cycles, amplitude=0.0, offset=0.0, step_s=5e-6, settle=0,
+          parameters=None):  # fmt: skip
+    """Coefficients (cycles, 4, lanes) in V, and the state at the end (n, lanes)."""
+    state = np.array(state, dtype=float).reshape(len(system.states), -1)
+    lanes = state.shape[1]
+    one = np.ones(lanes)
+    stretch = Stretch(frequency_hz, amplitude * one, 0.0 * one, offset * one, settle, cycles)
+    if parameters is None:
+        parameters = law_parameters(system, lanes)
+    (motion,) = advance(system, parameters, state, [stretch], step_s)
+    return motion.coefficients, motion.state
+
+
+def rows_of(system, **coordinates):
+    """A state (n,) with some of its entries set; names with `_rate` mean a velocity."""
+    state = np.zeros(len(system.states))
+    for name, value in coordinates.items():
+        state[system.states.index(name.replace("_rate", "'"))] = value
+    return state
+
+
+def engine_gain(unit, ratio, frequency_hz, level, settle, cycles, effects=(), offset=0.0,
+                step_s=5e-6):  # fmt: skip
+    """Per-cycle V_o over the level (cycles, 4) from zeros, as the oracle gives it."""
+    system = drivetrain_with(unit, ratio, effects).system()
+    start = np.zeros(len(system.states))
+    kept, _ = drive(system, start, frequency_hz, cycles, level, offset, step_s, settle)
+    return kept[..., 0] / level
+
+
+def oracle_gain(unit, ratio, frequency_hz, level, settle, cycles, extras=None, offset=0.0,
+                step_s=2e-6):  # fmt: skip
+    kept, _ = rk4.simulate_cycles(
+        unit.parameters, *half_plays(unit, ratio), level, frequency_hz, settle + cycles, step_s,
+        None, extras, offset,
+    )  # fmt: skip
+    return kept[settle:]
+
+
+def departure(one, other):
+    """How far two phasors are apart: dB and degrees."""
+    quotient = one / other
+    return abs(20.0 * np.log10(abs(quotient))), abs(np.degrees(np.angle(quotient)))
