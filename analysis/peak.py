@@ -1,0 +1,178 @@
+"""Reading a peak or a notch that no linear model describes.
+
+Owns the local parabola in the logarithm of the gain and the extremum of the
+grid, each with an error that holds for one draw of a scattering response. It
+knows nothing of poles and zeros and does not choose which extremum counts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaincc
+
+from analysis.candidates import Curve
+from analysis.damping import measure_half_power
+from analysis.noise import Vector
+
+__all__ = ["PeakReading", "read_peak"]
+
+WINDOWS = (0.5, 0.7, 1.0)
+"""Half-windows of the parabola in half-power half-widths."""
+LEAST_POINTS = 5
+"""A parabola through fewer readings cannot be tested."""
+LEAST_PROBABILITY = 0.01
+"""A parabola whose chi-square is less likely than this does not fit."""
+CLEAR_CURVATURE = 2.5
+"""The curvature must exceed this many of its standard errors."""
+JUMP_DB = 3.0
+"""A step of this size, three times the one on the other side, is a jump."""
+DRAWS = 200
+"""Draws of the noise that say which readings could be the extremum."""
+
+
+@dataclass(frozen=True, slots=True)
+class PeakReading:
+    """Frequency and gain of an extremum, each with one standard error; Hz and dB.
+
+    `jump` says that the response leaps next to the extremum.
+    """
+
+    frequency_hz: float
+    std_hz: float
+    gain_db: float
+    gain_std_db: float
+    method: Literal["parabola", "grid"]
+    jump: bool = False
+
+
+def read_peak(curve: Curve, index: int, sign: int, first: int, last: int) -> PeakReading:
+    """The extremum near a grid point: by parabola where one fits, else off the grid.
+
+    Parameters
+    ----------
+    curve
+        The smoothed level.
+    index
+        Grid point of the extremum of the smoothed curve.
+    sign
+        ``+1`` for a maximum, ``-1`` for a minimum.
+    first, last
+        Grid points between which the extremum may lie, both included; neither
+        is an end of the band.
+    """
+    fits = _parabolas(curve, index, sign, first, last)
+    if not fits:
+        return _grid_extremum(curve, index, sign, first, last)
+    # A wider window has less noise and more of the peak's skewness in it: what it
+    # moved beyond its noise, against the narrowest one, counts as its error.
+    narrow = fits[0]
+
+    def total(fit: PeakReading) -> float:
+        moved = (fit.frequency_hz - narrow.frequency_hz) ** 2
+        chance = abs(narrow.std_hz**2 - fit.std_hz**2)
+        return float(np.hypot(fit.std_hz, np.sqrt(max(0.0, moved - chance))))
+
+    best = min(fits, key=total)
+    return replace(best, std_hz=total(best))
+
+
+def _parabolas(curve: Curve, index: int, sign: int, first: int, last: int) -> list[PeakReading]:
+    """The parabolas that fit, narrowest window first."""
+    f = curve.frequency_hz
+    points = measure_half_power(f, curve.smooth_db, index, sign)
+    sides = (f[index] - points.low_hz, points.high_hz - f[index], f[last] - f[first])
+    reach = np.nanmin(sides)
+    found = []
+    for window in WINDOWS:
+        rows = np.flatnonzero(np.abs(f - f[index]) <= window * reach * (1.0 + 1e-9))
+        rows = rows[(rows >= first) & (rows <= last)]
+        if rows.size >= LEAST_POINTS and rows[0] < index < rows[-1]:
+            fit = _parabola(f[rows], curve.raw_db[rows], curve.noise_db[rows], sign)
+            found += [fit] if fit is not None else []
+    return found
+
+
+def _parabola(f: Vector, gain: Vector, noise: Vector, sign: int) -> PeakReading | None:
+    """Least-squares parabola; None where it does not fit or has no clear vertex inside."""
+    centre, half = 0.5 * (f[0] + f[-1]), 0.5 * (f[-1] - f[0])
+    u = (f - centre) / half
+    basis = np.stack([np.ones_like(u), u, u * u], axis=1)
+    weight = 1.0 / (noise**2 + np.median(noise**2))
+    try:
+        operator = np.linalg.solve(basis.T @ (weight[:, None] * basis), basis.T * weight)
+    except np.linalg.LinAlgError:
+        return None
+    a = operator @ gain
+    dof = u.size - 3
+    misfit = float(np.sum(((gain - basis @ a) / noise) ** 2))
+    if not gammaincc(dof / 2.0, misfit / 2.0) > LEAST_PROBABILITY:
+        return None
+    covariance = (operator * noise**2) @ operator.T * max(1.0, misfit / dof)
+    if -sign * a[2] < CLEAR_CURVATURE * np.sqrt(covariance[2, 2]):
+        return None
+    vertex = -a[1] / (2.0 * a[2])
+    if abs(vertex) > 0.9:
+        return None
+    by_a = np.array([0.0, -1.0, -2.0 * vertex]) / (2.0 * a[2])
+    at = np.array([1.0, vertex, vertex**2])
+    return PeakReading(
+        frequency_hz=float(centre + half * vertex),
+        std_hz=float(half * np.sqrt(by_a @ covariance @ by_a)),
+        gain_db=float(at @ a),
+        gain_std_db=float(np.sqrt(at @ covariance @ at)),
+        method="parabola",
+    )
+
+
+def _grid_extremum(curve: Curve, index: int, sign: int, first: int, last: int) -> PeakReading:
+    """The grid's extremum, spread over every point that could be it within its error."""
+    g = sign * curve.smooth_db
+    # Beyond the next valley (or hill) another feature begins.
+    first = max(first, int(np.argmin(g[: index + 1])))
+    last = min(last, index + int(np.argmin(g[index:])))
+    rows = np.arange(first, last + 1)
+    gain, std = curve.smooth_db[rows], curve.std_db[rows]
+    # A fixed stream: the same data give the same answer.
+    noise = np.random.default_rng(0).standard_normal((DRAWS, rows.size))
+    winners = np.argmax(sign * gain + std * noise, axis=1)
+    share = np.bincount(winners, minlength=rows.size) / DRAWS
+    place, spread, jump = _within_cell(curve.frequency_hz, g, rows)
+    mean, level = float(share @ place), float(share @ gain)
+    return PeakReading(
+        frequency_hz=mean,
+        std_hz=float(np.sqrt(share @ (spread**2 + (place - mean) ** 2))),
+        gain_db=level,
+        gain_std_db=float(np.sqrt(share @ (std**2 + (gain - level) ** 2))),
+        method="grid",
+        jump=bool(share @ jump > 0.5),
+    )
+
+
+def _within_cell(
+    f: Vector, g: Vector, rows: NDArray[np.intp]
+) -> tuple[Vector, Vector, NDArray[np.bool_]]:
+    """Where between readings a maximum lies if a given one is the highest; mean, spread, jump.
+
+    A peak of one hump lies between the two neighbours of its highest reading,
+    most likely near the parabola's vertex: a triangular density. At a jump it
+    lies anywhere up to the next reading: a uniform one.
+    """
+    before, here, after = f[rows - 1], f[rows], f[rows + 1]
+    left, right = g[rows] - g[rows - 1], g[rows] - g[rows + 1]
+    falls = (right > JUMP_DB) & (right > 3.0 * np.abs(left))
+    rises = (left > JUMP_DB) & (left > 3.0 * np.abs(right))
+    total = np.where(left + right > 0.0, left + right, np.inf)
+    lean = np.clip(0.5 * (left - right) / total, -0.5, 0.5)
+    vertex = here + lean * np.where(lean > 0.0, after - here, here - before)
+    place = np.select([falls, rises], [0.5 * (here + after), 0.5 * (here + before)], vertex)
+    uniform, triangular = np.sqrt(1.0 / 12.0), np.sqrt(1.0 / 24.0)
+    spread = np.select(
+        [falls, rises],
+        [(after - here) * uniform, (here - before) * uniform],
+        (after - before) * triangular,
+    )
+    return place, spread, falls | rises
