@@ -29,8 +29,10 @@ __all__ = [
     "SETTINGS",
     "SLEW",
     "SPACING",
+    "SPAN",
+    "START",
     "STEPPING",
-    "band_settings",
+    "STOP",
     "check_drive",
     "point_settings",
     "standing_settings",
@@ -174,14 +176,6 @@ def standing_settings() -> list[tuple[Setting, Any]]:
         (FAST_DISPLAY, False),
         (FORMAT, "REAL,64"),
     ]
-
-
-def band_settings(start_hz: float, stop_hz: float) -> list[tuple[Setting, Any]]:
-    """Start and stop, in an order that no earlier band can make the instrument refuse.
-
-    The start cannot pass 51.2 kHz minus the span, so the span is made small first.
-    """
-    return [(SPAN, 1.0), (START, start_hz), (STOP, stop_hz)]
 
 
 def point_settings(settings: PointSettings) -> list[tuple[Setting, Any]]:
