@@ -6,16 +6,17 @@ other module writes to them.
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-__all__ = ["Console", "Injected", "aligned", "as_json"]
+__all__ = ["Console", "Injected", "as_json"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +30,13 @@ class Console:
     """
 
     quiet: bool = False
+
+    def __post_init__(self) -> None:
+        # A terminal that lacks a character (the ± of a plain C locale) shows
+        # another in its place; it is no reason to lose the result.
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, io.TextIOWrapper):
+                stream.reconfigure(errors="replace")
 
     def data(self, text: str) -> None:
         """Print a line or block of the result to stdout."""
@@ -67,7 +75,7 @@ Injected = Annotated[Console, Parameter(parse=False, show=False)]
 
 def as_json(content: Mapping[str, Any]) -> str:
     """A JSON document; what is not a finite number becomes null."""
-    return json.dumps(_plain(content), indent=1, allow_nan=False, ensure_ascii=False)
+    return json.dumps(_plain(content), indent=1, allow_nan=False)
 
 
 def _plain(value: Any) -> Any:
@@ -80,17 +88,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Sequence) and not isinstance(value, str):
         return [_plain(item) for item in value]
     return value
-
-
-def aligned(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A plain-text table: the first column to the left, the others to the right."""
-    table = [list(headers), *(list(row) for row in rows)]
-    widths = [max(len(row[column]) for row in table) for column in range(len(headers))]
-    rule = ["-" * width for width in widths]
-    return "\n".join(
-        "  ".join(
-            cell.ljust(width) if column == 0 else cell.rjust(width)
-            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in [table[0], rule, *table[1:]]
-    )

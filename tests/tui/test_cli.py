@@ -155,7 +155,12 @@ def test_json_has_null_for_what_is_no_number():
     }
 
 
-def test_a_table_is_aligned():
-    assert output.aligned(["a", "bb"], [["long", "1"], ["x", "-"]]) == (
-        "a     bb\n----  --\nlong   1\nx      -"
+def test_a_terminal_without_the_character_shows_another():
+    program = "from tui.output import Console; Console().data('1 ± 2')"
+    run = subprocess.run(
+        [sys.executable, "-c", program],
+        env={"PYTHONIOENCODING": "ascii"},
+        capture_output=True,
+        check=True,
     )
+    assert run.stdout == b"1 ? 2\n"

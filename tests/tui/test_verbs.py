@@ -1,0 +1,114 @@
+"""The verbs end to end: the documents that scripts rely on, and the tables for people."""
+
+import functools
+import json
+from pathlib import Path
+
+import pytest
+
+from tui.cli import main
+
+PRACTICE = Path(__file__).parents[1] / "data" / "practice"
+SWEEP = str(PRACTICE / "practice-09.csv")
+
+
+def document(words, capsys):
+    """Run a verb with --json and return its one document; narration may only go to stderr."""
+    assert main([*words, "--json"]) == 0
+    out = capsys.readouterr().out
+
+    def refuse(constant):
+        raise AssertionError(f"{constant} is no JSON")
+
+    return json.loads(out, parse_constant=refuse)
+
+
+def text(words, capsys):
+    assert main(words) == 0
+    return capsys.readouterr().out
+
+
+def test_extract_gives_every_level_with_the_fields_that_scripts_use(capsys):
+    levels = document(["extract", SWEEP], capsys)["levels"]
+    assert [level["source_vpk"] for level in levels] == [1.5, 2.5, 4.0]
+    for level in levels:
+        assert set(level) >= {"source_vpk", "arf", "rf", "difference_hz", "damping_ratio", "flags"}
+        assert set(level["arf"]) >= {"frequency_hz", "std_hz", "gain_db"}
+        assert set(level["difference_hz"]) >= {"value", "std"}
+        assert set(level["damping_ratio"]) >= {"arf", "rf"}
+        assert 120 < level["arf"]["frequency_hz"] < level["rf"]["frequency_hz"] < 160
+
+
+def test_extract_has_null_and_a_reason_for_what_is_not_there(tmp_path, capsys):
+    lines = Path(SWEEP).read_text().splitlines(keepends=True)
+    cut = tmp_path / "cut.csv"
+    cut.write_text("".join(lines[:15]))
+    (level,) = document(["extract", str(cut)], capsys)["levels"]
+    assert level["arf"] is None
+    assert level["rf"] is None
+    assert level["flags"]
+    assert text(["extract", str(cut)], capsys).strip()
+
+
+def test_extract_prints_a_table(capsys):
+    table = text(["extract", SWEEP], capsys)
+    assert "ARF" in table
+    assert "RF" in table
+    assert all(len(line) <= 120 for line in table.splitlines())
+
+
+FIELDS = {"contribution_ratio", "b1_deg", "b2_deg", "b_t_deg", "error_index", "warnings"}
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["estimate", SWEEP, "--unit", "adss"],
+        ["estimate", "--unit", "adss", "--arf-hz", "128", "--rf-hz", "137"],
+    ],
+    ids=["file", "features"],
+)
+def test_estimate_gives_the_fields_that_scripts_use(words, capsys):
+    result = document(words, capsys)
+    assert set(result) >= FIELDS
+    ratio = result["contribution_ratio"]
+    low, high = ratio["interval95"]
+    assert 0 <= low <= ratio["value"] <= high <= 1
+    assert ratio["std"] > 0
+    index = result["error_index"]
+    assert len(index["ratio"]) == len(index["hz"]) == len(index["std_hz"]) > 2
+    assert index["ratio"][0] <= index["minimum_ratio"] <= index["ratio"][-1]
+    for name in ("b1_deg", "b2_deg", "b_t_deg"):
+        assert set(result[name]) >= {"value", "std"}
+
+
+def test_estimate_prints_its_result(capsys):
+    words = ["estimate", "--unit", "adss", "--arf-hz", "128", "--rf-hz", "137"]
+    assert "contribution" in text(words, capsys).lower()
+
+
+@pytest.fixture
+def short_reproduction(monkeypatch):
+    """One row of Table 2 with few runs: the verb is under test, not the numbers."""
+    from analysis import paper
+
+    short = functools.partial(
+        paper.reproduce, paper_runs=2, exact_runs=2, rows=[("ADSS", 50), ("ADSS", 75)]
+    )
+    monkeypatch.setattr(paper, "reproduce", short)
+
+
+@pytest.mark.usefixtures("short_reproduction")
+def test_reproduce_gives_the_fields_that_scripts_use(capsys, tmp_path):
+    result = document(["reproduce", "--plots", str(tmp_path / "plots")], capsys)
+    assert set(result) >= {"table2", "error_index", "damping", "elapsed_s"}
+    row = result["table2"][0]
+    assert (row["unit"], row["ratio_percent"]) == ("ADSS", 50)
+    wanted = {"published_hz", "value_hz", "std_hz", "exact_hz"}
+    wanted |= {"published_db", "value_db", "exact_db"}
+    for feature in ("arf", "rf"):
+        assert set(row[feature]) >= wanted
+    assert set(result["error_index"]["ADSS"]) >= {"minimum_ratio_percent", "minimum_hz"}
+    pictures = list((tmp_path / "plots").glob("*.png"))
+    assert pictures
+    assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in pictures)
