@@ -14,14 +14,7 @@ import numpy as np
 
 from daq.errors import FileFormatError
 from daq.formats.atomic import replacing
-from daq.formats.record import (
-    ARRAYS,
-    ROW_LIMIT,
-    arrays_of,
-    checked_file,
-    document_of,
-    response_from,
-)
+from daq.formats.record import ARRAYS, ROW_LIMIT, checked_file, response_from, taken_apart
 from daq.frf import FrequencyResponse
 
 if TYPE_CHECKING:
@@ -68,7 +61,7 @@ def write(response: FrequencyResponse, path: Path) -> None:
     """
     import h5py
 
-    arrays, document = arrays_of(response, path), document_of(response, path)
+    arrays, document = taken_apart(response, path)
     shown = {"gain_db": (response.gain_db, "dB"), "phase_deg": (response.phase_deg, "deg")}
     with replacing(path) as partial, h5py.File(partial, "w") as file:
         file.attrs.update({"NX_class": "NXroot", "default": "entry"})

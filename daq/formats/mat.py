@@ -2,11 +2,15 @@
 
 Owns that layout: column vectors under the names of the response's arrays, and
 the rest of it as a JSON text in the variable `document` (in MATLAB:
-``jsondecode(document)``).
+``jsondecode(document)``). The text at the head of the file carries a digest of
+what follows, because the reader of scipy can crash on a damaged file: nothing
+that was not written here gets that far.
 """
 
 from __future__ import annotations
 
+import hashlib
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +18,13 @@ import numpy as np
 
 from daq.errors import FileFormatError
 from daq.formats.atomic import replacing
-from daq.formats.record import ARRAYS, arrays_of, checked_file, document_of, response_from
+from daq.formats.record import ARRAYS, checked_file, response_from, taken_apart
 from daq.frf import FrequencyResponse
 
 __all__ = ["read", "write"]
 
+_TEXT_BYTES = 116
+"""Length of the free text that a file of this kind starts with."""
 _KIND = "a MATLAB file that lashbench wrote"
 
 
@@ -28,16 +34,19 @@ def read(path: Path) -> FrequencyResponse:
     Raises
     ------
     FileFormatError
-        If the file is damaged, of version 7.3, or not one of ours.
+        If the file is damaged, or was written or saved again by another program.
     """
     from scipy.io import loadmat
 
-    checked_file(path, _KIND)
+    content = checked_file(path, _KIND).read_bytes()
+    if content[:_TEXT_BYTES] != _head(content):
+        raise FileFormatError(
+            f"{path}: is damaged, or another program wrote it; give {_KIND}, or a CSV"
+        )
     try:
-        with path.open("rb") as file:
-            found = loadmat(file, variable_names=[*ARRAYS, "document"])
+        found = loadmat(BytesIO(content), variable_names=[*ARRAYS, "document"])
     except Exception as error:
-        # The reader has no error of its own: damage ends in any built-in one.
+        # The reader has no error of its own: what it dislikes ends in any built-in one.
         reason = " ".join(str(error).split()) or type(error).__name__
         raise FileFormatError(
             f"{path}: cannot be read as a MATLAB file ({reason}); give {_KIND}"
@@ -60,10 +69,18 @@ def write(response: FrequencyResponse, path: Path) -> None:
     """
     from scipy.io import savemat
 
-    content: dict[str, Any] = dict(arrays_of(response, path))
-    content["document"] = document_of(response, path)
-    with replacing(path) as partial, partial.open("wb") as file:
-        savemat(file, content, oned_as="column")
+    arrays, document = taken_apart(response, path)
+    buffer = BytesIO()
+    savemat(buffer, {**arrays, "document": document}, oned_as="column")
+    content = buffer.getvalue()
+    with replacing(path) as partial:
+        partial.write_bytes(_head(content) + content[_TEXT_BYTES:])
+
+
+def _head(content: bytes) -> bytes:
+    """The text at the start of a file with this content."""
+    digest = hashlib.sha256(content[_TEXT_BYTES:]).hexdigest()
+    return f"MATLAB 5.0 MAT-file, lashbench, sha256 {digest}".ljust(_TEXT_BYTES).encode("ascii")
 
 
 def _vector(held: Any, name: str, path: Path) -> Any:

@@ -7,10 +7,12 @@ It reads and writes no file.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -25,10 +27,9 @@ __all__ = [
     "FORMAT",
     "ROW_LIMIT",
     "VERSION",
-    "arrays_of",
     "checked_file",
-    "document_of",
     "response_from",
+    "taken_apart",
 ]
 
 FORMAT = "lashbench frequency response"
@@ -57,42 +58,42 @@ _PROCEDURE = ("unit", "direction", "settle_cycles", "integrate_cycles", "from_re
 _FLAGS = sum(PointFlag)
 
 
-def arrays_of(response: FrequencyResponse, path: Path) -> dict[str, NDArray[Any]]:
-    """The arrays of a response, checked, each of shape (rows,).
+def taken_apart(response: FrequencyResponse, path: Path) -> tuple[dict[str, NDArray[Any]], str]:
+    """The arrays of a response, and everything else of it as ASCII JSON.
+
+    Sequences of any kind come back as lists, NumPy scalars and arrays as the
+    numbers they hold. The document carries a digest of itself and the arrays,
+    so that damage is found in any format.
+
+    Returns
+    -------
+    tuple
+        Arrays by the names of `ARRAYS`, each of shape (rows,), and the document.
 
     Raises
     ------
     InputError
-        If a value is none that a reading can have; `path` is named.
+        If a value is none that a reading can have, or the provenance holds
+        something that JSON has no word for; `path` is named.
     """
     fault = _fault(response)
     if fault:
         raise InputError(f"{path}: {fault}")
-    return {name: np.asarray(getattr(response, name), dtype=ARRAYS[name][0]) for name in ARRAYS}
-
-
-def document_of(response: FrequencyResponse, path: Path) -> str:
-    """Everything of a response but its arrays, as ASCII JSON.
-
-    Sequences of any kind come back as lists, NumPy scalars and arrays as the
-    numbers they hold.
-
-    Raises
-    ------
-    InputError
-        If the provenance holds something that JSON has no word for.
-    """
-    document = {"format": FORMAT, "version": VERSION}
+    arrays: dict[str, NDArray[Any]] = {
+        name: np.asarray(getattr(response, name), dtype=ARRAYS[name][0]) for name in ARRAYS
+    }
+    document: dict[str, Any] = {"format": FORMAT, "version": VERSION}
     document |= {name: getattr(response, name) for name in _PROCEDURE}
     try:
         document["provenance"] = _plain(response.provenance)
-        return json.dumps(document, sort_keys=True)
+        document["sha256"] = _digest(arrays, document)
+        return arrays, json.dumps(document)
     except (TypeError, ValueError) as error:
         raise InputError(f"{path}: the provenance cannot be written ({error})") from error
 
 
 def response_from(arrays: Mapping[str, Any], text: str, path: Path) -> FrequencyResponse:
-    """The response that `arrays_of` and `document_of` took apart.
+    """The response that `taken_apart` took apart.
 
     Raises
     ------
@@ -104,8 +105,12 @@ def response_from(arrays: Mapping[str, Any], text: str, path: Path) -> Frequency
     missing = [name for name in ARRAYS if name not in arrays]
     if missing:
         raise FileFormatError(f"{path}: {', '.join(missing)} is missing; give a whole file")
-    columns = {name: _column(arrays[name], name, path) for name in ARRAYS}
+    columns: dict[str, Any] = {name: _column(arrays[name], name, path) for name in ARRAYS}
+    if document.pop("sha256") != _digest(columns, document):
+        raise FileFormatError(f"{path}: was damaged or altered: its digest does not fit")
     columns["phase_known"] = columns["phase_known"].astype(bool)
+    del document["format"], document["version"]
+    document["provenance"] = MappingProxyType(document["provenance"])
     try:
         response = FrequencyResponse(**columns, **document)
     except InputError as error:
@@ -140,6 +145,18 @@ def checked_file(path: Path, kind: str) -> Path:
     return path
 
 
+def _digest(arrays: Mapping[str, NDArray[Any]], document: Mapping[str, Any]) -> str:
+    digest = hashlib.sha256(json.dumps(document, sort_keys=True).encode("ascii"))
+    for name, (dtype, _) in ARRAYS.items():
+        values: NDArray[Any] = np.ascontiguousarray(arrays[name], dtype=dtype)
+        if values.dtype.kind in "fc":
+            # Text formats know one NaN only.
+            values = values.view(np.float64)
+            values = np.where(np.isnan(values), np.nan, values)
+        digest.update(values.astype(values.dtype.newbyteorder("<")).tobytes())
+    return digest.hexdigest()
+
+
 def _plain(value: Any) -> Any:
     if hasattr(value, "tolist"):
         value = value.tolist()
@@ -160,9 +177,9 @@ def _document(text: str, path: Path) -> dict[str, Any]:
         document = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise FileFormatError(f"{path}: its document is not JSON ({error})") from error
-    if not isinstance(document, dict) or document.pop("format", None) != FORMAT:
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise FileFormatError(f"{path}: is no {FORMAT}")
-    version = document.pop("version", None)
+    version = document.get("version")
     if type(version) is not int or version < 1:
         raise FileFormatError(f"{path}: the version {version!r} of its document is not a number")
     if version > VERSION:
@@ -170,7 +187,7 @@ def _document(text: str, path: Path) -> dict[str, Any]:
             f"{path}: was written by a newer lashbench (version {version}, this one knows "
             f"{VERSION}); update lashbench to read it"
         )
-    if set(document) != {*_PROCEDURE, "provenance"}:
+    if set(document) != {"format", "version", *_PROCEDURE, "provenance", "sha256"}:
         raise FileFormatError(f"{path}: its document has the wrong keys: {sorted(document)}")
     _check_procedure(document, path)
     return document

@@ -1,0 +1,227 @@
+"""Files in HP's Standard Data Format, put together here byte by byte from its description.
+
+The layout of the records is that of HP 5963-1715, appendix B, version 2.
+"""
+
+import struct
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+import sdfascii
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from daq.errors import FileFormatError, InputError
+from daq.formats import read_response, write_response
+from daq.frf import PointFlag
+
+HZ = struct.pack(">10sf8b", b"Hz", 6.2831855, 0, 0, -2, 0, 0, 0, 0, 2)
+VOLT = struct.pack(">10sf8b", b"V", 1.0, 2, 4, -6, -2, 0, 0, 0, 0)
+HP_35670A, HP_35665A = 10, 2
+
+
+@dataclass(frozen=True)
+class Channel:
+    label: bytes = b"Chan  1"
+    window: float = 1.0
+    unit: float = 1.0
+    overloaded: int = 0
+
+    def record(self) -> bytes:
+        return struct.pack(
+            ">hll30s12s12s2h5fhffhhhh10s22sffhhh5d",
+            14,
+            192,
+            -1,
+            self.label,
+            b"HP35670A",
+            b"MY1",
+            *(1, 1, 1.0, 0.0, 0.0, 1.0, self.window),
+            *(0, 0.0, 0.0, 3, 1, 0, self.overloaded),
+            *(b"V", VOLT, self.unit, 1e6, 0, 1, 0),
+            *(1.0, 0.0, 0.0, 0.0, 0.0),
+        )
+
+
+@dataclass(frozen=True)
+class File:
+    """A saved trace; the defaults are a frequency response with linear spacing."""
+
+    gain: tuple = (0.5 + 0.25j, 0.25 - 0.5j, -1 + 0.125j, 2j)
+    application: int = HP_35670A
+    revision: int = 2
+    title: bytes = b""
+    data_type: int = 4
+    is_complex: int = 1
+    is_valid: int = 1
+    x_type: int = 0
+    first: float = 100.0
+    step: float = 2.5
+    x_unit: bytes = HZ
+    y_code: int = 3
+    rows: int = 1
+    points: int | None = None
+    span: tuple = (0, 3)
+    powers: tuple = (48, -48)
+    records: tuple = (1, 0)
+    channels: tuple = field(default=(Channel(), Channel(b"Chan  2")))
+    abscissa: tuple | None = None
+
+    def content(self) -> bytes:
+        points = len(self.gain) if self.points is None else self.points
+        measurement = struct.pack(
+            ">hll8slh2hhlf60sf3dhhhd",
+            *(11, 140, -1, b"", len(self.gain), 1, *self.span, 0, 0, 0.0),
+            *(self.title, 0.0, 105.0, 10.0, 0.0, 2, 0, 0, 0.0),
+        )
+        data = struct.pack(
+            ">hll16shh2h8sh2hhhhhhhl2h22sh22s2dhh",
+            *(12, 134, -1, b"Freq Resp", 0, self.data_type, points, points - 1, b""),
+            *(self.x_type, 4, 0, self.y_code, 1, self.is_complex, 0, 0, self.is_valid),
+            *(0, self.rows, 1, self.x_unit, 0, VOLT, self.first, self.step, 0, 0),
+        )
+        vector = struct.pack(">hll2h2h", 13, 18, -1, *self.records, *self.powers)
+        channels = b"".join(channel.record() for channel in self.channels)
+        scan = struct.pack(">hl4h22s4x", 15, 40, 1, 0, 0, 3, VOLT)
+        kind = ">c8" if self.y_code == 3 else ">c16"
+        values = np.array(self.gain, dtype=kind if self.is_complex else ">f4").tobytes()
+        y = struct.pack(">hl", 17, 6 + len(values)) + values
+        x = b""
+        if self.abscissa is not None:
+            numbers = np.array(self.abscissa, dtype=">f8").tobytes()
+            x = struct.pack(">hl", 16, 6 + len(numbers)) + numbers
+        start = 2 + 64 + len(measurement)
+        places = np.cumsum([start, len(data), len(vector), len(channels), len(scan), len(x)])
+        header = struct.pack(
+            ">hlhhhhh8s6h7l",
+            *(10, 64, self.revision, self.application, 2026, 1121, 1234, b"A.01.11"),
+            *(1, 1, len(self.channels), 0, 1, 1 if x else 0),
+            *(places[0], places[1], places[2], -1, places[3], places[4] if x else -1, places[5]),
+        )
+        return b"B\x00" + header + measurement + data + vector + channels + scan + x + y
+
+
+def saved(tmp_path, file: File):
+    path = tmp_path / "TRACE.DAT"
+    path.write_bytes(file.content())
+    return path
+
+
+def test_the_records_have_the_sizes_of_the_format():
+    content = File().content()
+    assert struct.unpack(">hl", content[2:8]) == (10, 64)
+    assert struct.unpack(">hl", content[66:72]) == (11, 140)
+    assert struct.unpack(">hl", content[206:212]) == (12, 134)
+    assert struct.unpack(">hl", content[340:346]) == (13, 18)
+    assert struct.unpack(">hl", content[358:364]) == (14, 192)
+
+
+@pytest.mark.parametrize("application", [HP_35670A, HP_35665A])
+def test_a_frequency_response_is_read(tmp_path, application):
+    path = saved(tmp_path, File(application=application, title=b"run 7"))
+    response = read_response(path)
+    np.testing.assert_array_equal(response.frequency_hz, [100.0, 102.5, 105.0, 107.5])
+    np.testing.assert_array_equal(response.gain, File().gain)
+    assert np.all(np.isnan(response.source_vpk))
+    assert response.unit == "run 7"
+    assert response.provenance["started"] == "2026-11-21T12:34:00"
+    assert response.provenance["channels"] == ["Chan  2", "Chan  1"]
+    assert not np.any(response.flags)
+
+
+def test_the_reading_agrees_with_the_library_where_that_scales_nothing(tmp_path):
+    path = saved(tmp_path, File(application=HP_35665A, channels=(Channel(unit=2.0), Channel())))
+    _, values = sdfascii.read_sdf_file(str(path))
+    np.testing.assert_allclose(read_response(path).gain, values, rtol=1e-7)
+
+
+def test_spacing_by_ratio_and_by_list(tmp_path):
+    path = saved(tmp_path, File(x_type=1, step=1.1))
+    np.testing.assert_allclose(
+        read_response(path).frequency_hz, 100.0 * 1.1 ** np.arange(4), rtol=1e-15
+    )
+    listed = (100.0, 101.0, 150.0, 151.015625)
+    path = saved(tmp_path, File(x_type=2, abscissa=listed))
+    np.testing.assert_array_equal(read_response(path).frequency_hz, listed)
+
+
+def test_double_precision_is_kept(tmp_path):
+    gain = tuple(np.array([1 / 3, 2j / 7, -0.1, 1e-9]) + 0j)
+    path = saved(tmp_path, File(gain=gain, y_code=4, application=HP_35665A))
+    np.testing.assert_array_equal(read_response(path).gain, gain)
+
+
+def test_only_the_measured_span_counts(tmp_path):
+    path = saved(tmp_path, File(span=(1, 2)))
+    np.testing.assert_array_equal(read_response(path).frequency_hz, [102.5, 105.0])
+
+
+def test_engineering_units_and_windows_of_both_channels_count(tmp_path):
+    channels = (Channel(unit=4.0, window=2.0), Channel(b"Chan  2", unit=0.5, window=2.0))
+    path = saved(tmp_path, File(channels=channels))
+    expected = (2.0 / 0.5) / (2.0 / 4.0)
+    np.testing.assert_allclose(read_response(path).gain, expected * np.array(File().gain))
+
+
+def test_an_overload_flags_every_point(tmp_path):
+    channels = (Channel(), Channel(b"Chan  2", overloaded=1))
+    response = read_response(saved(tmp_path, File(channels=channels)))
+    assert np.all(response.flags == PointFlag.OVERLOAD)
+
+
+@pytest.mark.parametrize(
+    ("changes", "fault"),
+    [
+        ({"data_type": 2}, "Auto-power spectrum"),
+        ({"is_complex": 0, "gain": (1.0, 2.0, 3.0, 4.0)}, "not a complex frequency response"),
+        ({"is_valid": 0}, "marked as not valid"),
+        ({"rows": 2}, "waterfall"),
+        ({"x_unit": VOLT}, "abscissa is not in Hz"),
+        ({"first": 0.0}, "no readings"),
+        ({"gain": (1.0, np.nan, 1j, 2.0)}, "no readings"),
+        ({"points": 9, "span": (0, 8)}, "cut short"),
+        ({"span": (2, 1)}, "points 2 to 1"),
+        ({"span": (-3, 1)}, "points -3 to 1"),
+        ({"revision": 3}, "cannot be read as SDF"),
+        ({"revision": 9}, "cannot be read as SDF"),
+        ({"records": (7, 0)}, "cannot be read as SDF"),
+        ({"x_type": 2}, "is cut short"),
+        ({"channels": (Channel(unit=0.0), Channel())}, "cannot be|can not"),
+    ],
+)
+def test_anything_else_is_refused(tmp_path, changes, fault):
+    path = saved(tmp_path, replace(File(), **changes))
+    with pytest.raises(FileFormatError, match=fault):
+        read_response(path)
+
+
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(data=st.data())
+def test_damage_never_ends_the_program(tmp_path, data):
+    content = bytearray(File().content())
+    if data.draw(st.booleans()):
+        content = content[: data.draw(st.integers(0, len(content) - 1))]
+    for place in data.draw(st.lists(st.integers(0, max(len(content) - 1, 0)), max_size=6)):
+        if content:
+            content[place] ^= data.draw(st.integers(1, 255))
+    path = tmp_path / "DAMAGED.DAT"
+    path.write_bytes(content)
+    told = complaint(path)
+    assert told is None or (str(path) in told and "\n" not in told)
+
+
+def complaint(path) -> str | None:
+    try:
+        read_response(path)
+    except FileFormatError as error:
+        return str(error)
+    return None
+
+
+def test_the_format_is_only_read(tmp_path):
+    response = read_response(saved(tmp_path, File()))
+    with pytest.raises(InputError, match="cannot write"):
+        write_response(response, tmp_path / "new.dat")
