@@ -25,6 +25,7 @@ VERBS = {
     "extract": ("tui.commands.extract:extract", "Read ARF, RF and damping out of a response."),
     "estimate": ("tui.commands.estimate:estimate", "Tell the backlash of each gear stage."),
     "reproduce": ("tui.commands.reproduce:reproduce", "Compute the paper's tables and figures."),
+    "serve": ("tui.commands.serve:serve", "Serve a simulated 35670A on a wire."),
     "demo": ("tui.commands.demo:demo", "Do the whole job without hardware."),
 }
 """Every verb: the function that does it, and its line in the help."""

@@ -1,0 +1,251 @@
+"""The simulated analyser without a wire: an in-process transport for the address ``sim:``.
+
+Owns the transport and the reading of what may follow ``sim:``. It talks to the
+same bus as the adapters do; whatever differs on other wires is not here.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from urllib.parse import parse_qsl
+
+from daq.errors import BenchTimeout, ConfigurationError, LinkError, ProtocolError
+from daq.transports.base import Deadline, checked_line, take_block
+from sim.analyser35670a import Analyser35670A, Choices, TalkState
+from sim.analyser35670a.pace import ByTheClock, Fast, Pace
+from sim.effects import EffectSetting, parse_effect
+from sim.faults import Fault, FaultBoard, parse_fault
+from sim.response import SteppedServo
+from sim.unit import Unit
+
+__all__ = ["Loopback", "LoopbackSettings", "open_loopback", "read_loopback_settings"]
+
+_WAIT_S = 0.002
+_RATIO = 0.25
+
+
+class Loopback:
+    """Messages straight onto the bus of a simulated analyser; see `daq.transports.base.Transport`.
+
+    In fast operation each exchange lets one point of a running sweep be
+    measured, so that whoever polls sees it go on; a wait costs no time.
+    """
+
+    def __init__(
+        self, instrument: Analyser35670A, pace: Pace | None = None, address: str = "sim:"
+    ) -> None:
+        self.address = address
+        self.instrument = instrument
+        self._pace = pace or Fast(instrument)
+        self._waiting = "nothing"
+        self._closed = False
+
+    def write(self, line: str, deadline: Deadline) -> None:
+        """Send one message, EOI with its last byte."""
+        data = checked_line(line)
+        self._begin()
+        self._waiting = line
+        while data:
+            data = data[self.instrument.listen(data, end=True) :]
+            if data:
+                self._let_time_pass(deadline, f"{line!r} was not taken")
+        self._check_link()
+
+    def read(self, deadline: Deadline) -> str:
+        """One text reply, without terminator."""
+        message = self._message(deadline)
+        try:
+            return message.decode("ascii").rstrip("\n")
+        except UnicodeDecodeError as error:
+            raise ProtocolError(
+                f"{self.address}: the reply to {self._waiting!r} is not text: {message[:60]!r}"
+            ) from error
+
+    def read_block(self, deadline: Deadline) -> bytes:
+        """The payload of one definite-length block."""
+        message = self._message(deadline)
+        taken = 0
+
+        def take(count: int) -> bytes:
+            nonlocal taken
+            part = message[taken : taken + count]
+            if len(part) < count:
+                raise ProtocolError(
+                    f"{self.address}: the block that answers {self._waiting!r} was cut short: "
+                    f"{len(message)} bytes came, {taken + count} were due"
+                )
+            taken += count
+            return part
+
+        payload = take_block(take)
+        if taken < len(message):
+            raise ProtocolError(
+                f"{self.address}: {len(message) - taken} bytes follow the block that answers "
+                f"{self._waiting!r}"
+            )
+        return payload
+
+    def serial_poll(self, deadline: Deadline) -> int | None:
+        """The status byte."""
+        self._begin()
+        while (byte := self.instrument.serial_poll()) is None:
+            self._let_time_pass(deadline, "the serial poll was not answered")
+        self._check_link()
+        return byte
+
+    def device_clear(self, deadline: Deadline) -> bool:
+        """Clear the instrument."""
+        self._begin()
+        self.instrument.device_clear()
+        return True
+
+    def pause(self, seconds: float) -> None:
+        """Let time pass; in fast operation the instrument's work stands for it."""
+        if isinstance(self._pace, Fast):
+            self._pace.advance_point()
+            return
+        time.sleep(seconds)
+
+    def close(self) -> None:
+        """Let go of the wire; the instrument stays as it is."""
+        self._closed = True
+
+    def _begin(self) -> None:
+        if self._closed:
+            raise LinkError(f"{self.address}: the connection is closed")
+        self._pace.touch()
+        if isinstance(self._pace, Fast):
+            self._pace.advance_point()
+        else:
+            self._pace.advance()
+        self._check_link()
+
+    def _check_link(self) -> None:
+        if self.instrument.damage.link_fault("dropped-connection"):
+            self._closed = True
+            raise LinkError(f"{self.address}: the connection was lost at {self._waiting!r}")
+
+    def _message(self, deadline: Deadline) -> bytes:
+        """A whole reply, up to EOI."""
+        self._begin()
+        message = bytearray()
+        while True:
+            talk = self.instrument.talk()
+            message += talk.data
+            self._check_link()
+            if talk.end:
+                return bytes(message)
+            if talk.state is not TalkState.DATA:
+                begun = f" after {len(message)} bytes" if message else ""
+                self._let_time_pass(deadline, f"no reply to {self._waiting!r} came{begun}")
+
+    def _let_time_pass(self, deadline: Deadline, complaint: str) -> None:
+        if deadline.expired:
+            raise BenchTimeout(f"{self.address}: {complaint} within {deadline.span_s:g} s")
+        if not self._pace.advance():
+            time.sleep(min(_WAIT_S, deadline.remaining_s))
+
+
+@dataclass(frozen=True, slots=True)
+class LoopbackSettings:
+    """What may follow ``sim:``, as in ``sim:?ratio=0.3&seed=1&fault=silence:point=5``."""
+
+    ratio: float = _RATIO
+    seed: int = 0
+    noise_v: float = Choices().noise_v
+    realtime: bool = False
+    options: str = Choices().options
+    effects: tuple[EffectSetting, ...] = ()
+    faults: tuple[Fault, ...] = ()
+
+
+def read_loopback_settings(rest: str) -> LoopbackSettings:
+    """Read what follows ``sim:``.
+
+    Raises
+    ------
+    ConfigurationError
+        If a key or value is wrong; lists the keys.
+    """
+    values: dict[str, list[str]] = {}
+    if rest and not rest.startswith("?"):
+        raise _refusal(rest, "should begin with '?'")
+    try:
+        pairs = parse_qsl(rest[1:], keep_blank_values=True, strict_parsing=True) if rest[1:] else []
+    except ValueError as error:
+        raise _refusal(rest, "is not KEY=VALUE&KEY=VALUE") from error
+    for key, value in pairs:
+        values.setdefault(key, []).append(value)
+    if wrong := set(values) - {"ratio", "seed", "noise", "speed", "options", "effect", "fault"}:
+        raise _refusal(rest, f"has the unknown key {sorted(wrong)[0]!r}")
+    once = [key for key, found in values.items() if len(found) > 1]
+    if once and not set(once) <= {"effect", "fault"}:
+        raise _refusal(rest, f"has {once[0]!r} twice")
+    speed = values.get("speed", ["fast"])[0]
+    if speed not in ("fast", "realtime"):
+        raise _refusal(rest, f"has speed {speed!r}; it is fast or realtime")
+    return LoopbackSettings(
+        ratio=_number(rest, values, "ratio", _RATIO, 1.0),
+        seed=int(_number(rest, values, "seed", 0.0, 1e9)),
+        noise_v=_number(rest, values, "noise", Choices().noise_v, 10.0),
+        realtime=speed == "realtime",
+        options=values.get("options", [Choices().options])[0],
+        effects=tuple(parse_effect(text) for text in values.get("effect", [])),
+        faults=tuple(parse_fault(text) for text in values.get("fault", [])),
+    )
+
+
+def _number(rest: str, values: dict[str, list[str]], key: str, preset: float, high: float) -> float:
+    text = values.get(key, [""])[0]
+    if key not in values:
+        return preset
+    try:
+        number = float(text)
+    except ValueError as error:
+        raise _refusal(rest, f"has {key} {text!r}, which is no number") from error
+    if not 0.0 <= number <= high or (key == "seed" and number % 1):
+        raise _refusal(rest, f"has {key} {text}; it must be from 0 to {high:g}")
+    return number
+
+
+def _refusal(rest: str, fault: str) -> ConfigurationError:
+    return ConfigurationError(
+        f"instrument 'sim:{rest}' {fault}; "
+        "keys are ratio, seed, noise, speed, options, effect and fault"
+    )
+
+
+def open_loopback(
+    unit: Unit,
+    ratio: float | None = None,
+    effects: Sequence[EffectSetting] = (),
+    progress: Callable[[Analyser35670A], None] | None = None,
+) -> Callable[[str], Loopback]:
+    """A factory of ``sim:`` transports, each with an instrument of its own.
+
+    Parameters
+    ----------
+    unit
+        The unit behind the simulated inputs.
+    ratio, effects
+        Used where the address itself says nothing.
+    progress
+        Called with each new instrument, for whoever wants to look inside.
+    """
+
+    def open_one(rest: str) -> Loopback:
+        wanted = read_loopback_settings(rest)
+        share = wanted.ratio if "ratio=" in rest or ratio is None else ratio
+        instrument = Analyser35670A(
+            SteppedServo(unit, share, wanted.effects or tuple(effects), seed=wanted.seed),
+            Choices(seed=wanted.seed, noise_v=wanted.noise_v, options=wanted.options),
+            FaultBoard(wanted.faults),
+        )
+        if progress is not None:
+            progress(instrument)
+        pace: Pace = ByTheClock(instrument) if wanted.realtime else Fast(instrument)
+        return Loopback(instrument, pace, f"sim:{rest}")
+
+    return open_one

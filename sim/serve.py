@@ -1,0 +1,202 @@
+"""The simulated analyser on a wire: raw TCP, a Prologix-style TCP bridge, a pseudo-terminal.
+
+Owns the sockets and terminals and the loop that turns all of them, the
+adapters and the instrument in one thread. It listens on 127.0.0.1 only, prints
+nothing and catches no signal; `stop` may be called from anywhere.
+"""
+
+from __future__ import annotations
+
+import os
+import selectors
+import socket
+import time
+from types import TracebackType
+
+from daq.errors import LinkError
+from sim.adapter import FakeAdapter
+from sim.adapter_dialects import AR488, PROLOGIX_ETHERNET, PROLOGIX_USB, Dialect
+from sim.analyser35670a import Analyser35670A
+from sim.analyser35670a.pace import ByTheClock, Fast, Pace
+from sim.wires import AdapterClient, Listener, RawClient, Terminal
+
+__all__ = ["HOST", "Server"]
+
+HOST = "127.0.0.1"
+_TICK_S = 0.005
+_IDLE_S = 0.25
+_FAST_RESTART_S = 0.2
+
+
+class Server:
+    """One instrument behind any number of wires.
+
+    Parameters
+    ----------
+    instrument
+        What is served.
+    realtime
+        By the clock; else as fast as it can be computed.
+    tcp, prologix_tcp
+        Ports, 0 for any free one, None for none.
+    prologix_pty
+        Whether to open a pseudo-terminal.
+    dialect
+        ``"prologix"`` or ``"ar488"``: what the pseudo-terminal and the TCP bridge pretend to be.
+
+    Raises
+    ------
+    LinkError
+        If a port cannot be had.
+    """
+
+    def __init__(
+        self,
+        instrument: Analyser35670A,
+        *,
+        realtime: bool = True,
+        tcp: int | None = None,
+        prologix_tcp: int | None = None,
+        prologix_pty: bool = False,
+        dialect: str = "prologix",
+    ) -> None:
+        self.instrument = instrument
+        self._pace: Pace = ByTheClock(instrument) if realtime else Fast(instrument)
+        self._selector = selectors.DefaultSelector()
+        self._wake_read, self._wake_write = os.pipe()
+        self._selector.register(self._wake_read, selectors.EVENT_READ)
+        self._stopping = False
+        self._adapters: list[FakeAdapter] = []
+        self._listeners: list[Listener] = []
+        self._clients: list[RawClient | AdapterClient] = []
+        self._terminal: Terminal | None = None
+        self.addresses: dict[str, str] = {}
+        """Where it is served: ``tcp``, ``prologix_tcp``, ``prologix_pty``."""
+        try:
+            if tcp is not None:
+                self._listen("tcp", tcp, None)
+            if prologix_tcp is not None:
+                bridge = AR488 if dialect == "ar488" else PROLOGIX_ETHERNET
+                self._listen("prologix_tcp", prologix_tcp, self._adapter(bridge, realtime))
+            if prologix_pty:
+                cable = AR488 if dialect == "ar488" else PROLOGIX_USB
+                self._terminal = Terminal(self._adapter(cable, realtime))
+                self.addresses["prologix_pty"] = self._terminal.path
+        except BaseException:
+            self.close()
+            raise
+
+    def _adapter(self, dialect: Dialect, realtime: bool) -> FakeAdapter:
+        adapter = FakeAdapter(
+            self.instrument,
+            dialect,
+            restart_s=None if realtime else _FAST_RESTART_S,
+            paced=realtime,
+        )
+        self._adapters.append(adapter)
+        return adapter
+
+    def _listen(self, name: str, port: int, adapter: FakeAdapter | None) -> None:
+        try:
+            wire = socket.create_server((HOST, port))
+        except (OSError, OverflowError) as error:
+            raise LinkError(
+                f"port {port} on {HOST} cannot be listened on ({error}); give another, or 0 "
+                "for any free one"
+            ) from error
+        wire.setblocking(False)
+        listener = Listener(wire, adapter)
+        self._listeners.append(listener)
+        self._selector.register(wire, selectors.EVENT_READ, listener)
+        self.addresses[name] = f"{HOST}:{wire.getsockname()[1]}"
+
+    def __enter__(self) -> Server:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def stop(self) -> None:
+        """End `run` soon; safe in a signal handler and from another thread."""
+        self._stopping = True
+        os.write(self._wake_write, b"x")
+
+    def run(self) -> None:
+        """Serve until `stop`."""
+        while not self._stopping:
+            self.turn(self._wait_s())
+
+    def turn(self, wait_s: float) -> None:
+        """One round: what came in, what is due, what goes out."""
+        for key, _events in self._selector.select(wait_s):
+            if isinstance(key.data, Listener):
+                self._accept(key.data)
+            elif isinstance(key.data, RawClient | AdapterClient):
+                self._pace.touch()
+                key.data.gather()
+        now_s = time.monotonic()
+        if self._terminal is not None and self._terminal.gather(now_s):
+            self._pace.touch()
+        self._pace.advance()
+        for adapter in self._adapters:
+            adapter.pump(now_s)
+        self._work_clients(now_s)
+        if self._terminal is not None:
+            self._terminal.flush(now_s)
+        if self.instrument.damage.link_fault("dropped-connection"):
+            self._drop_all(now_s)
+
+    def _work_clients(self, now_s: float) -> None:
+        for client in self._clients:
+            client.work(now_s)
+        for client in [client for client in self._clients if client.closed]:
+            self._forget(client)
+
+    def _accept(self, listener: Listener) -> None:
+        client = listener.accept(self.instrument)
+        if client is not None:
+            self._clients.append(client)
+            self._selector.register(client.wire, selectors.EVENT_READ, client)
+
+    def _forget(self, client: RawClient | AdapterClient) -> None:
+        self._clients.remove(client)
+        self._selector.unregister(client.wire)
+        client.close()
+
+    def _drop_all(self, now_s: float) -> None:
+        for client in list(self._clients):
+            client.reset()
+            self._forget(client)
+        if self._terminal is not None:
+            self._terminal.unplug(now_s)
+            self.addresses["prologix_pty"] = self._terminal.path
+
+    def _wait_s(self) -> float:
+        due = self._pace.wait_s
+        wait = _IDLE_S if due is None else min(due, _IDLE_S)
+        busy = any(adapter.busy for adapter in self._adapters)
+        busy = busy or any(client.waiting for client in self._clients)
+        # A pseudo-terminal is looked at in turns: the selector would spin on a closed one.
+        return min(wait, _TICK_S) if busy or self._terminal is not None else wait
+
+    def close(self) -> None:
+        """Close every wire."""
+        for client in list(self._clients):
+            self._forget(client)
+        for listener in self._listeners:
+            self._selector.unregister(listener.wire)
+            listener.wire.close()
+        self._listeners.clear()
+        if self._terminal is not None:
+            self._terminal.close()
+            self._terminal = None
+        if self._wake_read >= 0:
+            self._selector.close()
+            os.close(self._wake_read)
+            os.close(self._wake_write)
+            self._wake_read = -1

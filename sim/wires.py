@@ -1,0 +1,250 @@
+"""The server's ends of its wires: a raw socket, an adapter behind a socket, a pseudo-terminal.
+
+Owns what is particular to each. The loop that turns them is `sim.serve`'s.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import select
+import shutil
+import socket
+import struct
+import tempfile
+from pathlib import Path
+
+from sim.adapter import FakeAdapter
+from sim.analyser35670a import Analyser35670A, TalkState
+
+__all__ = ["AdapterClient", "Listener", "RawClient", "Terminal"]
+
+_CHUNK = 65536
+_REPLUG_S = 0.5
+"""How long a pulled pseudo-terminal stays away."""
+
+
+class Listener:
+    """A listening socket; clients speak to the instrument, or to an adapter if there is one."""
+
+    def __init__(self, wire: socket.socket, adapter: FakeAdapter | None) -> None:
+        self.wire = wire
+        self._adapter = adapter
+
+    def accept(self, instrument: Analyser35670A) -> RawClient | AdapterClient | None:
+        """A new client, None if it has gone already."""
+        try:
+            wire, _address = self.wire.accept()
+        except OSError:
+            return None
+        wire.setblocking(False)
+        wire.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        if self._adapter is None:
+            return RawClient(wire, instrument)
+        return AdapterClient(wire, self._adapter)
+
+
+class _Client:
+    """Bytes in and out of one connection."""
+
+    def __init__(self, wire: socket.socket) -> None:
+        self.wire = wire
+        self.closed = False
+        self._in = bytearray()
+        self._out = bytearray()
+
+    def gather(self) -> None:
+        """Take what has come."""
+        try:
+            data = self.wire.recv(_CHUNK)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        self._in += data
+        self.closed = self.closed or not data
+
+    def _flush(self) -> None:
+        try:
+            while self._out:
+                del self._out[: self.wire.send(self._out)]
+        except BlockingIOError:
+            return
+        except OSError:
+            self.closed = True
+
+    @property
+    def waiting(self) -> bool:
+        """Whether something is left to do that no arriving byte will call for."""
+        return bool(self._in or self._out)
+
+    def close(self) -> None:
+        """Let go of the connection."""
+        self.wire.close()
+
+    def reset(self) -> None:
+        """Break the connection the hard way, so that the other side gets an error."""
+        linger = struct.pack("ii", 1, 0)
+        try:
+            self.wire.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, linger)
+        except OSError:
+            self.closed = True
+
+
+class RawClient(_Client):
+    """SCPI over a bare socket: lines in, replies out as soon as they are there.
+
+    There is no way to be told to talk here, so -420 cannot arise; a query
+    whose reply is still due is interrupted (-410) by the next line.
+    """
+
+    def __init__(self, wire: socket.socket, instrument: Analyser35670A) -> None:
+        super().__init__(wire)
+        self._instrument = instrument
+        self._asked = False
+
+    def work(self, now_s: float) -> None:
+        """Feed the instrument line by line, each reply first."""
+        self._take_reply()
+        while self._in:
+            end = self._in.find(b"\n") + 1 or len(self._in)
+            taken = self._instrument.listen(bytes(self._in[:end]))
+            self._asked = True
+            del self._in[:taken]
+            self._take_reply()
+            if taken < end:
+                break
+        self._flush()
+
+    def _take_reply(self) -> None:
+        while self._asked and self._instrument.reply_ready:
+            talk = self._instrument.talk()
+            if talk.state is not TalkState.DATA:
+                return
+            self._out += talk.data
+
+    @property
+    def waiting(self) -> bool:
+        """Also while a reply is due."""
+        return super().waiting or (self._asked and self._instrument.reply_due)
+
+    def close(self) -> None:
+        """[S] A gateway that loses its client clears the instrument's queues."""
+        if self._asked:
+            self._instrument.device_clear()
+        super().close()
+
+
+class AdapterClient(_Client):
+    """A connection to an adapter; the adapter outlives it."""
+
+    def __init__(self, wire: socket.socket, adapter: FakeAdapter) -> None:
+        super().__init__(wire)
+        self._adapter = adapter
+        self._spoke = False
+
+    def work(self, now_s: float) -> None:
+        """Pass bytes both ways."""
+        if self._in:
+            self._spoke = True
+            self._adapter.receive(bytes(self._in), now_s)
+            self._in.clear()
+        if self._spoke:
+            self._out += self._adapter.take_output(now_s)
+        self._flush()
+
+
+class Terminal:
+    """A pseudo-terminal with an adapter behind it, under a name that stays.
+
+    The name is a link, as udev makes them, because a cable that is pulled and
+    plugged in again comes back as another terminal.
+    """
+
+    def __init__(self, adapter: FakeAdapter) -> None:
+        self._adapter = adapter
+        self._folder = Path(tempfile.mkdtemp(prefix="lashbench-"))
+        self.path = str(self._folder / "gpib")
+        self._master = -1
+        self._open_here = False
+        self._away_until = 0.0
+        self._out = bytearray()
+        self._plug()
+
+    def _plug(self) -> None:
+        """Make the terminal; Linux and macOS only."""
+        import tty
+
+        master, slave = os.openpty()
+        tty.setraw(slave)
+        os.set_blocking(master, False)
+        link = Path(self.path)
+        link.unlink(missing_ok=True)
+        link.symlink_to(os.ttyname(slave))
+        # With our own end of it closed we see when the client opens and closes his.
+        os.close(slave)
+        self._master = master
+        self._open_here = False
+
+    def gather(self, now_s: float) -> bool:
+        """Take what has come; whether anything did."""
+        if self._master < 0:
+            if now_s >= self._away_until:
+                self._plug()
+            return False
+        poller = select.poll()
+        poller.register(self._master, select.POLLIN)
+        events = dict(poller.poll(0)).get(self._master, 0)
+        if events & select.POLLHUP and not events & select.POLLIN:
+            self._open_here = False
+            return False
+        if not self._open_here:
+            self._open_here = True
+            if self._adapter.dialect.name == "ar488":
+                # The line DTR is pulled on opening, and an Uno, Nano or Mega starts anew.
+                self._adapter.restart(now_s)
+        if not events & select.POLLIN:
+            return False
+        data = self._read()
+        self._adapter.receive(data, now_s)
+        return bool(data)
+
+    def _read(self) -> bytes:
+        try:
+            return os.read(self._master, _CHUNK)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            if error.errno == errno.EIO:
+                return b""
+            raise
+
+    def flush(self, now_s: float) -> None:
+        """Send what the adapter has to say, if anybody has the terminal open."""
+        self._out += self._adapter.take_output(now_s)
+        if self._master < 0 or not self._open_here:
+            self._out.clear()
+            return
+        try:
+            while self._out:
+                del self._out[: os.write(self._master, self._out)]
+        except BlockingIOError:
+            return
+        except OSError:
+            self._out.clear()
+
+    def unplug(self, now_s: float) -> None:
+        """Pull the cable; it is plugged in again a little later."""
+        self.close_terminal()
+        self._away_until = now_s + _REPLUG_S
+
+    def close_terminal(self) -> None:
+        """Hang up."""
+        if self._master >= 0:
+            os.close(self._master)
+            self._master = -1
+
+    def close(self) -> None:
+        """Hang up and remove the name."""
+        self.close_terminal()
+        shutil.rmtree(self._folder, ignore_errors=True)

@@ -1,0 +1,106 @@
+"""``lashbench serve``: the simulated 35670A on a wire.
+
+Owns the options of the verb, the ready line and the two signals that end it.
+"""
+
+from __future__ import annotations
+
+import json
+import signal
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from daq.errors import InputError
+from tui.options import Real, UnitName, Whole
+from tui.output import Injected
+
+__all__ = ["serve"]
+
+_PORTS = range(65536)
+
+
+def serve(
+    *,
+    unit: UnitName,
+    ratio: Real,
+    effect: list[str] | None = None,
+    tcp: Annotated[Whole | None, Parameter(help="Raw SCPI on this port.")] = None,
+    prologix_tcp: Annotated[Whole | None, Parameter(help="An adapter on this port.")] = None,
+    prologix_pty: bool = False,
+    speed: Literal["fast", "realtime"] = "realtime",
+    fault: list[str] | None = None,
+    seed: Whole = 0,
+    noise: Real = 0.5e-3,
+    options: str = "1D2",
+    dialect: Literal["prologix", "ar488"] = "prologix",
+    console: Injected,
+) -> None:
+    """Serve a simulated 35670A with a gimbal behind it until SIGTERM or SIGINT.
+
+    When ready it prints one JSON line with the addresses on stdout. It listens
+    on 127.0.0.1 only.
+
+    Parameters
+    ----------
+    ratio
+        Contribution ratio of stage 1 to the total backlash, 0 to 1.
+    effect
+        Extension of the model, ID:param=value[,param=value]; repeat it for several.
+    tcp
+        Port of raw SCPI; 0 picks a free one.
+    prologix_tcp
+        Port of a Prologix-style bridge; 0 picks a free one.
+    prologix_pty
+        A Prologix-style adapter on a pseudo-terminal.
+    speed
+        By the clock, or as fast as it can be computed.
+    fault
+        What shall go wrong, NAME or NAME:key=value[,key=value]; repeat it for several.
+    seed
+        Start of the random numbers: the same seed gives the same readings on every wire.
+    noise
+        Noise of each component of a reading averaged over 30 cycles, V.
+    options
+        What the instrument says is installed.
+    dialect
+        Which make of adapter.
+    """
+    if tcp is None and prologix_tcp is None and not prologix_pty:
+        raise InputError("nothing to serve; give --tcp PORT, --prologix-tcp PORT or --prologix-pty")
+    for name, port in (("--tcp", tcp), ("--prologix-tcp", prologix_tcp)):
+        if port is not None and port not in _PORTS:
+            raise InputError(f"{name} {port} is no port; give 0 to 65535, 0 for any free one")
+    if not 0.0 <= noise <= 10.0:
+        raise InputError(f"--noise {noise} V must be between 0 and 10 V")
+    if seed < 0:
+        raise InputError(f"--seed {seed} is negative; give 0 or more")
+    if '"' in options or not options.isprintable() or not options.isascii():
+        raise InputError(f"--options {options!r} must be a plain list such as 1D2,1D3")
+
+    from sim.analyser35670a import Analyser35670A, Choices
+    from sim.effects import parse_effect
+    from sim.faults import FaultBoard, parse_fault
+    from sim.response import SteppedServo
+    from sim.serve import Server
+    from sim.unit import load_unit
+
+    faults = [parse_fault(text) for text in fault or []]
+    effects = tuple(parse_effect(text) for text in effect or [])
+    servo = SteppedServo(load_unit(unit), ratio, effects, seed=seed)
+    choices = Choices(seed=seed, noise_v=noise, options=options)
+    instrument = Analyser35670A(servo, choices, FaultBoard(faults))
+    with Server(
+        instrument,
+        realtime=speed == "realtime",
+        tcp=tcp,
+        prologix_tcp=prologix_tcp,
+        prologix_pty=prologix_pty,
+        dialect=dialect,
+    ) as server:
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, lambda *_: server.stop())
+        # One line, not the indented document of other verbs: readers wait for a line.
+        console.data(json.dumps(server.addresses))
+        console.note("serving a simulated 35670A; end it with Ctrl-C")
+        server.run()
