@@ -36,6 +36,13 @@ __all__ = [
 PERIODIC_SCATTER = 0.01
 """A point is period-1 if no cycle's coefficient departs from the mean by more than this share."""
 
+START_SPREAD = 0.02
+"""How far from the middle of its play a mesh starts at most, as a share of the half play.
+
+At low drive the motion keeps to the branch that it starts on; one that starts
+near the middle behaves as the paper's simulation from rest does.
+"""
+
 
 @dataclass(frozen=True, slots=True)
 class Servo:
@@ -49,7 +56,7 @@ class Servo:
 
     system: PiecewiseLinearSystem
     seed: int = 0
-    start_spread: float = 1.0
+    start_spread: float = START_SPREAD
 
     @classmethod
     def of(
@@ -58,7 +65,7 @@ class Servo:
         ratio: float,
         effects: Sequence[EffectSetting] = (),
         seed: int = 0,
-        start_spread: float = 1.0,
+        start_spread: float = START_SPREAD,
     ) -> Servo:
         """The servo of a unit at one contribution ratio with some effects."""
         return cls(drivetrain_with(unit, ratio, effects).system(), seed, start_spread)

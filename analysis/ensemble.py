@@ -1,0 +1,101 @@
+"""Ensembles of simulated sweeps: many machines through the plan of one observation.
+
+Owns the draws that judgement rests on: which machines were simulated, and what
+a bench would have read from each. Every draw is one run, as a measurement is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.observation import Observation, channels_of_cycles
+from sim.effects import EffectSetting
+from sim.response import Servo, simulate_cycles
+from sim.unit import Unit
+
+__all__ = ["TOLERANCES", "Draws", "Machine", "run_machines"]
+
+TOLERANCES = {"R_m": 0.005, "k_t": 0.005, "J_L": 0.005, "k_s1": 0.005, "k_a": 0.005, "k_ts": 0.005}
+"""One standard deviation of the unit-to-unit spread of datasheet values, as a share."""
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """One machine of an ensemble.
+
+    `deviations` are relative departures of datasheet values, by symbol.
+    """
+
+    ratio: float
+    seed: int = 0
+    b_t_deg: float | None = None
+    deviations: tuple[tuple[str, float], ...] = ()
+    effects: tuple[EffectSetting, ...] = ()
+
+    def servo(self, unit: Unit) -> Servo:
+        """The machine as something that can be simulated."""
+        known = unit.parameters
+        changes = {symbol: known[symbol] * (1.0 + d) for symbol, d in self.deviations}
+        if self.b_t_deg is not None:
+            changes["b_t_deg"] = self.b_t_deg
+        if changes:
+            unit = unit.with_parameters(**changes)
+        return Servo.of(unit, self.ratio, self.effects, self.seed)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Draws:
+    """Channels (draws, 3, rows) read from one run of each machine, and the time simulated."""
+
+    machines: tuple[Machine, ...]
+    channels: NDArray[np.float64]
+    simulated_s: float
+
+    def joined(self, other: Draws) -> Draws:
+        """Both sets of draws."""
+        return Draws(
+            self.machines + other.machines,
+            np.concatenate([self.channels, other.channels]),
+            self.simulated_s + other.simulated_s,
+        )
+
+
+def run_machines(
+    unit: Unit,
+    machines: Sequence[Machine],
+    observation: Observation,
+    progress: Callable[[float], None] | None = None,
+) -> Draws:
+    """Take machines through the sweeps of an observation.
+
+    Raises
+    ------
+    AnalysisError
+        If a motion grew without bound.
+    """
+    servos = [machine.servo(unit) for machine in machines]
+    channels = np.empty((len(servos), 3, len(observation)))
+    simulated = 0.0
+    lots = _lots(len(servos))
+    for done, lot in enumerate(lots):
+        for plan, rows in observation.plans:
+            cycles = simulate_cycles([servos[i] for i in lot], plan)
+            for i, one in zip(lot, cycles, strict=True):
+                first = one[..., 1].reshape(len(rows), -1)
+                channels[i][:, rows] = channels_of_cycles(first, observation.noise[rows])
+            simulated += plan.duration_s * len(lot)
+        if progress is not None:
+            progress((done + 1) / len(lots))
+    return Draws(tuple(machines), channels, simulated)
+
+
+def _lots(count: int) -> list[range]:
+    """Ranges small enough that their cycles fit in memory and progress can be seen."""
+    return [range(start, min(start + _LOT, count)) for start in range(0, count, _LOT)]
+
+
+_LOT = 128

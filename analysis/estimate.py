@@ -1,0 +1,228 @@
+"""How much of the total backlash sits in each gear stage, and how sure that is.
+
+Owns the two forms of the estimate: the fit of a whole response at all its
+levels, and the paper's, from one anti-resonance and one resonance. Both give a
+posterior of the contribution ratio; neither looks for causes of a misfit
+(`analysis.diagnosis` does), but both warn of one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.ensemble import Machine
+from analysis.fit import RATIO, Axis, Posterior, fit_posterior
+from analysis.observation import observe
+from analysis.paper_estimate import IndexCurve, index_curve_of_response
+from daq.frf import FrequencyResponse
+from sim.unit import Unit
+
+__all__ = ["Estimate", "Uncertain", "estimate_features", "estimate_response"]
+
+Progress = Callable[[float, str], None]
+
+_WIDE_RESIDUAL = 1.35
+"""Robust residual, in standard deviations, from which the model is said to lack something."""
+
+
+@dataclass(frozen=True, slots=True)
+class Uncertain:
+    """A value with one standard deviation and, where known, its 95 % interval."""
+
+    value: float
+    std: float
+    interval95: tuple[float, float] | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """As JSON; the interval only where there is one."""
+        content: dict[str, Any] = {"value": self.value, "std": self.std}
+        if self.interval95 is not None:
+            content["interval95"] = list(self.interval95)
+        return content
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Estimate:
+    """The estimate of both stages' backlash.
+
+    `curve` is the paper's error index over the ratio, None where the response
+    shows no pair of features. `simulated_s` says how many seconds of motion
+    were simulated for it.
+    """
+
+    unit: str
+    contribution_ratio: Uncertain
+    b1_deg: Uncertain
+    b2_deg: Uncertain
+    b_t_deg: Uncertain
+    curve: IndexCurve | None
+    warnings: tuple[str, ...]
+    simulated_s: float
+
+    def to_json(self) -> dict[str, Any]:
+        """The document of ``estimate --json``."""
+        return {
+            "unit": self.unit,
+            "contribution_ratio": self.contribution_ratio.to_json(),
+            "b1_deg": self.b1_deg.to_json(),
+            "b2_deg": self.b2_deg.to_json(),
+            "b_t_deg": self.b_t_deg.to_json(),
+            "error_index": None if self.curve is None else self.curve.to_json(),
+            "warnings": list(self.warnings),
+            "simulated_s": self.simulated_s,
+        }
+
+    def summary(self) -> list[str]:
+        """Lines of text for a person."""
+        rows = [
+            ("contribution ratio of stage 1", self.contribution_ratio, 3, ""),
+            ("backlash of stage 1, b1", self.b1_deg, 4, "deg"),
+            ("backlash of stage 2, b2", self.b2_deg, 4, "deg"),
+            ("total backlash, b_t", self.b_t_deg, 4, "deg"),
+        ]
+        lines = [f"{self.unit}: backlash by stage"]
+        for name, number, digits, unit in rows:
+            line = f"  {name:<31} {number.value:8.{digits}f} +- {number.std:.{digits}f} {unit}"
+            if number.interval95 is not None:
+                low, high = number.interval95
+                line += f"  (95 %: {low:.{digits}f} to {high:.{digits}f})"
+            lines.append(line.rstrip())
+        if self.curve is not None:
+            lines.append(self.curve.summary())
+        lines += [f"  warning: {warning}" for warning in self.warnings]
+        return lines
+
+
+def estimate_response(
+    response: FrequencyResponse,
+    unit: Unit,
+    total_backlash_unknown: bool = False,
+    progress: Progress | None = None,
+    seed: int = 0,
+) -> Estimate:
+    """Estimate from a whole response at all its source levels.
+
+    Parameters
+    ----------
+    response
+        Measured or simulated, one level or more; phase and errors may be missing.
+    unit
+        The unit under test.
+    total_backlash_unknown
+        Fit the total backlash too, over 0.5 to 2 times the unit's.
+    progress
+        Told the share done and what is being done.
+    seed
+        Of the starts and places of the simulations.
+
+    Raises
+    ------
+    AnalysisError
+        If no usable point is left, or nothing simulated comes near the response.
+    """
+    observation = observe(response)
+    axes: tuple[Axis, ...] = (RATIO,)
+    if total_backlash_unknown:
+        axes = (replace(RATIO, coarse=17, scale=0.12), _total_axis(unit))
+    posterior = fit_posterior(unit, observation, axes, seed=seed, progress=progress)
+    curve = index_curve_of_response(response, observation, posterior.draws)
+    warnings = []
+    misfit = _robust_rms(posterior)
+    if misfit > _WIDE_RESIDUAL:
+        warnings.append(
+            f"the model leaves {misfit:.1f} standard deviations of the response unexplained; "
+            "run diagnose before trusting the ratio"
+        )
+    return _from_posterior(unit, posterior, curve, tuple(warnings))
+
+
+def estimate_features(
+    arf_hz: float, rf_hz: float, unit: Unit, progress: Progress | None = None, seed: int = 0
+) -> Estimate:
+    """Estimate from one anti-resonance and one resonance, the paper's way.
+
+    Raises
+    ------
+    InputError
+        If the frequencies are not positive or not in order.
+    AnalysisError
+        If the simulated unit shows no such features anywhere near.
+    """
+    from analysis.paper_estimate import fit_features
+
+    fitted = fit_features(arf_hz, rf_hz, unit, seed=seed, progress=progress)
+    warnings = list(fitted.warnings)
+    b_t = unit.backlash.b_t_deg
+    return _assemble(
+        unit,
+        fitted.ratios,
+        np.full_like(fitted.ratios, b_t),
+        fitted.weight,
+        fitted.curve,
+        tuple(warnings),
+        fitted.simulated_s,
+    )
+
+
+def _total_axis(unit: Unit) -> Axis:
+    b_t = unit.backlash.b_t_deg
+
+    def put(machine: Machine, value: float) -> Machine:
+        return replace(machine, b_t_deg=value)
+
+    return Axis("b_t_deg", 0.5 * b_t, 2.0 * b_t, 9, 0.2 * b_t, put)
+
+
+def _robust_rms(posterior: Posterior) -> float:
+    z = posterior.match.residual[:2] / posterior.match.std[:2]
+    z = z[np.isfinite(z)]
+    return float(1.4826 * np.median(np.abs(z))) if z.size else 0.0
+
+
+def _from_posterior(
+    unit: Unit, posterior: Posterior, curve: IndexCurve | None, warnings: tuple[str, ...]
+) -> Estimate:
+    mesh = np.meshgrid(*posterior.values, indexing="ij")
+    ratios = mesh[0].ravel()
+    total = mesh[1].ravel() if len(mesh) > 1 else np.full(ratios.shape, unit.backlash.b_t_deg)
+    return _assemble(
+        unit, ratios, total, posterior.weight.ravel(), curve, warnings, posterior.draws.simulated_s
+    )
+
+
+def _assemble(
+    unit: Unit,
+    ratios: NDArray[np.float64],
+    total_deg: NDArray[np.float64],
+    weight: NDArray[np.float64],
+    curve: IndexCurve | None,
+    warnings: tuple[str, ...],
+    simulated_s: float,
+) -> Estimate:
+    """Equations (15) and (20) applied to every place of the posterior."""
+    known = bool(np.ptp(total_deg) == 0.0)
+    return Estimate(
+        unit=unit.name,
+        contribution_ratio=_uncertain(ratios, weight),
+        b1_deg=_uncertain(ratios * total_deg * unit.stage2.N, weight),
+        b2_deg=_uncertain((1.0 - ratios) * total_deg, weight),
+        b_t_deg=Uncertain(float(total_deg[0]), 0.0) if known else _uncertain(total_deg, weight),
+        curve=curve,
+        warnings=warnings,
+        simulated_s=simulated_s,
+    )
+
+
+def _uncertain(values: NDArray[np.float64], weight: NDArray[np.float64]) -> Uncertain:
+    """Mean, standard deviation and central 95 % interval of a weighted grid."""
+    mean = float(weight @ values)
+    std = float(np.sqrt(weight @ (values - mean) ** 2))
+    order = np.argsort(values, kind="stable")
+    ranked, share = values[order], np.cumsum(weight[order]) - 0.5 * weight[order]
+    low, high = np.interp([0.025, 0.975], share, ranked)
+    return Uncertain(mean, std, (float(low), float(high)))

@@ -1,0 +1,256 @@
+"""Fitting the free numbers of a machine to an observation: where simulations are placed, and what follows.
+
+Owns the two stages of every fit: a coarse look over the whole range, then a
+closer one where the likelihood lies, and the posterior on a grid. What is free
+(contribution ratio, total backlash) is the caller's; it decides nothing about
+causes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.emulator import Emulator, Prediction
+from analysis.ensemble import TOLERANCES, Draws, Machine, run_machines
+from analysis.likelihood import Match, match_prediction
+from analysis.observation import Observation
+from daq.errors import AnalysisError
+from sim.unit import Unit
+
+__all__ = ["Axis", "Posterior", "RATIO", "fit_posterior"]
+
+Progress = Callable[[float, str], None]
+
+INFORMATION = 0.3
+"""Share of a point's likelihood that counts.
+
+Neighbouring points of a sweep keep to the same branch of the motion and err
+together; this value makes stated intervals cover (docs/estimate.md).
+"""
+
+_COARSE_TEMPER = 0.05
+_SIMULATED = ("R_m", "k_t", "J_L", "k_s1", "k_a")
+"""Datasheet values whose spread is simulated; that of k_ts scales the gain alone."""
+
+_DEVIATION = 0.015
+_GROUPS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """One free number: its range and how many coarse places span it.
+
+    `machine` puts a value into a machine. `scale` is the distance over which
+    a response changes smoothly, the same unit as the range.
+    """
+
+    name: str
+    low: float
+    high: float
+    coarse: int
+    scale: float
+    machine: Callable[[Machine, float], Machine]
+
+
+RATIO = Axis("ratio", 0.0, 1.0, 33, 0.08, lambda m, v: replace(m, ratio=float(v)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Posterior:
+    """Posterior of the free numbers on a regular grid.
+
+    `values` one array per axis; `weight` (...) sums to one over the grid;
+    `best` and `match` where it is largest; `draws` all runs that were made.
+    """
+
+    axes: tuple[Axis, ...]
+    values: tuple[NDArray[np.float64], ...]
+    weight: NDArray[np.float64]
+    best: tuple[float, ...]
+    match: Match
+    draws: Draws
+
+    def marginal(self, axis: int) -> NDArray[np.float64]:
+        """Weights along one axis, summing to one."""
+        others = tuple(i for i in range(self.weight.ndim) if i != axis)
+        return np.asarray(self.weight.sum(axis=others))
+
+
+def fit_posterior(
+    unit: Unit,
+    observation: Observation,
+    axes: Sequence[Axis] = (RATIO,),
+    *,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Posterior:
+    """Fit the free numbers of a unit to an observation.
+
+    Raises
+    ------
+    AnalysisError
+        If a motion grew without bound, or the data leave no likelihood.
+    """
+
+    def report(low: float, high: float, text: str) -> Callable[[float], None] | None:
+        if progress is None:
+            return None
+        return lambda part: progress(low + (high - low) * part, text)
+
+    rng = np.random.default_rng(seed)
+    axes = tuple(axes)
+    coarse = _coarse_machines(axes, rng)
+    draws = run_machines(unit, coarse, observation, report(0.0, 0.45, "simulating the range"))
+    scales = np.array([axis.scale for axis in axes])
+    look = _Look(observation, axes, draws, scales)
+    grid = _grid(axes)
+    likely = _weights(look.log_likelihood(grid), _COARSE_TEMPER)
+
+    fine = _fine_machines(axes, grid, likely, rng)
+    draws = draws.joined(
+        run_machines(unit, fine, observation, report(0.45, 0.9, "simulating near the answer"))
+    )
+    spread = np.sqrt(np.maximum(_moments(grid, likely)[1], 0.0))
+    width = np.clip(spread, 0.3 * scales, scales)
+    look = _Look(observation, axes, draws, width)
+    reachable = likely > 1e-4 * likely.max()
+    log_likelihood = np.full(len(grid), -np.inf)
+    log_likelihood[reachable] = look.log_likelihood(grid[reachable], INFORMATION)
+    if not np.any(np.isfinite(log_likelihood)):
+        raise AnalysisError("no simulated machine comes near the response; is it the right unit?")
+    weight = _weights(log_likelihood, 1.0)
+    top = int(np.argmax(weight))
+    match = look.match(grid[top], INFORMATION)
+    if progress is not None:
+        progress(1.0, "done")
+    shape = tuple(_fine_count(axis) for axis in axes)
+    return Posterior(
+        axes,
+        tuple(np.linspace(axis.low, axis.high, _fine_count(axis)) for axis in axes),
+        weight.reshape(shape),
+        tuple(float(v) for v in grid[top]),
+        match,
+        draws,
+    )
+
+
+class _Look:
+    """An emulator over draws, asked for likelihoods at places."""
+
+    def __init__(
+        self,
+        observation: Observation,
+        axes: Sequence[Axis],
+        draws: Draws,
+        width: NDArray[np.float64],
+    ) -> None:
+        self._observation = observation
+        self._width = width
+        places = np.array([[_value(axis, m) for axis in axes] for m in draws.machines])
+        deviations = np.array(
+            [[dict(m.deviations).get(s, 0.0) for s in _SIMULATED] for m in draws.machines]
+        )
+        used = np.any(deviations != 0.0, axis=0)
+        self._emulator = Emulator(places, deviations[:, used], draws.channels, observation.blocks)
+        symbols = [s for s, u in zip(_SIMULATED, used, strict=True) if u]
+        self._sigmas = np.array([TOLERANCES[s] for s in [*symbols, "k_ts"]])
+
+    def match(self, place: NDArray[np.float64], information: float = 1.0) -> Match:
+        prediction = self._emulator.predict(place, self._width)
+        gain = np.zeros((1, *prediction.mean.shape))
+        gain[0, 0] = 1.0
+        scaled: Prediction = replace(prediction, slopes=np.concatenate([prediction.slopes, gain]))
+        return match_prediction(self._observation, scaled, self._sigmas, information)
+
+    def log_likelihood(
+        self, places: NDArray[np.float64], information: float = 1.0
+    ) -> NDArray[np.float64]:
+        return np.array([self.match(place, information).log_likelihood for place in places])
+
+
+def _value(axis: Axis, machine: Machine) -> float:
+    value = getattr(machine, axis.name)
+    return float(value)
+
+
+def _grid(axes: Sequence[Axis]) -> NDArray[np.float64]:
+    lines = [np.linspace(axis.low, axis.high, _fine_count(axis)) for axis in axes]
+    mesh = np.meshgrid(*lines, indexing="ij")
+    return np.stack([m.ravel() for m in mesh], axis=1)
+
+
+def _fine_count(axis: Axis) -> int:
+    return 6 * (axis.coarse - 1) // 2 + 1
+
+
+def _coarse_machines(axes: Sequence[Axis], rng: np.random.Generator) -> list[Machine]:
+    lines = [np.linspace(axis.low, axis.high, axis.coarse) for axis in axes]
+    places = np.stack([m.ravel() for m in np.meshgrid(*lines, indexing="ij")], axis=1)
+    return [_machine_at(axes, place, seed) for seed, place in enumerate(places)]
+
+
+def _fine_machines(
+    axes: Sequence[Axis],
+    grid: NDArray[np.float64],
+    likely: NDArray[np.float64],
+    rng: np.random.Generator,
+) -> list[Machine]:
+    """Machines where the answer may lie: some as in the datasheet, some off it in known ways."""
+    mean, variance = _moments(grid, likely)
+    reach = np.array([0.3 * axis.scale for axis in axes])
+
+    def place() -> NDArray[np.float64]:
+        centre = grid[rng.choice(len(grid), p=likely)]
+        step = rng.uniform(-1.5, 1.5, len(axes)) * np.maximum(np.sqrt(variance), reach)
+        low = np.array([axis.low for axis in axes])
+        high = np.array([axis.high for axis in axes])
+        return np.clip(centre + step, low, high)
+
+    plain = 40 if len(axes) == 1 else 80
+    machines = [_machine_at(axes, place(), 10_000 + i) for i in range(plain)]
+    signs = _balanced_signs(_GROUPS, len(_SIMULATED), rng)
+    for g in range(_GROUPS):
+        deviations = tuple(
+            (symbol, float(_DEVIATION * sign))
+            for symbol, sign in zip(_SIMULATED, signs[g], strict=True)
+        )
+        for i in range(10):
+            machine = _machine_at(axes, place(), 20_000 + 100 * g + i)
+            machines.append(replace(machine, deviations=deviations))
+    return machines
+
+
+def _balanced_signs(groups: int, count: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    """Signs (groups, count), each column half plus and half minus, columns unlike each other."""
+    column = np.repeat([1.0, -1.0], groups // 2)
+    best, least = None, np.inf
+    for _ in range(200):
+        trial = np.stack([rng.permutation(column) for _ in range(count)], axis=1)
+        likeness = float(np.abs(np.corrcoef(trial.T) - np.eye(count)).max())
+        if likeness < least:
+            best, least = trial, likeness
+    return np.asarray(best)
+
+
+def _machine_at(axes: Sequence[Axis], place: NDArray[np.float64], seed: int) -> Machine:
+    machine = Machine(ratio=0.0, seed=seed)
+    for axis, value in zip(axes, place, strict=True):
+        machine = axis.machine(machine, float(value))
+    return machine
+
+
+def _weights(log_likelihood: NDArray[np.float64], temper: float) -> NDArray[np.float64]:
+    scaled = temper * (log_likelihood - np.max(log_likelihood))
+    weight = np.exp(scaled)
+    return np.asarray(weight / weight.sum())
+
+
+def _moments(
+    grid: NDArray[np.float64], weight: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    mean = weight @ grid
+    return mean, weight @ (grid - mean) ** 2

@@ -1,0 +1,167 @@
+"""What a measured response says, in the form in which simulations are compared with it.
+
+Owns the channels of comparison: log gain, phase, and the logarithm of the
+cycle-to-cycle scatter. The scatter is data too: undamped meshes chatter, and a
+little damping silences them. It simulates nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.errors import AnalysisError
+from daq.frf import DB_PER_NEPER, FrequencyResponse, PointFlag
+from daq.plan import SweepPlan
+
+__all__ = ["CHANNELS", "Observation", "channels_of_cycles", "observe"]
+
+CHANNELS = ("gain", "phase", "scatter")
+"""Real and imaginary part of log(V_o/V_i), and log of the relative scatter of the reading."""
+
+SETTLE_CYCLES, INTEGRATE_CYCLES = 20, 30
+"""Assumed where a file does not say."""
+
+SEGMENT_ROWS = 6
+
+_QUIET_SHARE = 0.02
+_DEFAULT_NOISE_V = 5e-4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observation:
+    """A response as channels, rows ordered by level, then ascending frequency.
+
+    `values` (3, rows): the channels; NaN where the response does not hold one.
+    `source_vpk`, `frequency_hz` (rows,). `noise_v`: the reading's own noise
+    per component at the input of the analyser, V. `noise` (rows,): the same
+    relative to the response. `plans`: the sweep that a simulation must take,
+    one for each set of levels that share their frequencies, with their rows.
+    `blocks`: the rows of each level. `segments`: first rows of short stretches
+    of a level over which the motion may keep to one branch.
+    """
+
+    values: NDArray[np.float64]
+    source_vpk: NDArray[np.float64]
+    frequency_hz: NDArray[np.float64]
+    noise_v: float
+    noise: NDArray[np.float64]
+    plans: tuple[tuple[SweepPlan, NDArray[np.int64]], ...]
+
+    @property
+    def blocks(self) -> tuple[slice, ...]:
+        """Rows of each level as slices, in order."""
+        starts = np.flatnonzero(np.diff(self.source_vpk, prepend=np.nan) != 0)
+        ends = [*starts[1:], len(self)]
+        return tuple(slice(int(a), int(b)) for a, b in zip(starts, ends, strict=True))
+
+    @property
+    def segments(self) -> NDArray[np.int64]:
+        """First rows of stretches of about `SEGMENT_ROWS` within each level."""
+        firsts = [
+            np.linspace(b.start, b.stop, max((b.stop - b.start) // SEGMENT_ROWS, 1) + 1)[:-1]
+            for b in self.blocks
+        ]
+        return np.concatenate(firsts).astype(np.int64)
+
+    def __len__(self) -> int:
+        return len(self.frequency_hz)
+
+
+def observe(response: FrequencyResponse) -> Observation:
+    """Bring a response into the form in which it is compared.
+
+    Raises
+    ------
+    AnalysisError
+        If no usable point is left.
+    """
+    usable = ((response.flags & (PointFlag.SPOILT | PointFlag.OVERLOAD)) == 0) & (
+        np.abs(response.gain) > 0
+    )
+    if not np.any(usable):
+        raise AnalysisError("the response holds no usable point; measure it again")
+    kept = response.take(usable)
+    parts = [kept.at_level(level) for level in kept.levels_vpk]
+    gain = np.concatenate([part.gain for part in parts])
+    known = np.concatenate([part.phase_known for part in parts])
+    level = np.concatenate([part.source_vpk for part in parts])
+    frequency = np.concatenate([part.frequency_hz for part in parts])
+    scatter = np.concatenate([part.gain_std_db for part in parts]) / DB_PER_NEPER
+    noise_v = _reading_noise(scatter * np.abs(gain) * level)
+    log_gain = np.log(gain)
+    with np.errstate(divide="ignore"):
+        log_scatter = np.where(scatter > 0, np.log(scatter), np.nan)
+    return Observation(
+        values=np.stack([log_gain.real, np.where(known, log_gain.imag, np.nan), log_scatter]),
+        source_vpk=level,
+        frequency_hz=frequency,
+        noise_v=noise_v,
+        noise=noise_v / (level * np.abs(gain)),
+        plans=_plans(response, level, frequency),
+    )
+
+
+def _reading_noise(volts: NDArray[np.float64]) -> float:
+    """Noise per component: what the quietest points show, as there the motion repeats.
+
+    `volts` counts both components, as the scatter of a reading does.
+    """
+    known = volts[np.isfinite(volts) & (volts > 0)]
+    if known.size == 0:
+        return _DEFAULT_NOISE_V
+    return float(np.quantile(known, _QUIET_SHARE) / np.sqrt(2.0))
+
+
+def _plans(
+    response: FrequencyResponse, level: NDArray[np.float64], frequency: NDArray[np.float64]
+) -> tuple[tuple[SweepPlan, NDArray[np.int64]], ...]:
+    grids: dict[tuple[float, ...], list[float]] = {}
+    for v in np.unique(level):
+        grids.setdefault(tuple(frequency[level == v].tolist()), []).append(float(v))
+    settle = response.settle_cycles
+    integrate = response.integrate_cycles
+    return tuple(
+        (
+            SweepPlan(
+                grid,
+                tuple(levels),
+                direction=response.direction or "up",
+                settle_cycles=SETTLE_CYCLES if settle is None else settle,
+                integrate_cycles=INTEGRATE_CYCLES if integrate is None else integrate,
+                from_rest=bool(response.from_rest),
+            ),
+            np.flatnonzero(np.isin(level, levels)),
+        )
+        for grid, levels in grids.items()
+    )
+
+
+def channels_of_cycles(
+    coefficients: NDArray[np.complex128], noise: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Channels of a simulated sweep, as a bench with this reading noise would see them.
+
+    Parameters
+    ----------
+    coefficients
+        (..., rows, cycles): V_o/V_i cycle by cycle.
+    noise
+        (rows,): relative noise per component of the reading, added to the scatter.
+
+    Returns
+    -------
+    ndarray
+        (..., 3, rows). The scatter counts both components, as a reading that
+        is not turned into its own direction shows it.
+    """
+    cycles = coefficients.shape[-1]
+    mean = coefficients.mean(axis=-1)
+    magnitude = np.maximum(np.abs(mean), 1e-30)
+    spread = np.abs(coefficients - mean[..., None]) ** 2
+    variance = spread.sum(axis=-1) / max(cycles - 1, 1) / cycles / magnitude**2
+    scatter = 0.5 * np.log(variance + 2.0 * noise**2)
+    log_gain = np.log(np.where(np.abs(mean) > 0, mean, 1e-30))
+    return np.stack([log_gain.real, log_gain.imag, scatter], axis=-2)
