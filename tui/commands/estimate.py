@@ -7,10 +7,15 @@ its uncertainty are the analysis's.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from daq.errors import InputError
 from tui.options import Json, Real, UnitName
 from tui.output import Injected
+
+if TYPE_CHECKING:
+    from daq.frf import FrequencyResponse
+    from sim.unit import Unit
 
 __all__ = ["estimate"]
 
@@ -41,33 +46,51 @@ def estimate(
     total_backlash_unknown
         Estimate the total backlash too, instead of taking the unit's.
     """
-    if file is not None and (arf_hz is not None or rf_hz is not None):
-        raise InputError(f"{file}: give either a response or --arf-hz and --rf-hz, not both")
-    if file is None and (arf_hz is None or rf_hz is None):
-        raise InputError("nothing to estimate from; give a response, or both --arf-hz and --rf-hz")
-    if file is None and total_backlash_unknown:
-        raise InputError(
-            "--total-backlash-unknown needs a response at several source levels; "
-            "two frequencies cannot tell it"
-        )
-    from sim.unit import load_unit
-
-    subject = load_unit(unit)
     if file is None:
+        if arf_hz is None or rf_hz is None:
+            raise InputError(
+                "nothing to estimate from; give a response, or both --arf-hz and --rf-hz"
+            )
+        if total_backlash_unknown:
+            raise InputError(
+                "--total-backlash-unknown needs a response at several source levels; "
+                "two frequencies cannot tell it"
+            )
+        subject = _unit(unit)
         from analysis.estimate import estimate_features
 
         result = estimate_features(arf_hz, rf_hz, subject, progress=console.progress)
+        warnings = []
     else:
+        if arf_hz is not None or rf_hz is not None:
+            raise InputError(f"{file}: give either a response or --arf-hz and --rf-hz, not both")
+        subject, response = _unit(unit), _response(file)
         from analysis.estimate import estimate_response
-        from daq.formats import read_response
 
         result = estimate_response(
-            read_response(file),
-            subject,
-            total_backlash_unknown=total_backlash_unknown,
-            progress=console.progress,
+            response, subject, total_backlash_unknown, progress=console.progress
         )
+        warnings = _doubts(response, subject)
     if json:
-        console.document(result.to_json())
+        document = result.to_json()
+        console.document(document | {"warnings": warnings + document["warnings"]})
     else:
-        console.data("\n".join(result.summary()))
+        console.data("\n".join([*result.summary(), *(f"  warning: {text}" for text in warnings)]))
+
+
+def _unit(name_or_path: str) -> Unit:
+    from sim.unit import load_unit
+
+    return load_unit(name_or_path)
+
+
+def _response(file: Path) -> FrequencyResponse:
+    from daq.formats import read_response
+
+    return read_response(file)
+
+
+def _doubts(response: FrequencyResponse, unit: Unit) -> list[str]:
+    if response.unit.lower() == unit.name.lower():
+        return []
+    return [f"the response is of unit {response.unit}, not of {unit.name}"]
