@@ -33,7 +33,7 @@ _QUIET_S = 0.1
 
 def escape(message: bytes) -> bytes:
     """Protect CR, LF, ESC and ``+`` from the adapter by an ESC before each."""
-    return _ESCAPED.sub(rb"\x1b\1", message)
+    return _ESCAPED.sub(b"\x1b\\1", message)
 
 
 @dataclass(frozen=True, slots=True)

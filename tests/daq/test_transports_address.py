@@ -1,0 +1,137 @@
+"""Instrument URLs: every form is read, everything else is refused with the list of forms."""
+
+import contextlib
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from daq.errors import ConfigurationError, FileFormatError, InputError
+from daq.transports.address import (
+    FORMS,
+    HostedAddress,
+    PrologixSerial,
+    PrologixTcp,
+    ReplayFile,
+    VisaAddress,
+    parse_address,
+)
+from daq.transports.open import open_transport
+
+
+@pytest.mark.parametrize(
+    ("url", "address"),
+    [
+        ("sim:", HostedAddress("sim", "")),
+        ("sim:edss?ratio=0.3", HostedAddress("sim", "edss?ratio=0.3")),
+        ("TCPIP::127.0.0.1::5025::SOCKET", VisaAddress("TCPIP::127.0.0.1::5025::SOCKET")),
+        ("tcpip0::bench-7.lab::inst0::instr", VisaAddress("tcpip0::bench-7.lab::inst0::instr")),
+        ("TCPIP::gateway::gpib0,11::INSTR", VisaAddress("TCPIP::gateway::gpib0,11::INSTR")),
+        ("GPIB0::11::INSTR", VisaAddress("GPIB0::11::INSTR")),
+        ("GPIB::5", VisaAddress("GPIB::5")),
+        ("prologix:/dev/ttyUSB0?addr=14", PrologixSerial("/dev/ttyUSB0", 14)),
+        ("prologix:COM3", PrologixSerial("COM3", 11)),
+        ("prologix:socket://10.0.0.2:1234?addr=0", PrologixSerial("socket://10.0.0.2:1234", 0)),
+        ("prologix-tcp:10.0.0.2:1234?addr=30", PrologixTcp("10.0.0.2", 1234, 30)),
+        ("prologix-tcp:[::1]:1234", PrologixTcp("::1", 1234, 11)),
+        ("replay:runs/a b.jsonl", ReplayFile(Path("runs/a b.jsonl"))),
+    ],
+)
+def test_every_form_is_read(url, address):
+    assert parse_address(url) == address
+
+
+@pytest.mark.parametrize(
+    ("url", "fault"),
+    [
+        ("", "no scheme"),
+        ("127.0.0.1:5025", "no scheme"),
+        ("SIM:", "no scheme"),
+        ("http://bench", "unknown scheme 'http'"),
+        ("TCPIP::host::SOCKET", "no VISA name"),
+        ("TCPIP::host::70000::SOCKET", "70000"),
+        ("TCPIP::host::0::SOCKET", "has 0 where"),
+        ("TCPIP::host::5025::SOCKET?addr=11", "no VISA name"),
+        ("GPIB0::31::INSTR", "31"),
+        ("GPIB0::11::40::INSTR", "40"),
+        ("ASRL3::INSTR", "no VISA name"),
+        ("PRLGX-TCPIP::host::INTFC", "no VISA name"),
+        ("prologix:", "no serial device"),
+        ("prologix:/dev/tty USB", "no serial device"),
+        ("prologix:COM3?addr=31", "'31'"),
+        ("prologix:COM3?addr=", "''"),
+        ("prologix:COM3?addr=-1", "'-1'"),
+        ("prologix:COM3?addr=1&addr=2", "one option only"),
+        ("prologix:COM3?baud=9600", "one option only"),
+        ("prologix:COM3?", "one option only"),
+        ("prologix:COM3?addr", "nothing readable"),
+        ("prologix-tcp:host", "HOST:PORT"),
+        ("prologix-tcp:host:0", "HOST:PORT"),
+        ("prologix-tcp:host:99999", "HOST:PORT"),
+        ("prologix-tcp:host:12a", "HOST:PORT"),
+        ("prologix-tcp:a:b:1", "HOST:PORT"),
+        ("replay:", "no file"),
+    ],
+)
+def test_anything_else_is_refused_with_the_forms(url, fault):
+    with pytest.raises(ConfigurationError) as refusal:
+        parse_address(url)
+    assert fault in str(refusal.value)
+    assert all(form in str(refusal.value) for form in FORMS)
+    assert refusal.value.exit_code == 2
+
+
+@given(st.text(max_size=40))
+def test_no_text_escapes_the_parser_with_another_error(text):
+    with contextlib.suppress(ConfigurationError):
+        parse_address(text)
+
+
+def test_a_refusal_is_one_line():
+    with pytest.raises(ConfigurationError) as refusal:
+        parse_address("two\nlines")
+    assert "\n" not in str(refusal.value)
+
+
+@given(st.text(max_size=12), st.integers(-5, 200))
+def test_an_accepted_gpib_address_is_one(place, address):
+    try:
+        parsed = parse_address(f"prologix:{place}?addr={address}")
+    except ConfigurationError:
+        return
+    assert parsed.gpib_address == address
+    assert 0 <= address <= 30
+
+
+def test_a_scheme_without_a_provider_is_unknown():
+    with pytest.raises(ConfigurationError, match="unknown scheme 'sim'"):
+        open_transport("sim:", {})
+
+
+def test_a_provided_scheme_gets_what_follows_the_colon():
+    seen = []
+    assert open_transport("sim:a?b=c", {"sim": lambda rest: seen.append(rest) or "wire"}) == "wire"
+    assert seen == ["a?b=c"]
+
+
+def test_a_replay_of_nothing_is_a_bad_file(tmp_path):
+    with pytest.raises(FileFormatError, match="cannot be read"):
+        open_transport(f"replay:{tmp_path / 'gone'}")
+
+
+def test_a_transcript_is_never_written_over(tmp_path):
+    path = tmp_path / "run.jsonl"
+    path.write_text("evidence")
+
+    class Wire:
+        address = "x:"
+        closed = False
+
+        def close(self):
+            Wire.closed = True
+
+    with pytest.raises(InputError, match="give a new file"):
+        open_transport("sim:", {"sim": lambda _: Wire()}, record=path)
+    assert Wire.closed
+    assert path.read_text() == "evidence"

@@ -1,0 +1,181 @@
+"""VISA resources over the Python back end: raw socket and VXI-11, each against its own server."""
+
+import gc
+import struct
+import threading
+import time
+
+import pytest
+from vxi11 import Vxi11Instrument
+from wire import ByteServer, lines_of
+
+from daq.errors import BenchTimeout, LinkError, ProtocolError
+from daq.transports.base import Deadline, ask, ask_block
+from daq.transports.open import open_transport
+from daq.transports.visa import open_visa
+
+PAYLOAD = struct.pack(">6d", 1.0, -2.0, 10.0, 43.0, 9.9e37, 0.0) + b"\n\r\x1b+\0#\n"
+BLOCK = b"#2%d" % len(PAYLOAD) + PAYLOAD + b"\n"
+
+
+def instrument(line):
+    return {
+        b"A?": b"+1\n",
+        b"BLOCK?": BLOCK,
+        b"CUT?": BLOCK[:20],
+        b"LONG?": b"#3999" + PAYLOAD + b"\n",
+        b"BINARY?": b"\xff\xff\n",
+    }.get(line, b"")
+
+
+@pytest.fixture
+def raw():
+    with ByteServer(lines_of(instrument)) as server:
+        transport = open_transport(f"TCPIP::127.0.0.1::{server.port}::SOCKET")
+        yield transport
+        transport.close()
+
+
+def test_a_raw_socket_answers_text_and_blocks(raw):
+    for _ in range(3):
+        assert ask(raw, "A?", Deadline.after(2.0)) == "+1"
+        assert ask_block(raw, "BLOCK?", Deadline.after(2.0)) == PAYLOAD
+
+
+def test_commands_in_a_row_do_not_wait_for_each_other(raw):
+    started = time.monotonic()
+    for _ in range(20):
+        raw.write("X 1", Deadline.after(1.0))
+        raw.write("Y 2", Deadline.after(1.0))
+        ask(raw, "A?", Deadline.after(1.0))
+    # Held back by acknowledgements it would take 40 ms each.
+    assert time.monotonic() - started < 0.5
+
+
+def test_a_raw_socket_has_no_poll_and_drops_on_clear(raw):
+    assert raw.serial_poll(Deadline.after(1.0)) is None
+    raw.write("A?", Deadline.after(1.0))
+    time.sleep(0.05)
+    assert not raw.device_clear(Deadline.after(1.0))
+    with pytest.raises(BenchTimeout):
+        raw.read(Deadline.after(0.05))
+    assert ask(raw, "A?", Deadline.after(1.0)) == "+1"
+
+
+def test_a_time_out_names_what_waited(raw):
+    started = time.monotonic()
+    with pytest.raises(BenchTimeout, match=r"'N\?' got no answer within 0.1 s"):
+        ask(raw, "N?", Deadline.after(0.1))
+    assert 0.09 < time.monotonic() - started < 0.5
+
+
+@pytest.mark.parametrize("query", ["CUT?", "LONG?"])
+def test_a_block_cut_short_is_a_damaged_reply(raw, query):
+    with pytest.raises(ProtocolError, match="cut short"):
+        ask_block(raw, query, Deadline.after(0.1))
+
+
+def test_text_where_a_block_was_due_is_a_damaged_reply(raw):
+    with pytest.raises(ProtocolError, match="should start with '#'"):
+        ask_block(raw, "A?", Deadline.after(0.5))
+
+
+def test_bytes_that_are_no_text_are_a_damaged_reply(raw):
+    with pytest.raises(ProtocolError, match="not text"):
+        ask(raw, "BINARY?", Deadline.after(0.5))
+
+
+def test_a_closed_connection_is_lost_at_once_and_never_spins():
+    with ByteServer(lambda data: None if b"BYE" in data else b"+1\n") as server:
+        transport = open_transport(f"TCPIP::127.0.0.1::{server.port}::SOCKET")
+        assert ask(transport, "A?", Deadline.after(1.0)) == "+1"
+        started = time.monotonic()
+        with pytest.raises(LinkError, match="closed the connection"):
+            ask(transport, "BYE", Deadline.after(5.0))
+        with pytest.raises(LinkError):
+            transport.device_clear(Deadline.after(5.0))
+        with pytest.raises(LinkError):
+            ask(transport, "A?", Deadline.after(5.0))
+        assert time.monotonic() - started < 1.0
+        transport.close()
+        transport.close()
+
+
+def test_a_connection_closed_while_waiting_ends_the_wait():
+    hang_up = threading.Event()
+
+    def answer(data):
+        hang_up.wait(2.0)
+
+    with ByteServer(answer) as server:
+        transport = open_transport(f"TCPIP::127.0.0.1::{server.port}::SOCKET")
+        timer = threading.Timer(0.1, hang_up.set)
+        timer.start()
+        started = time.monotonic()
+        with pytest.raises(LinkError, match="closed the connection"):
+            ask(transport, "A?", Deadline.after(10.0))
+        assert time.monotonic() - started < 1.0
+        timer.join()
+        transport.close()
+
+
+def test_a_port_on_which_nobody_listens_is_no_connection():
+    with ByteServer(lambda data: b"") as server:
+        port = server.port
+    with pytest.raises(LinkError, match="no connection"):
+        open_transport(f"TCPIP::127.0.0.1::{port}::SOCKET")
+
+
+def test_a_gpib_card_without_a_back_end_is_said_so():
+    with pytest.raises(LinkError, match="needs its maker's VISA, or linux-gpib"):
+        open_transport("GPIB0::11::INSTR")
+
+
+@pytest.fixture
+def vxi11():
+    device = Vxi11Instrument(instrument, status_byte=96)
+    with ByteServer(device.feed) as server:
+        transport = open_visa(f"TCPIP::127.0.0.1,{server.port}::inst0::INSTR", Deadline.after(3.0))
+        yield transport, device
+        transport.close()
+
+
+@pytest.mark.parametrize("largest_read", [1 << 20, 7])
+def test_vxi11_answers_text_and_blocks(vxi11, largest_read):
+    transport, device = vxi11
+    device.largest_read = largest_read
+    assert ask(transport, "A?", Deadline.after(2.0)) == "+1"
+    assert ask_block(transport, "BLOCK?", Deadline.after(2.0)) == PAYLOAD
+    assert device.messages == [b"A?", b"BLOCK?"]
+
+
+def test_vxi11_polls_and_clears(vxi11):
+    transport, device = vxi11
+    assert transport.serial_poll(Deadline.after(2.0)) == 96
+    transport.write("A?", Deadline.after(2.0))
+    assert transport.device_clear(Deadline.after(2.0))
+    assert device.cleared == 1
+    with pytest.raises(BenchTimeout):
+        transport.read(Deadline.after(0.1))
+
+
+def test_vxi11_times_out_by_name(vxi11):
+    transport, _ = vxi11
+    with pytest.raises(BenchTimeout, match=r"'N\?' got no answer"):
+        ask(transport, "N?", Deadline.after(0.1))
+
+
+@pytest.mark.parametrize(("query", "fault"), [("CUT?", "20 bytes came"), ("LONG?", "were due")])
+def test_vxi11_says_how_much_of_a_block_came(vxi11, query, fault):
+    with pytest.raises(ProtocolError, match=fault):
+        ask_block(vxi11[0], query, Deadline.after(0.5))
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+def test_vxi11_without_anybody_there_is_no_connection():
+    with ByteServer(lambda data: b"") as server:
+        port = server.port
+    with pytest.raises(LinkError, match="cannot be opened"):
+        open_transport(f"TCPIP::127.0.0.1,{port}::inst0::INSTR", opening_s=1.0)
+    gc.collect()  # the back end leaves its socket to the collector
