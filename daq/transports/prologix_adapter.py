@@ -201,15 +201,22 @@ class Adapter:
         return _text(line)
 
     def _find(self, deadline: Deadline) -> tuple[str, Dialect]:
+        """Ask for the version until two answers are of the kind; the first may be a greeting."""
         heard = ""
         while not deadline.expired:
-            self.send(b"++ver", deadline)
-            patience = deadline.within(_PATIENCE_S)
-            while (line := self._next_line(patience)) is not None:
-                heard = line
-                found = dialect_of(line)
-                if found is not None:
-                    return self._settled(line, found, deadline)
+            for _ in range(2):
+                self.send(b"++ver", deadline)
+                patience = deadline.within(_PATIENCE_S)
+                line = self._next_line(patience)
+                while line is not None and dialect_of(line) is None:
+                    heard, line = line, self._next_line(patience)
+                if line is None:
+                    break
+                # Answers to a `++ver` that was sent while it was starting may still come.
+                self._hear_out(deadline)
+            dialect = None if line is None else dialect_of(line)
+            if line is not None and dialect is not None:
+                return self._settled(line, dialect, deadline)
         heard = heard or _text(self.unread())
         raise LinkError(
             f"{self.link.name}: no GPIB adapter answered '++ver' within {deadline.span_s:g} s "
@@ -218,8 +225,6 @@ class Adapter:
         )
 
     def _settled(self, version: str, dialect: Dialect, deadline: Deadline) -> tuple[str, Dialect]:
-        # Answers to a `++ver` that was sent while it was starting up may still come.
-        self._hear_out(deadline)
         # Any text may be stored in an AR488 as its version; `real` asks for the truth, and
         # other adapters answer it with a complaint or the same text again.
         if dialect is OTHER:
