@@ -1,9 +1,8 @@
 """Elements become the right matrices: held against equations (1) to (14) written out by hand."""
 
-import control
 import numpy as np
 import pytest
-from side_by_side import ADSS, EDSS, FRICTIONLESS
+from side_by_side import ADSS, EDSS, FRICTIONLESS, state_space
 
 from daq.errors import ConfigurationError
 from sim.assembly import Assembly, Law
@@ -12,41 +11,6 @@ from sim.effects import drivetrain_with, parse_effect
 from sim.elements import Damper, HardeningSpring, Inertia, Mesh, Spring
 
 FREQUENCIES = np.geomspace(1.0, 1000.0, 400)
-
-
-def state_space(unit, c_s1=0.0, B_L=0.0, K_c=0.0):
-    """Equations (1) to (14) without play and dry friction, by hand.
-
-    States: i_a, then angle and rate of motor, gear 1, shaft middle, pinion 2 and load, then
-    V_o and its rate.
-    """
-    p = unit.parameters
-    A, B = np.zeros((13, 13)), np.zeros((13, 1))
-    B[0] = p["k_a"] / p["L_a"]
-    A[0, 0], A[0, 2] = -p["R_m"] / p["L_a"], -p["k_b"] / p["L_a"]
-    for angle in (1, 3, 5, 7, 9):
-        A[angle, angle + 1] = 1.0
-    T_g1 = np.zeros(13)
-    T_g1[[1, 3]] = p["k_g1"] / p["N_1"], -p["k_g1"]
-    T_L = np.zeros(13)
-    T_L[[7, 9]] = p["k_2"] / p["N"], -p["k_2"]
-    T_a, T_c = np.zeros(13), np.zeros(13)
-    T_a[[3, 5, 4, 6]] = 2 * p["k_s1"], -2 * p["k_s1"], 2 * c_s1, -2 * c_s1
-    T_c[[5, 7, 6, 8]] = 2 * p["k_s1"], -2 * p["k_s1"], 2 * c_s1, -2 * c_s1
-    A[2] -= T_g1 / p["N_1"] / p["J_m"]
-    A[2, 0] += p["k_t"] / p["J_m"]
-    A[2, 2] -= p["B_m"] / p["J_m"]
-    A[4] = (T_g1 - T_a) / p["J_g1"]
-    A[6] = (T_a - T_c) / p["J_s1"]
-    A[8] = (T_c - T_L / p["N"]) / p["J_p2"]
-    A[10] = T_L / p["J_L"]
-    A[10, 10] -= B_L / p["J_L"]
-    A[10, 9] -= K_c / p["J_L"]
-    A[11, 12] = 1.0
-    A[12, 2], A[12, 11], A[12, 12] = 723439.0 * p["k_ts"], -723439.0, -1710.0
-    C = np.zeros((1, 13))
-    C[0, 11] = 1.0
-    return control.ss(A, B, C, 0.0)
 
 
 @pytest.mark.parametrize("unit", [ADSS, EDSS], ids=["adss", "edss"])

@@ -1,0 +1,100 @@
+"""What moves freely never gains energy, and loses none that nothing takes."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from side_by_side import ADSS, EDSS, FRICTIONLESS, drive
+
+from sim.assembly import Law
+from sim.drivetrain import Drivetrain
+from sim.effects import drivetrain_with, parse_effect
+from sim.elements import Inertia, Mesh, Spring
+
+UNITS = {"adss": ADSS, "edss": EDSS}
+SAMPLE_HZ = 250.0
+
+
+def energy_of(drivetrain: Drivetrain, states, x):
+    """Kinetic energy and what the springs, and the meshes beyond their play, hold; (lanes,)."""
+    at = {name: x[i] for i, name in enumerate(states)}
+    total = np.zeros(x.shape[1])
+    for element in drivetrain.elements.values():
+        if isinstance(element, Inertia):
+            total += 0.5 * element.J * at[f"{element.coordinate}'"] ** 2
+        if isinstance(element, Spring | Mesh):
+            y = sum(c * at[q] for q, c in element.along.items())
+            play = element.half_play if isinstance(element, Mesh) else 0.0
+            total += 0.5 * element.k * np.maximum(np.abs(y) - play, 0.0) ** 2
+    return total
+
+
+def kicked(system, lanes, rng):
+    """Free motion as violent as a strong drive makes it: rates of motor and load alone."""
+    x = np.zeros((len(system.states), lanes))
+    x[system.states.index("th_m'")] = 20.0 * rng.standard_normal(lanes)
+    x[system.states.index("th_L'")] = 0.3 * rng.standard_normal(lanes)
+    return x
+
+
+def energies(drivetrain, seed, samples, lanes=8, step_s=5e-6):
+    """Energy of free motions at SAMPLE_HZ, over the energy at the start: (samples, lanes)."""
+    system = drivetrain.system()
+    x = kicked(system, lanes, np.random.default_rng(seed))
+    start = energy_of(drivetrain, system.states, x)
+    rows = [np.ones(lanes)]
+    for _ in range(samples):
+        _, x = drive(system, x, SAMPLE_HZ, 1, step_s=step_s)
+        rows.append(energy_of(drivetrain, system.states, x) / start)
+    return np.array(rows)
+
+
+def without_losses(unit, ratio):
+    quiet = unit.with_parameters(**FRICTIONLESS, B_m=0.0)
+    return drivetrain_with(quiet, ratio).replacing("motor", k_t=0.0, k_b=0.0)
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("name", UNITS)
+def test_a_chain_without_losses_keeps_its_energy(name, ratio):
+    history = energies(without_losses(UNITS[name], ratio), seed=1, samples=50)
+    assert np.abs(history - 1.0).max() < 0.3
+    assert abs(history.mean() - 1.0) < 0.05
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    name=st.sampled_from(sorted(UNITS)),
+    ratio=st.floats(0.0, 1.0),
+    b_t_deg=st.floats(0.0, 0.5),
+    T_f_m=st.floats(0.0, 0.03),
+    T_f_L=st.floats(0.0, 0.3),
+    c_s1=st.sampled_from([0.0, 1e-3, 0.1]),
+    c_g1=st.sampled_from([0.0, 0.1, 10.0]),
+    c_2=st.sampled_from([0.0, 1.0, 100.0]),
+    seed=st.integers(0, 2**31),
+)
+def test_free_motion_never_gains_energy(name, ratio, b_t_deg, T_f_m, T_f_L, c_s1, c_g1, c_2, seed):
+    unit = UNITS[name].with_parameters(b_t_deg=b_t_deg, T_f_m=T_f_m, T_f_L=T_f_L)
+    chosen = {"shaft-damping:c_s1": c_s1, "mesh1-damping:c_g1": c_g1, "mesh2-damping:c_2": c_2}
+    effects = [parse_effect(f"{key}={value}") for key, value in chosen.items()]
+    drivetrain = drivetrain_with(unit, ratio, effects).replacing("motor", k_t=0.0, k_b=0.0)
+    history = energies(drivetrain, seed, samples=20, lanes=4)
+    assert np.diff(history, axis=0).max() < 0.05
+    assert history.min() >= 0.0
+
+
+def test_friction_brings_free_motion_to_rest_and_rest_is_still():
+    dampers = ["shaft-damping:c_s1=0.02", "mesh1-damping:c_g1=0.2", "mesh2-damping:c_2=2"]
+    drivetrain = drivetrain_with(ADSS, 0.25, [parse_effect(text) for text in dampers])
+    drivetrain = drivetrain.replacing("motor", k_t=0.0, k_b=0.0)
+    system = drivetrain.system()
+    x = kicked(system, 8, np.random.default_rng(5))
+    _, x = drive(system, x, 10.0, 5)
+    frictions = [law for law in system.nonlinearities if law.law is Law.FRICTION]
+    for law in frictions:
+        assert np.abs(law.outlet @ x).max() < 1e-12
+    _, later = drive(system, x, 10.0, 2)
+    for name in ("th_m", "th_L"):
+        row = system.states.index(name)
+        assert np.abs(later[row] - x[row]).max() < 1e-12

@@ -1,0 +1,250 @@
+"""From a plan to a frequency response: order, starts, error bars, flags, and the same bits."""
+
+import numpy as np
+import pytest
+from side_by_side import ADSS, EDSS, oracle_gain
+
+from daq.errors import AnalysisError, ConfigurationError
+from daq.frf import DB_PER_NEPER, PointFlag
+from daq.plan import SweepPlan
+from sim.effects import drivetrain_with, parse_effect
+from sim.elements import Damper
+from sim.response import (
+    PERIODIC_SCATTER,
+    Servo,
+    SteppedServo,
+    response_of_cycles,
+    scatter_of_cycles,
+    simulate,
+    simulate_cycles,
+)
+
+BAND = (100.0, 120.0, 140.0)
+PLAN = SweepPlan(BAND, (2.5,), settle_cycles=4, integrate_cycles=6)
+DAMPED = [
+    parse_effect(text)
+    for text in ("shaft-damping:c_s1=0.02", "mesh1-damping:c_g1=0.8", "mesh2-damping:c_2=2")
+]
+
+
+def plan_with(**changes):
+    fields = ("frequencies_hz", "levels_vpk", "direction", "settle_cycles", "integrate_cycles",
+              "from_rest", "dc_offset_v")  # fmt: skip
+    return SweepPlan(**({name: getattr(PLAN, name) for name in fields} | changes))
+
+
+def dwells(plan, seed, level, rest):
+    """The same sweep by hand, dwell by dwell, as an analyser would make it."""
+    servo = SteppedServo(ADSS, 0.25, seed=seed)
+    found = {}
+    for f in plan.visited_hz:
+        if rest:
+            servo.rest()
+        record = servo.dwell(f, level, plan.dc_offset_v, plan.settle_cycles, plan.integrate_cycles)
+        found[f] = record.output_cycles / level
+    return np.array([found[f] for f in sorted(found)])
+
+
+@pytest.mark.parametrize("direction", ["up", "down"])
+@pytest.mark.parametrize("from_rest", [False, True])
+@pytest.mark.parametrize("offset", [0.0, 0.3])
+def test_a_sweep_is_its_dwells_one_after_the_other(direction, from_rest, offset):
+    plan = plan_with(direction=direction, from_rest=from_rest, dc_offset_v=offset)
+    (cycles,) = simulate_cycles([Servo.of(ADSS, 0.25, seed=7)], plan)
+    assert cycles.shape == (1, 3, 6, 4)
+    assert np.array_equal(cycles[0], dwells(plan, 7, 2.5, from_rest))
+
+
+def test_direction_and_rest_matter_and_rows_stay_ascending():
+    kinds = [
+        plan_with(),
+        plan_with(direction="down"),
+        plan_with(from_rest=True),
+    ]
+    responses = [simulate(ADSS, 0.25, plan) for plan in kinds]
+    for response, plan in zip(responses, kinds, strict=True):
+        assert list(response.frequency_hz) == list(BAND)
+        assert response.direction == plan.direction
+        assert response.from_rest == plan.from_rest
+        assert (response.settle_cycles, response.integrate_cycles) == (4, 6)
+    up, down, rest = (response.gain for response in responses)
+    assert up[0] == rest[0]
+    assert np.all(up[1:] != rest[1:])
+    assert np.all(up != down)
+
+
+def test_levels_keep_their_order_and_each_starts_anew():
+    both = simulate(ADSS, 0.25, plan_with(levels_vpk=(2.5, 1.0)))
+    assert list(both.source_vpk) == [2.5] * 3 + [1.0] * 3
+    assert list(both.frequency_hz) == list(BAND) * 2
+    alone = simulate(ADSS, 0.25, plan_with(levels_vpk=(2.5,)))
+    assert np.array_equal(both.gain[:3], alone.gain)
+    assert not np.allclose(both.gain[3:], alone.gain, rtol=1e-2)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 12345])
+def test_a_seed_gives_the_same_bits_and_another_seed_does_not(seed):
+    first, again, other = (simulate(EDSS, 0.5, PLAN, seed=s) for s in (seed, seed, seed + 1))
+    assert np.array_equal(first.gain, again.gain)
+    assert np.array_equal(first.gain_std_db, again.gain_std_db)
+    assert np.all(first.gain != other.gain)
+    assert first.provenance["seed"] == seed
+
+
+def crowd():
+    """Forty servos of four kinds: plays and frictions vary, one kind is another machine."""
+    for i in range(40):
+        if i % 10 == 3:
+            yield Servo.of(EDSS, 0.5, seed=i)
+        elif i % 10 == 6:
+            yield Servo.of(ADSS, 0.5, [parse_effect("load-inertia:J_L=0.002")], seed=i)
+        else:
+            unit = ADSS.with_parameters(T_f_m=0.01 + 1e-4 * i, b_t_deg=0.05 + 1e-3 * i)
+            yield Servo.of(unit, i / 40.0, seed=i)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_company_changes_nothing_to_the_last_bit(workers):
+    plan = plan_with(frequencies_hz=(118.0, 131.0), levels_vpk=(2.5, 1.2), integrate_cycles=3)
+    servos = list(crowd())
+    together = simulate_cycles(servos, plan, workers=workers)
+    for i in (0, 3, 6, 17, 39):
+        (alone,) = simulate_cycles([servos[i]], plan)
+        assert np.array_equal(together[i], alone), i
+
+
+def test_the_response_is_what_the_oracle_finds_from_a_settled_motion():
+    unit = ADSS.with_parameters(b_t_deg=0.02)
+    plan = plan_with(frequencies_hz=(60.0,), settle_cycles=150, integrate_cycles=5)
+    bias = parse_effect("load-torque-bias:T_b=0.2")
+    response = simulate(unit, 0.25, plan, effects=[*DAMPED, bias])
+    extras = {"c_s1": 0.02, "c_g1": 0.8, "c_2": 2.0, "T_b": 0.2}
+    expected = oracle_gain(unit, 0.25, 60.0, 2.5, 150, 5, extras, step_s=1e-6).mean(axis=0)
+    assert response.gain[0] == pytest.approx(expected[1], rel=1e-3)
+    assert response.harmonic2[0] == pytest.approx(expected[2], abs=1e-3 * abs(expected[1]))
+    assert response.harmonic3[0] == pytest.approx(expected[3], abs=1e-3 * abs(expected[1]))
+    assert abs(response.harmonic2[0]) > 5e-3
+    assert response.dc_v[0] == pytest.approx(2.5 * expected[0].real, abs=1e-3)
+    assert response.flags[0] == 0
+    assert response.gain_std_db[0] < 1e-3
+
+
+def test_an_offset_of_the_source_turns_the_motor_steadily():
+    quiet = ADSS.with_parameters(T_f_m=0.0, T_f_L=0.0)
+    plan = plan_with(frequencies_hz=(100.0,), settle_cycles=150, dc_offset_v=0.5)
+    response = simulate(quiet, 0.0, plan, effects=DAMPED)
+    p = quiet.parameters
+    speed = p["k_a"] * 0.5 * p["k_t"] / (p["k_t"] * p["k_b"] + p["R_m"] * p["B_m"])
+    assert response.dc_v[0] == pytest.approx(p["k_ts"] * speed, rel=1e-2)
+
+
+def test_mean_and_errors_of_three_cycles_by_hand():
+    # Mean 2j; departures of 0.3 along it and 0.6 across it.
+    mean, along, across, worst = scatter_of_cycles(np.array([2.3j, -0.6 + 1.7j, 0.6 + 2.0j]))
+    assert mean == pytest.approx(2j)
+    assert along == pytest.approx(np.std([0.3, -0.3, 0.0], ddof=1) / np.sqrt(3.0))
+    assert across == pytest.approx(np.std([0.0, 0.6, -0.6], ddof=1) / np.sqrt(3.0))
+    assert worst == pytest.approx(np.hypot(0.6, 0.3) / 2.0)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_standard_errors_of_synthetic_cycles_are_the_scatter_of_their_means(seed):
+    # 4000 points of 12 cycles: the scatter of the means is known within 1.1 % (one sigma), the
+    # bound is 5 %; a false alarm is a matter of 1e-5.
+    rng = np.random.default_rng(seed)
+    true, turn = 0.8 * np.exp(0.7j), np.exp(0.7j)
+    noise = 0.02 * rng.standard_normal((4000, 12)) + 0.05j * rng.standard_normal((4000, 12))
+    mean, along, across, _ = scatter_of_cycles(true + turn * noise)
+    scatter = (mean - true) / turn
+    assert np.sqrt(np.mean(along**2)) == pytest.approx(scatter.real.std(), rel=0.05)
+    assert np.sqrt(np.mean(across**2)) == pytest.approx(scatter.imag.std(), rel=0.05)
+
+
+def synthetic(cycles):
+    """A response from per-cycle gains, (points, cycles), with no other harmonics."""
+    whole = np.zeros((1, *np.shape(cycles), 4), dtype=complex)
+    whole[0, ..., 1] = cycles
+    points = np.shape(cycles)[0]
+    plan = plan_with(
+        frequencies_hz=tuple(100.0 + np.arange(points)), integrate_cycles=np.shape(cycles)[1]
+    )
+    return response_of_cycles(whole, plan, "x", {"kind": "simulated"})
+
+
+def test_standard_errors_are_given_in_decibel_and_degree():
+    response = synthetic([[0.5 + 0.01j, 0.5 - 0.01j, 0.52, 0.48]])
+    assert response.gain[0] == pytest.approx(0.5)
+    along = np.std([0.0, 0.0, 0.02, -0.02], ddof=1) / 2.0
+    across = np.std([0.01, -0.01, 0.0, 0.0], ddof=1) / 2.0
+    assert response.gain_std_db[0] == pytest.approx(DB_PER_NEPER * along / 0.5)
+    assert response.phase_std_deg[0] == pytest.approx(np.degrees(across / 0.5))
+
+
+def test_a_point_that_does_not_repeat_is_flagged():
+    small, large = 0.9 * PERIODIC_SCATTER, 1.1 * PERIODIC_SCATTER
+    response = synthetic([[1.0 + small, 1.0 - small], [1.0 + large, 1.0 - large]])
+    assert list(response.flags) == [0, int(PointFlag.NOT_PERIODIC)]
+
+
+def test_a_single_cycle_has_no_error_bar():
+    response = synthetic([[0.5]])
+    assert np.isnan(response.gain_std_db[0])
+    assert np.isnan(response.phase_std_deg[0])
+    assert response.flags[0] == 0
+
+
+def test_undamped_play_is_flagged_and_a_damped_servo_without_play_is_not():
+    rough = simulate(ADSS, 0.5, plan_with(frequencies_hz=(133.0,), settle_cycles=20))
+    assert rough.flags[0] & PointFlag.NOT_PERIODIC
+    assert rough.gain_std_db[0] > 0.01
+    smooth_plan = plan_with(frequencies_hz=(100.0,), settle_cycles=60)
+    smooth = simulate(ADSS.with_parameters(b_t_deg=0.0), 0.5, smooth_plan, effects=DAMPED)
+    assert smooth.flags[0] == 0
+
+
+def test_the_start_rests_somewhere_inside_the_plays():
+    # So weak a drive that friction holds the motor: the meshes stay where the seed put them.
+    places = []
+    for seed in range(20):
+        servo = SteppedServo(ADSS, 0.25, seed=seed)
+        record = servo.dwell(100.0, 0.05, settle_cycles=1, integrate_cycles=1)
+        assert np.abs(record.output_cycles).max() < 1e-6
+        system = Servo.of(ADSS, 0.25).system
+        places.append([law.outlet @ servo._state[:, 0] / law.parameters[0]
+                       for law in system.nonlinearities[:2]])  # fmt: skip
+    places = np.array(places)
+    assert np.abs(places).max() <= 1.0 + 1e-9
+    # Twenty uniform draws all lie within half their range with probability 2e-5.
+    assert np.ptp(places, axis=0).min() > 1.0
+
+
+def test_motion_without_bound_is_an_error_and_no_number():
+    engine = drivetrain_with(ADSS, 0.25).adding(drive=Damper({"th_L": 1.0}, -100.0))
+    with pytest.raises(AnalysisError, match=r"100 Hz.*without bound"):
+        simulate_cycles([Servo(engine.system())], plan_with(settle_cycles=50))
+
+
+def test_dwell_records_what_both_inputs_saw():
+    servo = SteppedServo(ADSS, 0.25, DAMPED)
+    record = servo.dwell(120.0, 2.0, 0.25, settle_cycles=60, integrate_cycles=3)
+    assert np.array_equal(record.source_cycles, np.full(3, 2.0 + 0j))
+    assert record.source_peak_v == 2.25
+    largest = np.abs(record.output_cycles[0]).sum()
+    first = abs(record.output_cycles[0, 1])
+    assert first < record.output_peak_v < 1.1 * largest
+
+
+def test_provenance_tells_how_to_do_it_again():
+    effect = parse_effect("load-viscous-damping:B_L=0.05")
+    response = simulate(ADSS, 0.25, PLAN, effects=[effect], seed=3)
+    told = response.provenance
+    assert told["kind"] == "simulated"
+    assert told["contribution_ratio"] == 0.25
+    assert told["effects"] == [{"id": "load-viscous-damping", "B_L": 0.05}]
+    assert told["parameters"]["k_s1"] == 22.8
+    assert response.unit == "ADSS"
+
+
+def test_a_ratio_that_is_no_share_is_refused():
+    with pytest.raises(ConfigurationError, match="outside 0 to 1"):
+        simulate(ADSS, 1.5, PLAN)
