@@ -11,6 +11,7 @@ from sim.effects import drivetrain_with, parse_effect
 from sim.elements import Damper
 from sim.response import (
     PERIODIC_SCATTER,
+    START_SPREAD,
     Servo,
     SteppedServo,
     response_of_cycles,
@@ -202,18 +203,17 @@ def test_undamped_play_is_flagged_and_a_damped_servo_without_play_is_not():
     assert smooth.flags[0] == 0
 
 
-def test_the_start_rests_somewhere_inside_the_plays():
-    # So weak a drive that friction holds the motor: the meshes stay where the seed put them.
+def test_the_start_rests_where_the_seed_puts_it_inside_the_plays():
+    # So weak a drive that friction holds the motor: the meshes stay where they start.
     places = []
     for seed in range(20):
         servo = SteppedServo(ADSS, 0.25, seed=seed)
         record = servo.dwell(100.0, 0.05, settle_cycles=1, integrate_cycles=1)
         assert np.abs(record.output_cycles).max() < 1e-6
-        system = Servo.of(ADSS, 0.25).system
-        places.append([law.outlet @ servo._state[:, 0] / law.parameters[0]
-                       for law in system.nonlinearities[:2]])  # fmt: skip
-    places = np.array(places)
-    assert np.abs(places).max() <= 1.0 + 1e-9
+        meshes = Servo.of(ADSS, 0.25).system.nonlinearities[:2]
+        places.append([mesh.outlet @ servo._state[:, 0] / mesh.parameters[0] for mesh in meshes])
+    places = np.array(places) / START_SPREAD
+    assert np.abs(places).max() <= 1.0 + 1e-2
     # Twenty uniform draws all lie within half their range with probability 2e-5.
     assert np.ptp(places, axis=0).min() > 1.0
 
