@@ -21,7 +21,7 @@ from sqlalchemy.dialects.sqlite import insert
 from daq import store_schema as table
 from daq.analyser import Identity, SourceState, SweepPoint
 from daq.errors import FileFormatError, InputError
-from daq.frf import FrequencyResponse
+from daq.frf import FrequencyResponse, PointFlag
 from daq.store_file import WRITES, open_engine, telling_faults
 from daq.store_records import (
     Estimate,
@@ -292,11 +292,13 @@ class Store:
 
     def _measurements(self, where: sa.ColumnElement[bool]) -> list[Measurement]:
         live = table.points.c.superseded_by.is_(None)
+        # A point that was merely taken a second time is as good as any.
+        touched = table.points.c.flags.op("&")(~int(PointFlag.RETAKEN)) != 0
         counts = (
             sa.select(
                 table.points.c.measurement_id.label("of"),
                 sa.func.count().label("points"),
-                sa.func.sum(sa.case((table.points.c.flags != 0, 1), else_=0)).label("flagged"),
+                sa.func.sum(sa.case((touched, 1), else_=0)).label("flagged"),
             )
             .where(live)
             .group_by(table.points.c.measurement_id)

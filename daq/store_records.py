@@ -78,7 +78,7 @@ class Measurement:
     points: int
     """Points in force, superseded ones not counted."""
     flagged: int
-    """Points in force that carry a flag."""
+    """Points in force that carry a flag other than that of being taken a second time."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,350 @@
+"""The bench session: an engine that measures, journals, yields, and always ends safe.
+
+Owns the order of a measurement and its invariants: limits before the first
+byte, checks before the first volt, a point committed before anyone is told,
+the source off whenever nothing is measured and at every end there is. It
+talks to no person: whoever iterates it watches, whoever holds its control may
+hold it, stop it or abort it.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+from daq.adaptive import AdaptiveSweep
+from daq.analyser import Analyser, PointSettings, SourceState, SweepPoint
+from daq.control import Cancelled, SessionControl
+from daq.errors import LashbenchError, MeasurementError
+from daq.frf import PointFlag
+from daq.limits import tightest
+from daq.preflight import check_identity, check_source, check_trial, take_trial
+from daq.session_agenda import Pace
+from daq.session_events import (
+    CheckLine,
+    Finished,
+    GoingOn,
+    LevelStarted,
+    Opened,
+    Paused,
+    PointStored,
+    RunIn,
+    SessionEvent,
+    SourceSafe,
+)
+from daq.session_journal import Journal, Place
+from daq.session_request import SessionRequest
+from daq.store import Store
+from daq.store_records import MeasurementState
+
+__all__ = ["Session"]
+
+_LOOK_S = 0.05
+"""How long a pause sleeps before it looks at the control again."""
+_SAFE_TRIES = 10
+"""How often the safe-off recipe is begun again when a key press breaks it."""
+_REPEATS_SIGMA = 6.0
+"""Standard errors within which a run-in point must repeat the stored one."""
+_REPEATS_DB = 0.05
+"""Difference between two visits that is no sign of anything, dB."""
+
+
+class Session:
+    """One run of a measurement; iterate `run` once.
+
+    Parameters
+    ----------
+    analyser
+        Connected. The session makes it safe and does not close it.
+    store
+        Open history, writable.
+    request
+        What to do.
+    control
+        Where a person asks for a pause or an end; one of its own if left out.
+    """
+
+    def __init__(
+        self,
+        analyser: Analyser,
+        store: Store,
+        request: SessionRequest,
+        control: SessionControl | None = None,
+    ) -> None:
+        self.control = control or SessionControl()
+        self._analyser = analyser
+        self._store = store
+        self._request = request
+        self._pace = Pace()
+        self._in_hand: Place | None = None
+        self._all_taken = False
+
+    def run(self) -> Iterator[SessionEvent]:
+        """Measure, yielding what happens; the last record is `Finished`.
+
+        Closing the iterator early ends the session as an interruption does.
+
+        Raises
+        ------
+        LimitError
+            If a limit forbids the plan; nothing was sent and nothing stored.
+        InputError
+            If the measurement to resume is not there or was aborted.
+        LashbenchError
+            After `Finished`: the fault that ended the session, if one did.
+        """
+        self._began_s = time.monotonic()
+        self._journal = Journal(self._store, self._request)
+        self._plan, self._agenda = self._journal.plan, self._journal.agenda
+        error: Exception | None = None
+        try:
+            yield self._opened()
+            self._analyser.on_wait = self.control.check
+            yield from self._check()
+            yield from self._measure()
+        except Cancelled:
+            pass
+        except Exception as fault:
+            error = fault
+        except BaseException:
+            # Whoever watched has left, or the program is told to end: nobody
+            # is there to yield to, and the source must be off all the same.
+            self._close(None)
+            raise
+        finished = self._close(error)
+        yield SourceSafe(finished.source_state)
+        yield finished
+        if finished.error is not None:
+            raise finished.error
+
+    # ------------------------------------------------------------ checks
+
+    def _opened(self) -> Opened:
+        agenda = self._agenda
+        return Opened(
+            self._journal.id, self._plan, agenda.done, agenda.total, agenda.remaining_cycles_s
+        )
+
+    def _check(self) -> Iterator[SessionEvent]:
+        journal = self._journal
+        yield from journal.told([self._limits()])
+        self.control.check()
+        identity = self._analyser.identify()
+        yield from journal.told(
+            check_identity(identity, journal.before.instrument if journal.before else None)
+        )
+        journal.instrument(identity)
+        yield from journal.told(check_source(self._analyser))
+        journal.source(SourceState.CONFIRMED_OFF)
+        self.control.check()
+        nothing_to_drive = self._agenda.finished and self._request.refinement is None
+        if nothing_to_drive or self.control.cut is not None:
+            return
+        journal.source(SourceState.ON)
+        point, trial = take_trial(
+            self._analyser, self._plan, self._settings(min(self._plan.levels_vpk))
+        )
+        journal.note(
+            "trial point",
+            f"{point.frequency_hz:g} Hz at {trial.source_vpk:g} V peak",
+            gain_re=point.gain.real,
+            gain_im=point.gain.imag,
+            flags=int(point.flags),
+        )
+        yield from journal.told(check_trial(point, trial, self._plan, self._request.plausible))
+
+    def _limits(self) -> CheckLine:
+        bounds, plan = tightest(self._request.limits), self._plan
+        lowest_hz, highest_hz = min(plan.frequencies_hz), max(plan.frequencies_hz)
+        return CheckLine(
+            "limits",
+            "pass",
+            f"{max(plan.levels_vpk):g} V peak of {bounds.source_vpk:g}, {lowest_hz:g} to "
+            f"{highest_hz:g} Hz within {bounds.start_hz:g} to {bounds.stop_hz:g}, "
+            f"{plan.duration_s:.0f} s of {bounds.duration_s:g}",
+        )
+
+    # ------------------------------------------------------------ measuring
+
+    def _measure(self) -> Iterator[SessionEvent]:
+        for level in self._plan.levels_vpk:
+            for frequencies in self._rounds(level):
+                self._agenda.extend(level, frequencies)
+                while run := self._agenda.next_run(level, frequencies):
+                    if self.control.paused:
+                        yield from self._hold()
+                    if self.control.cut is not None:
+                        return
+                    yield from self._sweep(level, run)
+        self._all_taken = True
+
+    def _rounds(self, source_vpk: float) -> Iterator[Sequence[float]]:
+        """The frequencies of the plan, then those of refinement; stored ones may be among them."""
+        request = self._request
+        if request.refinement is None or request.judge is None:
+            yield [float(hz) for hz in self._plan.visited_hz]
+            return
+        adaptive = AdaptiveSweep(self._plan, request.refinement, request.judge)
+        while frequencies := adaptive.ask():
+            yield frequencies
+            adaptive.tell([self._agenda.stored(source_vpk, hz).point for hz in frequencies])
+        self._journal.note(
+            "refinement",
+            f"{adaptive.reason} at {source_vpk:g} V peak after {len(adaptive.points)} points",
+        )
+
+    def _sweep(self, source_vpk: float, run: Sequence[float]) -> Iterator[SessionEvent]:
+        """Drive neighbouring points, with a run-in where the level was under way already."""
+        plan = self._plan
+        readback = self._analyser.prepare(
+            min(plan.frequencies_hz), max(plan.frequencies_hz), self._settings(source_vpk)
+        )
+        yield from self._journal.settings(readback)
+        lead = self._agenda.run_in(source_vpk, run[0], self._request.run_in_points)
+        self._journal.source(SourceState.ON)
+        yield LevelStarted(source_vpk, len(run))
+        points = self._analyser.sweep([*lead, *run])
+        try:
+            for requested_hz in lead:
+                yield from self._run_in(source_vpk, requested_hz, _next(points, requested_hz))
+            for requested_hz in run:
+                self._in_hand = source_vpk, requested_hz
+                yield self._commit(self._in_hand, _next(points, requested_hz))
+                if self.control.paused or self.control.cut is not None:
+                    return
+            if next(points, None) is not None:
+                raise MeasurementError("the instrument gave more points than were asked for")
+        finally:
+            _close(points)
+
+    def _commit(self, place: Place, point: SweepPoint) -> PointStored:
+        if place in self._journal.retake:
+            point = replace(point, flags=point.flags | PointFlag.RETAKEN)
+        before_s = self._agenda.remaining_cycles_s
+        stored = self._store.add_point(self._journal.id, *place, point)
+        self._in_hand = None
+        self._agenda.store(stored)
+        left_s = self._agenda.remaining_cycles_s
+        return PointStored(
+            stored,
+            self._agenda.done,
+            self._agenda.total,
+            time.monotonic() - self._began_s,
+            self._pace.remaining_s(before_s - left_s, left_s),
+        )
+
+    def _run_in(
+        self, source_vpk: float, requested_hz: float, point: SweepPoint
+    ) -> Iterator[SessionEvent]:
+        stored = self._agenda.stored(source_vpk, requested_hz).point
+        sigma = _distance(point, stored)
+        yield RunIn(source_vpk, point, sigma)
+        if sigma is not None and sigma > _REPEATS_SIGMA:
+            yield self._journal.warned(
+                f"{requested_hz:g} Hz at {source_vpk:g} V peak was {sigma:.1f} standard errors "
+                "away when driven again: the conditions are not those of before"
+            )
+
+    def _hold(self) -> Iterator[SessionEvent]:
+        state = self._make_safe()
+        self._journal.source(state)
+        self._journal.note("pause", f"holding; source {state.value}")
+        yield Paused(state)
+        if state is not SourceState.CONFIRMED_OFF:
+            yield self._journal.warned(
+                f"the source is {state.value} in the pause; switch it off by hand"
+            )
+        while self.control.paused and self.control.cut is None:
+            time.sleep(_LOOK_S)
+        if self.control.cut is None:
+            self._analyser.on_wait = self.control.check
+            self._journal.note("go on", "after a pause")
+            yield GoingOn()
+
+    def _settings(self, source_vpk: float) -> PointSettings:
+        return PointSettings(
+            source_vpk=source_vpk,
+            settle_cycles=self._plan.settle_cycles,
+            integrate_cycles=self._plan.integrate_cycles,
+            dc_offset_v=self._plan.dc_offset_v,
+            slew_vpk_per_s=self._request.slew_vpk_per_s,
+            input_range_vpk=self._request.input_range_vpk,
+        )
+
+    # ------------------------------------------------------------ the end
+
+    def _close(self, error: Exception | None) -> Finished:
+        """Make safe before anything else can fail, then say in the store how it ended."""
+        source_state = self._make_safe()
+        state, reason = self._verdict(error)
+        points, flagged = self._agenda.done + self._agenda.again, 0
+        try:
+            found = self._journal.end(state, source_state, reason, self._in_hand)
+            points, flagged = found.points, found.flagged
+        except LashbenchError as fault:
+            # Without its last line the measurement stands as interrupted, and
+            # the fault that came first is the one to tell.
+            error, state = error or fault, "interrupted"
+        return Finished(
+            measurement=self._journal.id,
+            state=state,
+            source_state=source_state,
+            points=points,
+            flagged=flagged,
+            elapsed_s=time.monotonic() - self._began_s,
+            reason=reason,
+            error=error,
+        )
+
+    def _verdict(self, error: Exception | None) -> tuple[MeasurementState, str]:
+        cut = self.control.cut
+        if cut is not None and cut[0] == "abort":
+            return "aborted", cut[1]
+        if error is not None:
+            return "interrupted", str(error)
+        if self._all_taken:
+            return "complete", "all points are taken"
+        return "interrupted", cut[1] if cut is not None else "nobody watched any more"
+
+    def _make_safe(self) -> SourceState:
+        """Run the safe-off recipe to its end, whatever is pressed meanwhile."""
+        self._analyser.on_wait = None
+        for _ in range(_SAFE_TRIES):
+            with suppress(KeyboardInterrupt):
+                try:
+                    return self._analyser.make_safe()
+                except Exception:
+                    # It promises not to raise; one that does has proven nothing.
+                    return SourceState.UNKNOWN
+            self.control.interrupt("interrupted from the keyboard")
+        return SourceState.UNKNOWN
+
+
+def _next(points: Iterator[SweepPoint], requested_hz: float) -> SweepPoint:
+    point = next(points, None)
+    if point is None:
+        raise MeasurementError(
+            f"the instrument ended its sweep before the point at {requested_hz:g} Hz"
+        )
+    return point
+
+
+def _close(points: Iterator[SweepPoint]) -> None:
+    """End a sweep early, where it is a generator; one that ended takes no notice."""
+    close = getattr(points, "close", None)
+    if close is not None:
+        close()
+
+
+def _distance(point: SweepPoint, stored: SweepPoint) -> float | None:
+    """Difference of two visits in standard errors of the magnitude; None if one is unknown."""
+    if point.gain_std_db is None or stored.gain_std_db is None:
+        return None
+    sizes = abs(point.gain), abs(stored.gain)
+    if not all(size > 0 and math.isfinite(size) for size in sizes):
+        return None
+    apart_db = abs(20.0 * math.log10(sizes[0] / sizes[1]))
+    return apart_db / math.hypot(point.gain_std_db, stored.gain_std_db, _REPEATS_DB)
