@@ -61,6 +61,7 @@ class Sweep:
     """One measurement: its band, its plan, and what came of it.
 
     `uneven` is a sweep with auto resolution; its X axis is what was measured.
+    `both_ends`: whether the last point of plan and axis is the stop.
     """
 
     start_hz: float
@@ -71,6 +72,7 @@ class Sweep:
     uneven: bool
     shown: int
     plan: tuple[float, ...]
+    both_ends: bool
     finest: float = 0.0
     change: float = 0.02
     points: list[Point] = field(default_factory=list)
@@ -120,9 +122,10 @@ class Sweep:
             measured = sorted(point.frequency_hz for point in self.points)
             padding = [measured[-1] if measured else self.start_hz]
             return np.array((measured + padding * self.shown)[: self.shown])
+        places = np.arange(self.shown) / (self.shown - 1 if self.both_ends else self.shown)
         if self.logarithmic:
-            return np.geomspace(self.start_hz, self.stop_hz, self.shown)
-        return np.linspace(self.start_hz, self.stop_hz, self.shown)
+            return np.asarray(self.start_hz * (self.stop_hz / self.start_hz) ** places)
+        return self.start_hz + places * (self.stop_hz - self.start_hz)
 
     def shown_points(self, hold: bool) -> NDArray[np.intp]:
         """For each displayed point the measured one that it shows, -1 for none; (shown,)."""
@@ -174,13 +177,14 @@ def plan_sweep(instrument: Analyser35670A) -> Sweep:
         uneven=uneven and not manual,
         shown=FEW if count <= FEW else MANY,
         plan=(),
+        both_ends=instrument.choices.both_ends,
         finest=1.0 / count,
         change=settings.get("FREQ:RES:AUTO:MCH").value / 100.0,
     )
     if manual:
         sweep.plan = (settings.get("FREQ:MAN").value,)
     else:
-        intervals = count - 1 if instrument.choices.both_ends else count
+        intervals = count - 1 if sweep.both_ends else count
         places = [k / intervals for k in range(count)]
         if downward:
             places = [1.0 - place for place in places]

@@ -117,10 +117,9 @@ def _channels(instrument: Analyser35670A, head: str, first: str | None, second: 
         used = {int(shown)}
         shown += f",{second or 1}" if last == "TRAC" else ""
     for channel in sorted(used - {1}):
-        if channel > 2 and not instrument.settings.get("INP#", 4):
-            raise ScpiError(-200, _FOUR_CHANNELS)
-        if not instrument.settings.get("INP#", channel):
-            raise ScpiError(-200, _TWO_CHANNELS)
+        # Channels 3 and 4 come and go together.
+        if not instrument.settings.get("INP#", 2 if channel == 2 else 4):
+            raise ScpiError(-200, _TWO_CHANNELS if channel == 2 else _FOUR_CHANNELS)
     return shown
 
 
