@@ -165,6 +165,11 @@ class Store:
             _inserted(connection, table.events, row)
         return entry
 
+    def reopen(self, measurement: int) -> None:
+        """Take up a measurement again: it is "interrupted" until `finish` says otherwise."""
+        with self._writing() as connection:
+            self._update(connection, measurement, state="interrupted", ended=None)
+
     def finish(self, measurement: int, state: MeasurementState, source_state: SourceState) -> None:
         """Record how a measurement ended, and what is known of the source."""
         with self._writing() as connection:
