@@ -91,7 +91,7 @@ def find_candidates(samples: Samples) -> tuple[Candidate, Candidate]:
     """
     low, high = (smooth_curve(samples, TARGETS_DB[sign]) for sign in (-1, 1))
     if len(samples) < LEAST_POINTS:
-        why = f"only {len(samples)} usable points; {LEAST_POINTS} or more are needed"
+        why = f"usable points: {len(samples)}; {LEAST_POINTS} or more are needed"
         return Candidate(-1, low, None, why), Candidate(1, high, None, why)
     wide = smooth_curve(samples, 0.0)
     valley = _valley(low, wide)
@@ -163,14 +163,23 @@ def _valley(curve: Curve, wide: Curve) -> Candidate:
     left = np.maximum.accumulate(g)
     right = np.maximum.accumulate(g[::-1])[::-1]
     k = int(np.argmax(np.minimum(left, right) - g))
-    below, above = slice(0, k), slice(k + 1, None)
-    clear = all(_stands_out(curve, wide, k, side, -1) for side in (below, above))
-    if clear and 1 < k < g.size - 2:
+    if _rises_both_ways(curve, wide, k) == (True, True) and not _edge(k, g.size):
         return Candidate(-1, curve, k)
-    edge = _edge(k if clear else int(np.argmin(g)), g.size)
-    if edge:
-        return Candidate(-1, curve, None, f"the gain is lowest at the {edge} edge of the band")
-    return Candidate(-1, curve, None, "no minimum stands out of the scatter")
+    reasons = {
+        (False, False): "no minimum stands out of the scatter",
+        (False, True): "the gain is lowest at the lower edge of the band",
+        (True, False): "the gain is lowest at the upper edge of the band",
+        (True, True): "the minimum touches the edge of the band",
+    }
+    return Candidate(-1, curve, None, reasons[_rises_both_ways(curve, wide, int(np.argmin(g)))])
+
+
+def _rises_both_ways(curve: Curve, wide: Curve, k: int) -> tuple[bool, bool]:
+    """Whether the gain is clearly higher somewhere below and somewhere above a point."""
+    return (
+        _stands_out(curve, wide, k, slice(0, k), -1),
+        _stands_out(curve, wide, k, slice(k + 1, None), -1),
+    )
 
 
 def _hill(curve: Curve, wide: Curve, bottom: int | None) -> Candidate:

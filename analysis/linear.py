@@ -6,6 +6,7 @@ fits nothing itself (`analysis.rational` does) and reports no feature.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -35,7 +36,7 @@ LEAST_POINTS = 6
 """A window with fewer points is not tried."""
 HIGHEST_ORDER = {"band": 3, "window": 2}
 """Greatest degree of the surrounding over the whole band, and in a window of it."""
-REACHES = (4.0, 3.0, 2.0)
+REACHES = (math.inf, 4.0, 3.0, 2.0)
 """Half-windows of a single feature in half-power half-widths."""
 
 
@@ -83,6 +84,11 @@ class LinearReading:
         noise = g @ self.fit.covariance @ g.T * self.inflation**2
         return np.asarray(noise + self.misfit_hz**2 * np.eye(len(g)))
 
+    @property
+    def std_hz(self) -> float:
+        """One standard error of the first extremum's frequency, Hz."""
+        return float(np.sqrt(self.frequency_covariance[0, 0]))
+
     def beside(self, frequency_hz: float, std_hz: float) -> LinearReading:
         """The same, its error widened by what another reading of the one extremum disagrees.
 
@@ -93,6 +99,10 @@ class LinearReading:
         own = float(self.frequency_covariance[0, 0]) - self.misfit_hz**2
         misfit = max(self.misfit_hz**2, moved - abs(std_hz**2 - own))
         return replace(self, misfit_hz=float(np.sqrt(misfit)))
+
+    def approximate(self, error_hz: float) -> LinearReading:
+        """The same with one more error of the frequency added, Hz."""
+        return replace(self, misfit_hz=float(np.hypot(self.misfit_hz, error_hz)))
 
 
 def read_both(samples: Samples, low: Start, high: Start) -> tuple[LinearReading | None, str]:
@@ -117,31 +127,35 @@ def read_both(samples: Samples, low: Start, high: Start) -> tuple[LinearReading 
 def read_one(
     samples: Samples, start: Start, low_hz: float, high_hz: float
 ) -> tuple[LinearReading | None, str]:
-    """One pair alone, in a window about it that stays within two frequencies.
+    """One pair alone, over all that lies within two frequencies or in a window of it.
 
     A response that one linear model does not describe as a whole need not be
-    linear near one extremum either. So the narrower windows are fitted too, and
-    what they move the extremum beyond their noise is added to its error.
+    linear near one extremum either. So several windows are fitted, what the others
+    move the extremum beyond chance is added to the error of each, and the one with
+    the least error is taken.
 
     Returns
     -------
     The reading, or None, and then why the last window was refused.
     """
-    reading: LinearReading | None = None
+    believed: list[LinearReading] = []
     why = ""
     for reach in REACHES:
         half = reach * start.half_width_hz
         window = samples.between(
             max(low_hz, start.frequency_hz - half), min(high_hz, start.frequency_hz + half)
         )
-        other, reason = _best_order(window, (start,), HIGHEST_ORDER["window"])
+        whole = len(window) == len(samples)
+        reading, reason = _best_order(
+            window, (start,), HIGHEST_ORDER["band" if whole else "window"]
+        )
         why = reason or why
-        if reading is None:
-            reading = other
-        elif other is not None:
-            std = float(np.sqrt(other.frequency_covariance[0, 0]))
-            reading = reading.beside(other.extrema[0].frequency_hz, std)
-    return reading, why
+        believed += [reading] if reading is not None else []
+    alone = [(one.extrema[0].frequency_hz, one.std_hz) for one in believed]
+    for k in range(len(believed)):
+        for frequency_hz, std_hz in alone[:k] + alone[k + 1 :]:
+            believed[k] = believed[k].beside(frequency_hz, std_hz)
+    return min(believed, key=lambda one: one.std_hz, default=None), why
 
 
 def _best_order(

@@ -18,7 +18,7 @@ from analysis.candidates import Curve
 from analysis.damping import measure_half_power
 from analysis.noise import Vector
 
-__all__ = ["PeakReading", "read_peak"]
+__all__ = ["PeakReading", "read_peak", "shape_error"]
 
 WINDOWS = (0.5, 0.7, 1.0)
 """Half-windows of the parabola in half-power half-widths."""
@@ -28,8 +28,14 @@ LEAST_PROBABILITY = 0.01
 """A parabola whose chi-square is less likely than this does not fit."""
 CLEAR_CURVATURE = 2.5
 """The curvature must exceed this many of its standard errors."""
+SHAPE_STEPS = 0.2
+"""Standard error, in steps of the sweep, of taking a nonlinear response for a smooth one
+between its readings."""
+SAME_DEPTH = 2.0
+"""The vertex and the smoothed curve must agree in gain within this many standard errors."""
 JUMP_DB = 3.0
-"""A step of this size, three times the one on the other side, is a jump."""
+JUMP_RATIO = 2.0
+"""A step of this size, and so many times the one on the other side, is a jump."""
 DRAWS = 200
 """Draws of the noise that say which readings could be the extremum."""
 
@@ -64,24 +70,40 @@ def read_peak(curve: Curve, index: int, sign: int, first: int, last: int) -> Pea
         Grid points between which the extremum may lie, both included; neither
         is an end of the band.
     """
+    grid = _grid_extremum(curve, index, sign, first, last)
     fits = _parabolas(curve, index, sign, first, last)
-    if not fits:
-        return _grid_extremum(curve, index, sign, first, last)
-    # A wider window has less noise and more of the peak's skewness in it: what it
-    # moved beyond its noise, against the narrowest one, counts as its error.
-    narrow = fits[0]
+    depth, error = curve.smooth_db[index], curve.std_db[index]
+    shape = shape_error(curve.frequency_hz, index)
+    best = grid
+    for fit, probability in fits:
+        # A vertex that the smoothed curve does not show is a few readings' luck.
+        off = abs(fit.gain_db - depth) / np.hypot(fit.gain_std_db, error)
+        if off > SAME_DEPTH or not probability > LEAST_PROBABILITY:
+            continue
+        # A wider window has less noise and more of the peak's skewness in it: how far
+        # the window moves the vertex beyond chance counts as error, and so does the grid.
+        moved = max(_moved(fit, other) for other in (fits[0][0], fits[-1][0], grid))
+        std = float(np.sqrt(fit.std_hz**2 + moved**2 + shape**2))
+        if std < best.std_hz:
+            best = replace(fit, std_hz=std)
+    return best
 
-    def total(fit: PeakReading) -> float:
-        moved = (fit.frequency_hz - narrow.frequency_hz) ** 2
-        chance = abs(narrow.std_hz**2 - fit.std_hz**2)
-        return float(np.hypot(fit.std_hz, np.sqrt(max(0.0, moved - chance))))
 
-    best = min(fits, key=total)
-    return replace(best, std_hz=total(best))
+def shape_error(frequency_hz: Vector, index: int) -> float:
+    """Standard error of an extremum for not knowing a nonlinear response between readings, Hz."""
+    return float(SHAPE_STEPS * 0.5 * (frequency_hz[index + 1] - frequency_hz[index - 1]))
 
 
-def _parabolas(curve: Curve, index: int, sign: int, first: int, last: int) -> list[PeakReading]:
-    """The parabolas that fit, narrowest window first."""
+def _moved(one: PeakReading, other: PeakReading) -> float:
+    """How far two readings of the same data differ beyond the difference of their variances, Hz."""
+    moved = (one.frequency_hz - other.frequency_hz) ** 2
+    return float(np.sqrt(max(0.0, moved - abs(one.std_hz**2 - other.std_hz**2))))
+
+
+def _parabolas(
+    curve: Curve, index: int, sign: int, first: int, last: int
+) -> list[tuple[PeakReading, float]]:
+    """Parabolas with a clear vertex, narrowest window first, each with its chi-square's chance."""
     f = curve.frequency_hz
     points = measure_half_power(f, curve.smooth_db, index, sign)
     sides = (f[index] - points.low_hz, points.high_hz - f[index], f[last] - f[first])
@@ -96,8 +118,10 @@ def _parabolas(curve: Curve, index: int, sign: int, first: int, last: int) -> li
     return found
 
 
-def _parabola(f: Vector, gain: Vector, noise: Vector, sign: int) -> PeakReading | None:
-    """Least-squares parabola; None where it does not fit or has no clear vertex inside."""
+def _parabola(
+    f: Vector, gain: Vector, noise: Vector, sign: int
+) -> tuple[PeakReading, float] | None:
+    """Least-squares parabola and its chi-square's chance; None without a clear vertex inside."""
     centre, half = 0.5 * (f[0] + f[-1]), 0.5 * (f[-1] - f[0])
     u = (f - centre) / half
     basis = np.stack([np.ones_like(u), u, u * u], axis=1)
@@ -109,8 +133,6 @@ def _parabola(f: Vector, gain: Vector, noise: Vector, sign: int) -> PeakReading 
     a = operator @ gain
     dof = u.size - 3
     misfit = float(np.sum(((gain - basis @ a) / noise) ** 2))
-    if not gammaincc(dof / 2.0, misfit / 2.0) > LEAST_PROBABILITY:
-        return None
     covariance = (operator * noise**2) @ operator.T * max(1.0, misfit / dof)
     if -sign * a[2] < CLEAR_CURVATURE * np.sqrt(covariance[2, 2]):
         return None
@@ -119,13 +141,14 @@ def _parabola(f: Vector, gain: Vector, noise: Vector, sign: int) -> PeakReading 
         return None
     by_a = np.array([0.0, -1.0, -2.0 * vertex]) / (2.0 * a[2])
     at = np.array([1.0, vertex, vertex**2])
-    return PeakReading(
+    reading = PeakReading(
         frequency_hz=float(centre + half * vertex),
         std_hz=float(half * np.sqrt(by_a @ covariance @ by_a)),
         gain_db=float(at @ a),
         gain_std_db=float(np.sqrt(at @ covariance @ at)),
         method="parabola",
     )
+    return reading, float(gammaincc(dof / 2.0, misfit / 2.0))
 
 
 def _grid_extremum(curve: Curve, index: int, sign: int, first: int, last: int) -> PeakReading:
@@ -140,7 +163,7 @@ def _grid_extremum(curve: Curve, index: int, sign: int, first: int, last: int) -
     noise = np.random.default_rng(0).standard_normal((DRAWS, rows.size))
     winners = np.argmax(sign * gain + std * noise, axis=1)
     share = np.bincount(winners, minlength=rows.size) / DRAWS
-    place, spread, jump = _within_cell(curve.frequency_hz, g, rows)
+    place, spread, jump = _within_cell(curve, g, rows)
     mean, level = float(share @ place), float(share @ gain)
     return PeakReading(
         frequency_hz=mean,
@@ -153,26 +176,27 @@ def _grid_extremum(curve: Curve, index: int, sign: int, first: int, last: int) -
 
 
 def _within_cell(
-    f: Vector, g: Vector, rows: NDArray[np.intp]
+    curve: Curve, g: Vector, rows: NDArray[np.intp]
 ) -> tuple[Vector, Vector, NDArray[np.bool_]]:
     """Where between readings a maximum lies if a given one is the highest; mean, spread, jump.
 
-    A peak of one hump lies between the two neighbours of its highest reading,
-    most likely near the parabola's vertex: a triangular density. At a jump it
-    lies anywhere up to the next reading: a uniform one.
+    A peak of one hump lies between the two neighbours of its highest reading, most
+    likely near it: a triangular density. At a jump it lies anywhere up to the next
+    reading, and where the curve was smoothed anywhere within half a step of the
+    parabola through the three: uniform ones.
     """
+    f = curve.frequency_hz
     before, here, after = f[rows - 1], f[rows], f[rows + 1]
     left, right = g[rows] - g[rows - 1], g[rows] - g[rows + 1]
-    falls = (right > JUMP_DB) & (right > 3.0 * np.abs(left))
-    rises = (left > JUMP_DB) & (left > 3.0 * np.abs(right))
+    falls = (right > JUMP_DB) & (right > JUMP_RATIO * np.abs(left))
+    rises = (left > JUMP_DB) & (left > JUMP_RATIO * np.abs(right))
+    smoothed = curve.std_db[rows] < curve.noise_db[rows]
     total = np.where(left + right > 0.0, left + right, np.inf)
     lean = np.clip(0.5 * (left - right) / total, -0.5, 0.5)
     vertex = here + lean * np.where(lean > 0.0, after - here, here - before)
-    place = np.select([falls, rises], [0.5 * (here + after), 0.5 * (here + before)], vertex)
+    cases = [falls, rises, smoothed]
+    place = np.select(cases, [0.5 * (here + after), 0.5 * (here + before), vertex], here)
     uniform, triangular = np.sqrt(1.0 / 12.0), np.sqrt(1.0 / 24.0)
-    spread = np.select(
-        [falls, rises],
-        [(after - here) * uniform, (here - before) * uniform],
-        (after - before) * triangular,
-    )
+    widths = [after - here, here - before, 0.5 * (after - before)]
+    spread = np.select(cases, [w * uniform for w in widths], (after - before) * triangular)
     return place, spread, falls | rises

@@ -25,11 +25,15 @@ from scipy.special import gammaincc
 
 from analysis.noise import Vector
 from analysis.samples import Samples
+from daq.frf import DB_PER_NEPER
 
 __all__ = ["Extremum", "Pair", "RationalFit", "fit_rational"]
 
 ZETA_BOUNDS = (1e-4, 2.0)
 """Damping ratios beyond these are no resonance that a sweep can resolve."""
+
+WIDEST_BAND = 1e3
+"""Over a band whose ends are further apart than this no polynomial is a slow surrounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,9 +164,11 @@ class RationalFit:
         value, jacobian = _model(x, self.theta, self.pairs, self.order)
         slope_by_theta = (jacobian[2].real - jacobian[0].real) / (2 * d)
         curvature = float(value[0].real - 2 * value[1].real + value[2].real) / d**2
-        db = 20.0 / np.log(10.0)
         return Extremum(
-            at, float(value[1].real) * db, -slope_by_theta / curvature, jacobian[1].real * db
+            frequency_hz=at,
+            gain_db=float(value[1].real * DB_PER_NEPER),
+            gradient=-slope_by_theta / curvature,
+            gain_gradient_db=jacobian[1].real * DB_PER_NEPER,
         )
 
 
@@ -203,9 +209,12 @@ def fit_rational(
 
     Returns
     -------
-    The fit, or None where the samples are too few or no fit is found within bounds.
+    The fit, or None where the samples are too few, their band is too wide, or no fit
+    is found within bounds.
     """
     x, f_0 = _relative(samples)
+    if not x[-1] < WIDEST_BAND * x[0]:
+        return None
     with_phase = np.isfinite(samples.phase_std)
     gain_only = not with_phase.any()
     first = 2 * len(pairs)

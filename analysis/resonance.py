@@ -17,7 +17,7 @@ from analysis.candidates import Candidate, find_candidates
 from analysis.damping import measure_half_power
 from analysis.features import Feature, LevelFeatures, Method, summary, to_json
 from analysis.linear import LinearReading, Start, read_both, read_one
-from analysis.peak import read_peak
+from analysis.peak import read_peak, shape_error
 from analysis.samples import Samples, level_samples
 from daq.errors import AnalysisError
 from daq.frf import FrequencyResponse
@@ -143,6 +143,9 @@ class _Reader:
         linear, reason = read_one(self.samples, start, float(f[first - 1]), float(f[last + 1]))
         if linear is not None:
             linear = linear.beside(peak.frequency_hz, peak.std_hz)
+            if len(linear.fit.samples) < len(self.samples):
+                # No linear model describes the whole band, so this one is an approximation.
+                linear = linear.approximate(shape_error(f, candidate.at))
             self._note_scatter(name, linear)
             return _linear_feature(linear, 0)
         read_off = "" if peak.method == "parabola" else " read off the grid"
