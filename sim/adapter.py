@@ -21,6 +21,8 @@ __all__ = ["FakeAdapter"]
 
 _ESCAPE, _PLUS = 27, 43
 _ENDS = (10, 13)
+_BURST_S = 0.02
+"""Time's worth of bytes that a serial line may deliver at once after it was quiet."""
 
 
 @dataclass(slots=True)
@@ -132,7 +134,7 @@ class FakeAdapter:
             return b""
         count = len(self._output)
         if self._rate:
-            since = min(now_s - self._sent_at_s, 0.1)
+            since = min(now_s - self._sent_at_s, _BURST_S)
             count = min(count, int(since * self._rate))
             if not count:
                 return b""

@@ -219,7 +219,9 @@ def test_blocks_are_definite_and_big_endian(quiet):
 def test_blocks_may_hold_any_byte(bench):
     values = np.arange(802) / 802.0 + 1e-3
     values[:5] = np.frombuffer(
-        bytes.fromhex("3F0A0D1B2B000000 3F000A0D1B2B0A0D 3F1B1B2B2B0A0A00 3F2B2B2B2B2B2B2B 3F0A0A0A0A0A0A0A"),
+        bytes.fromhex(
+            "3F0A0D1B2B000000 3F000A0D1B2B0A0D 3F1B1B2B2B0A0A00 3F2B2B2B2B2B2B2B 3F0A0A0A0A0A0A0A"
+        ),
         dtype=">f8",
     )  # fmt: skip
     controller = bench(**NOISELESS)

@@ -352,7 +352,8 @@ def test_autocalibration_comes_in_the_middle_of_a_sweep_or_pause(bench):
     controller = bench(calibrations_s=(5.0,))
     controller.instrument.power_on()
     controller.write("INIT:CONT OFF", "CAL:AUTO ON", "INST:SEL SINE;:FREQ:RES:AUTO OFF",
-                     "FREQ:STAR 100;STOP 200;RES 20 PNT/SWP", "SOUR:VOLT 1 VPK", "ABOR;:INIT")  # fmt: skip
+                     "FREQ:STAR 100;STOP 200;RES 20 PNT/SWP", "SOUR:VOLT 1 VPK",
+                     "ABOR;:INIT")  # fmt: skip
     calibrating = []
     while controller.instrument.measurement.running:
         controller.instrument.agenda.run_next()
