@@ -4,8 +4,10 @@ import functools
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from daq.formats import read_response
 from tui.cli import main
 
 PRACTICE = Path(__file__).parents[1] / "data" / "practice"
@@ -60,16 +62,7 @@ def test_extract_prints_a_table(capsys):
 FIELDS = {"contribution_ratio", "b1_deg", "b2_deg", "b_t_deg", "error_index", "warnings"}
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["estimate", SWEEP, "--unit", "adss"],
-        ["estimate", "--unit", "adss", "--arf-hz", "128", "--rf-hz", "137"],
-    ],
-    ids=["file", "features"],
-)
-def test_estimate_gives_the_fields_that_scripts_use(words, capsys):
-    result = document(words, capsys)
+def check_estimate(result):
     assert set(result) >= FIELDS
     ratio = result["contribution_ratio"]
     low, high = ratio["interval95"]
@@ -82,9 +75,69 @@ def test_estimate_gives_the_fields_that_scripts_use(words, capsys):
         assert set(result[name]) >= {"value", "std"}
 
 
-def test_estimate_prints_its_result(capsys):
+@pytest.mark.slow
+def test_estimate_gives_the_fields_that_scripts_use(capsys):
     words = ["estimate", "--unit", "adss", "--arf-hz", "128", "--rf-hz", "137"]
-    assert "contribution" in text(words, capsys).lower()
+    check_estimate(document(words, capsys))
+
+
+@pytest.fixture
+def calls(monkeypatch):
+    """Estimates at once, without a simulation; the calls are kept."""
+    from analysis import estimate
+    from analysis.paper_estimate import IndexCurve
+
+    made = []
+
+    def known(*words, progress=None, **options):
+        made.append((words, options))
+        ratios = np.linspace(0, 1, 5)
+        uncertain = estimate.Uncertain(0.5, 0.1, (0.3, 0.7))
+        curve = IndexCurve(ratios, 10 * ratios, np.full(5, np.nan))
+        rest = (uncertain, uncertain, estimate.Uncertain(0.066, 0.0), curve, ("a warning",), 1.0)
+        progress(0.5, "half")
+        return estimate.Estimate("ADSS", uncertain, *rest)
+
+    monkeypatch.setattr(estimate, "estimate_response", known)
+    monkeypatch.setattr(estimate, "estimate_features", known)
+    return made
+
+
+def test_estimate_hands_the_whole_response_on(calls, capsys):
+    result = document(["estimate", SWEEP, "--unit", "adss"], capsys)
+    check_estimate(result)
+    assert result["error_index"]["std_hz"] == [None] * 5
+    (((response, unit, unknown), options),) = calls
+    assert (len(response), unit.name, unknown, options) == (183, "ADSS", False, {})
+
+
+def test_estimate_is_told_that_the_total_is_unknown(calls, capsys):
+    document(["estimate", SWEEP, "--unit", "adss", "--total-backlash-unknown"], capsys)
+    assert calls[0][0][2] is True
+
+
+def test_estimate_hands_two_frequencies_on(calls, capsys):
+    document(["estimate", "--unit", "edss", "--arf-hz", "40", "--rf-hz", "75.5"], capsys)
+    arf, rf, unit = calls[0][0]
+    assert (arf, rf, unit.name) == (40.0, 75.5, "EDSS")
+
+
+@pytest.mark.usefixtures("calls")
+def test_estimate_warns_where_the_response_is_of_another_unit(capsys):
+    result = document(["estimate", SWEEP, "--unit", "edss"], capsys)
+    assert result["warnings"] == ["the response is of unit ADSS, not of EDSS", "a warning"]
+    assert "of unit ADSS" in text(["estimate", SWEEP, "--unit", "edss"], capsys)
+
+
+@pytest.mark.usefixtures("calls")
+def test_demo_goes_through_every_step(tmp_path, capsys):
+    out = text(["demo", "--out", str(tmp_path / "here" / "demo")], capsys)
+    for heading in ("1. ", "2. ", "3. "):
+        assert f"\n{heading}" in "\n" + out
+    assert out.count("contribution ratio") == 2
+    folder = tmp_path / "here" / "demo"
+    assert (folder / "response.png").read_bytes().startswith(b"\x89PNG")
+    assert len(read_response(folder / "response.csv")) == 183
 
 
 @pytest.fixture
@@ -92,9 +145,7 @@ def short_reproduction(monkeypatch):
     """One row of Table 2 with few runs: the verb is under test, not the numbers."""
     from analysis import paper
 
-    short = functools.partial(
-        paper.reproduce, paper_runs=2, exact_runs=2, rows=[("ADSS", 50), ("ADSS", 75)]
-    )
+    short = functools.partial(paper.reproduce, paper_runs=2, exact_runs=2, rows=[("ADSS", 50)])
     monkeypatch.setattr(paper, "reproduce", short)
 
 
