@@ -32,6 +32,9 @@ __all__ = ["Dialogue"]
 _QUEUE_READS = 12
 """Reads of the error queue before it is taken to be endless; the queue holds 5."""
 
+_RECOVERY_S = 2.0
+"""Bound of each step of a recovery: what follows it may be making the source safe."""
+
 _STALE_REPLIES = 400
 """Replies dropped while looking for the one that proves both sides in step; the rest of a cut
 block may hold many line feeds."""
@@ -57,13 +60,15 @@ class Dialogue:
     False: the state of the instrument is unknown until it is set up anew.
     """
 
-    def __init__(self, transport: Transport, reply_s: float = 5.0, block_s: float = 15.0) -> None:
+    def __init__(self, transport: Transport, reply_s: float = 5.0, block_s: float = 10.0) -> None:
         self.transport = transport
         self.reply_s = reply_s
         self.block_s = block_s
         self.trusted = False
         self.lock = threading.RLock()
         """Held for each exchange; whoever needs several in a row may hold it longer."""
+        self.on_wait: Callable[[], None] | None = None
+        """Called between the polls of every wait; may raise, which ends the wait."""
         self._nonce = 0
 
     # Exchanges
@@ -178,12 +183,16 @@ class Dialogue:
         LashbenchError
             If the instrument does not come back.
         """
-        self.trusted = False
-        deadline = Deadline.after(self.reply_s)
         with self.lock:
-            if not self.transport.device_clear(deadline):
-                self._get_in_step()
+            self.clear()
             return self._drain_plainly()
+
+    def clear(self) -> None:
+        """Device clear, and get both sides in step where the wire has none."""
+        self.trusted = False
+        with self.lock:
+            if not self.transport.device_clear(self._soon()):
+                self._get_in_step()
 
     def _get_in_step(self) -> None:
         """Find the reply that answers this question and not an older one.
@@ -193,7 +202,7 @@ class Dialogue:
         nobody (the user status enable) and asked for until it comes back.
         """
         self._nonce = self._nonce % 32000 + 17
-        deadline = Deadline.after(self.reply_s)
+        deadline = self._soon()
         self.transport.write(f"STAT:USER:ENAB {self._nonce}", deadline)
         self.transport.write("STAT:USER:ENAB?", deadline)
         for _ in range(_STALE_REPLIES):
@@ -209,10 +218,13 @@ class Dialogue:
             )
         self.transport.write("STAT:USER:ENAB 0", deadline)
 
+    def _soon(self) -> Deadline:
+        return Deadline.after(min(self.reply_s, _RECOVERY_S))
+
     def _drain_plainly(self) -> list[QueueEntry]:
         entries: list[QueueEntry] = []
         for _ in range(_QUEUE_READS):
-            entry = parse_error(ask(self.transport, "SYST:ERR?", Deadline.after(self.reply_s)))
+            entry = parse_error(ask(self.transport, "SYST:ERR?", self._soon()))
             if entry.number == 0:
                 break
             entries.append(entry)

@@ -82,6 +82,15 @@ class HP35670A:
         self._setup: SetUp | None = None
         self._times_made_safe = 0
 
+    @property
+    def on_wait(self) -> Callable[[], None] | None:
+        """See `Analyser`."""
+        return self._dialogue.on_wait
+
+    @on_wait.setter
+    def on_wait(self, call: Callable[[], None] | None) -> None:
+        self._dialogue.on_wait = call
+
     def identify(self) -> Identity:
         """Ask who is there, and refuse anything but a 35670A with swept sine."""
         with self._dialogue.lock:
@@ -187,20 +196,24 @@ class HP35670A:
         def guard() -> None:
             if self._times_made_safe != times:
                 raise MeasurementError("the source was made safe while the sweep ran; it ends here")
+            if self.on_wait is not None:
+                self.on_wait()
 
         try:
             with dialogue.lock:
                 guard()
                 self._drive(setup, frequencies)
             yield from measure(dialogue, setup, self._timing, frequencies, guard)
-        except BaseException:
+        except BaseException as error:
             # The first fault is the one to report; the session makes safe in any case.
             with contextlib.suppress(LashbenchError):
-                dialogue.clear()
-            with contextlib.suppress(LashbenchError):
-                self._fall_silent()
+                if not isinstance(error, LashbenchError):
+                    dialogue.clear()  # an interrupt may have come between question and answer
+                self._quiet()
+            dialogue.trusted = False
             raise
-        self._fall_silent()
+        self._quiet()
+        dialogue.check("end of the sweep", harmless=parks_at_zero)
 
     def _drive(self, setup: SetUp, frequencies: Sequence[float]) -> None:
         """Clear the events of earlier, then set offset and, last of all, the level."""
@@ -215,8 +228,6 @@ class HP35670A:
         dialogue.confirm(DC_OFFSET, setup.settings.dc_offset_v)
         dialogue.check("source level", harmless=parks_at_zero)
 
-    def _fall_silent(self) -> None:
-        dialogue = self._dialogue
+    def _quiet(self) -> None:
         for line in ("ABOR", LEVEL.command(0.0), DC_OFFSET.command(0.0)):
-            dialogue.send(line)
-        dialogue.check("end of the sweep", harmless=parks_at_zero)
+            self._dialogue.send(line)

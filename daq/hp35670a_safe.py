@@ -104,10 +104,13 @@ def make_safe(transport: Transport) -> SafeOff:
     attempt = _Attempt(transport)
     _go_quiet(attempt)
     proven = _proof(attempt)
-    if not proven:
+    if not attempt.answered:
+        attempt.send("*RST")  # it cannot be asked, but it may hear
+    elif not proven:
         attempt.act("*RST", lambda: _reset(attempt))
         proven = _proof(attempt)
-    attempt.act("SYST:ERR?", lambda: _drained(attempt))
+    if attempt.answered:
+        attempt.act("SYST:ERR?", lambda: _drained(attempt))
     if proven:
         state = SourceState.CONFIRMED_OFF
     else:

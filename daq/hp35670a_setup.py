@@ -66,7 +66,7 @@ class Timing:
     """
 
     reply_s: float = 5.0
-    block_s: float = 15.0
+    block_s: float = 10.0
     overhead_s: float = 30.0
     margin: float = 3.0
 

@@ -16,6 +16,9 @@ from daq.transports.prologix_adapter import MARGIN_S, READ_TIMEOUT_MS, Adapter, 
 __all__ = ["PrologixTransport"]
 
 _ONE_READ_S = READ_TIMEOUT_MS / 1000 + MARGIN_S
+_FRUITLESS_READS = 3
+"""Reads in a row that bring nothing after which a reply that has begun is taken to be cut."""
+
 _ADAPTER_S = 1.0
 """Bound of a question to the adapter itself."""
 
@@ -35,6 +38,8 @@ class PrologixTransport:
         self.address = address
         self._adapter = adapter
         self._waiting = "nothing"
+        self._in_step = True
+        self._fruitless = 0
 
     def write(self, line: str, deadline: Deadline) -> None:
         """Send one message; raises `ProtocolError` if bytes lie there that nobody asked for."""
@@ -44,6 +49,10 @@ class PrologixTransport:
                 f"message {line!r} has {len(data)} bytes once escaped, the limit is "
                 f"{LINE_LIMIT_BYTES}; nothing was sent, split it"
             )
+        if not self._in_step and not self._get_in_step(deadline.within(_ADAPTER_S)) and "?" in line:
+            # A command may still do good once the adapter comes back; the answer to a question
+            # could not be told from an older one.
+            raise self._adapter_silent()
         lying = self._adapter.unread().replace(b"\0", b"")
         if lying.strip():
             raise ProtocolError(
@@ -56,6 +65,7 @@ class PrologixTransport:
     def read(self, deadline: Deadline) -> str:
         """One text reply, without terminator."""
         adapter = self._adapter
+        self._fruitless = 0
         adapter.send(b"++read eoi", deadline)
         while (line := adapter.taken_line()) is None:
             self._wait_for_more(deadline)
@@ -69,6 +79,7 @@ class PrologixTransport:
     def read_block(self, deadline: Deadline) -> bytes:
         """The payload of one definite-length block."""
         adapter = self._adapter
+        self._fruitless = 0
         adapter.send(b"++read eoi", deadline)
         before = 0
 
@@ -87,10 +98,13 @@ class PrologixTransport:
         An adapter gives up in silence when a byte is late, and what is left of
         the reply stays in the instrument. `before` bytes of it were used up.
         """
-        if deadline.expired:
-            raise self._silence(before + self._adapter.kept(), deadline)
-        came = self._adapter.gather(Deadline.after(_ONE_READ_S))
-        if not came and not deadline.expired:
+        came_before = before + self._adapter.kept()
+        if deadline.expired or (came_before and self._fruitless >= _FRUITLESS_READS):
+            raise self._silence(came_before, deadline)
+        if self._adapter.gather(Deadline.after(_ONE_READ_S)):
+            self._fruitless = 0
+        elif not deadline.expired:
+            self._fruitless += 1
             self._adapter.send(b"++read eoi", deadline)
 
     def serial_poll(self, deadline: Deadline) -> int:
@@ -110,14 +124,12 @@ class PrologixTransport:
     def device_clear(self, deadline: Deadline) -> bool:
         """Clear the instrument, drop what lies unread, and set the adapter up if it forgot."""
         self._adapter.send(b"++clr", deadline)
-        if not self._adapter.resynchronise(deadline):
-            raise LinkError(
-                f"{self.address}: the adapter is silent; the instrument cannot be reached"
-            )
+        if not self._get_in_step(deadline):
+            raise self._adapter_silent()
         if self._adapter.has_forgotten(deadline):
             self._adapter.set_up(deadline)
             self._adapter.send(b"++clr", deadline)
-            self._adapter.resynchronise(deadline)
+            self._get_in_step(deadline)
         return True
 
     def pause(self, seconds: float) -> None:
@@ -128,19 +140,26 @@ class PrologixTransport:
         """Let go of the adapter."""
         self._adapter.close()
 
+    def _get_in_step(self, deadline: Deadline) -> bool:
+        self._in_step = self._adapter.resynchronise(deadline)
+        return self._in_step
+
+    def _adapter_silent(self) -> LinkError:
+        return LinkError(
+            f"{self.address}: the adapter is silent since {self._waiting!r}; is it plugged in and "
+            "powered, and is the instrument switched on?"
+        )
+
     def _silence(self, came: int, deadline: Deadline) -> Exception:
         """What a reply that did not come, or not whole, means; asks the adapter to find out."""
-        if not self._adapter.resynchronise(Deadline.after(_ADAPTER_S)):
-            return LinkError(
-                f"{self.address}: the adapter is silent since {self._waiting!r}; "
-                "is it plugged in and powered?"
-            )
+        if not self._get_in_step(Deadline.after(_ADAPTER_S)):
+            return self._adapter_silent()
         forgot = self._adapter.has_forgotten(Deadline.after(_ADAPTER_S))
         hint = "; the adapter was reset and lost its settings" if forgot else ""
         if came:
             return ProtocolError(
-                f"{self.address}: the reply to {self._waiting!r} was cut short, {came} bytes came "
-                f"within {deadline.span_s:g} s{hint}"
+                f"{self.address}: the reply to {self._waiting!r} was cut short, {came} bytes "
+                f"came{hint}"
             )
         return BenchTimeout(
             f"{self.address}: the instrument is silent, {self._waiting!r} got no answer within "

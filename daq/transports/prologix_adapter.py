@@ -87,6 +87,7 @@ class Adapter:
         self.link = link
         self.gpib_address = gpib_address
         self._unread = bytearray()
+        self._versions_due = 0
         self.version, self.dialect = self._find(deadline)
         self.set_up(deadline)
 
@@ -140,15 +141,24 @@ class Adapter:
     def resynchronise(self, deadline: Deadline) -> bool:
         """Drop everything up to the adapter's own version text; False if it stays silent.
 
-        The adapter works its lines off in order, so nothing older can follow.
+        The adapter works its lines off in order, so nothing older can follow
+        the answer to this question. Answers still owed to earlier ones count.
         """
         self.send(b"++ver", deadline)
-        while (line := self._next_line(deadline)) is not None:
+        self._versions_due += 1
+        heard = False
+        while self._versions_due:
+            line = self._next_line(deadline)
+            if line is None:
+                break
             # A cut reply without line feed stands before the version on the same line.
             if line.endswith(self.version):
-                return True
+                self._versions_due -= 1
+                heard = True
+        if heard:
+            self._versions_due = 0  # those of before a reset never come
         self._unread.clear()
-        return False
+        return heard
 
     def has_forgotten(self, deadline: Deadline) -> bool:
         """Whether it lost its settings, as after a reset by its own power or cable."""

@@ -262,8 +262,36 @@ def test_a_clear_through_a_silent_adapter_is_a_lost_link():
     adapter = TinyAdapter(lambda _: None)
     transport = opened(adapter)
     adapter.silent = True
-    with pytest.raises(LinkError, match="cannot be reached"):
+    with pytest.raises(LinkError, match="adapter is silent"):
         transport.device_clear(soon())
+
+
+def test_an_answer_from_before_is_never_taken_for_a_new_one():
+    adapter = TinyAdapter(echo_number)
+    transport = opened(adapter)
+    adapter.silent = True
+    with pytest.raises(LinkError):
+        ask(transport, "1?", soon())
+    # Now it works off what it was sent meanwhile, version texts and all.
+    adapter.silent = False
+    transport._adapter.link.buffer += b"+1\n" + adapter.version.encode() + b"\r\n"
+    assert ask(transport, "2?", soon()) == "+2"
+    assert ask(transport, "3?", soon()) == "+3"
+
+
+def test_commands_still_go_out_to_a_silent_adapter_and_questions_do_not():
+    adapter = TinyAdapter(echo_number)
+    transport = opened(adapter)
+    adapter.silent = True
+    with pytest.raises(LinkError):
+        ask(transport, "1?", soon())
+    sent = []
+    transport._adapter.link.adapter.feed = lambda data: sent.append(data) or b""
+    transport.write("SOUR:VOLT 0 VPK", soon())
+    assert b"SOUR:VOLT 0 VPK\n" in sent
+    with pytest.raises(LinkError, match="adapter is silent"):
+        transport.write("SOUR:VOLT?", soon())
+    assert not any(b"SOUR:VOLT?" in data for data in sent)
 
 
 def test_closing_lets_the_link_go():
