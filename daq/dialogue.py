@@ -35,6 +35,9 @@ _QUEUE_READS = 12
 _RECOVERY_S = 2.0
 """Bound of each step of a recovery: what follows it may be making the source safe."""
 
+_LOOK_S = 0.1
+"""Longest pause without a look at whether anybody wants it to end."""
+
 _STALE_REPLIES = 400
 """Replies dropped while looking for the one that proves both sides in step; the rest of a cut
 block may hold many line feeds."""
@@ -65,10 +68,10 @@ class Dialogue:
         self.reply_s = reply_s
         self.block_s = block_s
         self.trusted = False
+        self.on_wait: Callable[[], None] | None = None
+        """Called between the polls of a wait; may raise to end it."""
         self.lock = threading.RLock()
         """Held for each exchange; whoever needs several in a row may hold it longer."""
-        self.on_wait: Callable[[], None] | None = None
-        """Called between the polls of every wait; may raise, which ends the wait."""
         self._nonce = 0
 
     # Exchanges
@@ -98,6 +101,17 @@ class Dialogue:
     def poll(self) -> int | None:
         """Serial poll; None where the wire has none."""
         return self._guarded(lambda: self.transport.serial_poll(Deadline.after(self.reply_s)))
+
+    def pause(self, seconds: float) -> None:
+        """Let time pass, with a look at `on_wait` at least every `_LOOK_S`."""
+        left_s = seconds
+        while True:
+            if self.on_wait is not None:
+                self.on_wait()
+            if left_s <= 0:
+                return
+            self.transport.pause(min(left_s, _LOOK_S))
+            left_s -= _LOOK_S
 
     # Settings
 

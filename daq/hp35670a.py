@@ -42,6 +42,7 @@ __all__ = ["HP35670A", "Method"]
 Method = Literal["point-by-point", "on-box"]
 
 _CALIBRATION_HOLDS_S = 7200.0
+_NARROWEST_HZ = 1.0
 _LOCK_PATIENCE_S = 6.0
 """How long going safe waits for an exchange of another thread to end before it goes on anyway."""
 
@@ -84,12 +85,15 @@ class HP35670A:
 
     @property
     def on_wait(self) -> Callable[[], None] | None:
-        """See `Analyser`."""
+        """Called at least five times a second while an operation is waited for; may raise.
+
+        A reply that does not come is not interrupted: it has a bound of its own.
+        """
         return self._dialogue.on_wait
 
     @on_wait.setter
-    def on_wait(self, call: Callable[[], None] | None) -> None:
-        self._dialogue.on_wait = call
+    def on_wait(self, look: Callable[[], None] | None) -> None:
+        self._dialogue.on_wait = look
 
     def identify(self) -> Identity:
         """Ask who is there, and refuse anything but a 35670A with swept sine."""
@@ -108,7 +112,8 @@ class HP35670A:
         InstrumentError
             If the instrument complains or reads back something else.
         """
-        table = planned_settings(start_hz, stop_hz, settings)
+        # A plan of one frequency has no band, and the instrument knows none so narrow.
+        table = planned_settings(start_hz, max(stop_hz, start_hz + _NARROWEST_HZ), settings)
         self._setup = None
         dialogue = self._dialogue
         with dialogue.lock:

@@ -117,7 +117,7 @@ def wait_until_done(dialogue: Dialogue, what: str, deadline: Deadline) -> None:
         polls += 1
         if deadline.expired:
             raise dialogue.failure(_not_ended(what, deadline))
-        dialogue.transport.pause(pause_s)
+        dialogue.pause(pause_s)
         pause_s = min(pause_s * _PAUSE_GROWTH, 0.1)
 
 
@@ -163,7 +163,7 @@ def polled(
         if deadline.expired:
             raise dialogue.failure(_not_ended(what, deadline))
         yield polls
-        dialogue.transport.pause(min(pause_s, longest_pause_s))
+        dialogue.pause(min(pause_s, longest_pause_s))
         pause_s = min(pause_s * _PAUSE_GROWTH, longest_pause_s)
 
 
