@@ -32,6 +32,7 @@ HARMLESS_DB = 0.02
 distant modes of the structure and move an extremum by far less than a step."""
 GREATEST_CORRELATION = 0.95
 """Correlation of neighbouring residuals from which errors are inflated no further."""
+TOO_FEW = "too few points for a linear fit"
 LEAST_POINTS = 6
 """A window with fewer points is not tried."""
 HIGHEST_ORDER = {"band": 3, "window": 2}
@@ -105,23 +106,17 @@ class LinearReading:
         return replace(self, misfit_hz=float(np.hypot(self.misfit_hz, error_hz)))
 
 
-def read_both(samples: Samples, low: Start, high: Start) -> tuple[LinearReading | None, str]:
-    """One zero pair and one pole pair over the widest window that the model describes.
-
-    Returns
-    -------
-    The reading, or None, and then why the last window was refused.
-    """
+def read_both(samples: Samples, low: Start, high: Start) -> LinearReading | None:
+    """One zero pair and one pole pair over the widest window that the model describes."""
     apart = high.frequency_hz - low.frequency_hz
-    f = samples.frequency_hz
-    reading, why = _best_order(samples, (low, high), HIGHEST_ORDER["band"])
+    reading, _ = _best_order(samples, (low, high), HIGHEST_ORDER["band"])
     for share in (1.0, 0.5):
         window = samples.between(
             low.frequency_hz - share * apart, high.frequency_hz + share * apart
         )
-        if reading is None and len(window) < f.size:
-            reading, why = _best_order(window, (low, high), HIGHEST_ORDER["window"])
-    return reading, why
+        if reading is None and len(window) < len(samples):
+            reading, _ = _best_order(window, (low, high), HIGHEST_ORDER["window"])
+    return reading
 
 
 def read_one(
@@ -136,10 +131,10 @@ def read_one(
 
     Returns
     -------
-    The reading, or None, and then why the last window was refused.
+    The reading, or None, and why the narrowest window with enough points was refused.
     """
     believed: list[LinearReading] = []
-    why = ""
+    why = TOO_FEW
     for reach in REACHES:
         half = reach * start.half_width_hz
         window = samples.between(
@@ -149,7 +144,7 @@ def read_one(
         reading, reason = _best_order(
             window, (start,), HIGHEST_ORDER["band" if whole else "window"]
         )
-        why = reason or why
+        why = why if reason == TOO_FEW else reason
         believed += [reading] if reading is not None else []
     alone = [(one.extrema[0].frequency_hz, one.std_hz) for one in believed]
     for k in range(len(believed)):
@@ -167,7 +162,7 @@ def _best_order(
     believed, no lower one is.
     """
     best: LinearReading | None = None
-    why = "too few points for a linear fit"
+    why = TOO_FEW
     if len(window) < LEAST_POINTS:
         return None, why
     pairs = tuple(start.pair for start in starts)

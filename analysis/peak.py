@@ -34,8 +34,9 @@ between its readings."""
 SAME_DEPTH = 2.0
 """The vertex and the smoothed curve must agree in gain within this many standard errors."""
 JUMP_DB = 3.0
-JUMP_RATIO = 2.0
-"""A step of this size, and so many times the one on the other side, is a jump."""
+"""A smaller step from one reading to the next is no cliff, dB."""
+JUMP_SHARE = 0.5
+"""Share of a step that the one on the other side lacks from which on it is called a jump."""
 DRAWS = 200
 """Draws of the noise that say which readings could be the extremum."""
 
@@ -181,22 +182,25 @@ def _within_cell(
     """Where between readings a maximum lies if a given one is the highest; mean, spread, jump.
 
     A peak of one hump lies between the two neighbours of its highest reading, most
-    likely near it: a triangular density. At a jump it lies anywhere up to the next
-    reading, and where the curve was smoothed anywhere within half a step of the
-    parabola through the three: uniform ones.
+    likely near it: a triangular density. The more the response falls off a cliff
+    on one side, the more it lies anywhere up to the reading on that side: a
+    uniform one. Where the curve was smoothed it lies anywhere within half a step of
+    the vertex of the parabola through the three.
     """
     f = curve.frequency_hz
     before, here, after = f[rows - 1], f[rows], f[rows + 1]
-    left, right = g[rows] - g[rows - 1], g[rows] - g[rows + 1]
-    falls = (right > JUMP_DB) & (right > JUMP_RATIO * np.abs(left))
-    rises = (left > JUMP_DB) & (left > JUMP_RATIO * np.abs(right))
+    left, right = np.maximum(g[rows] - g[[rows - 1, rows + 1]], 0.0)
+    steep, total = np.maximum(left, right), np.where(left + right > 0.0, left + right, np.inf)
+    far = np.where(right > left, after, before)
+    cliff = np.where(steep > JUMP_DB, np.abs(right - left) / np.maximum(steep, JUMP_DB), 0.0)
     smoothed = curve.std_db[rows] < curve.noise_db[rows]
-    total = np.where(left + right > 0.0, left + right, np.inf)
-    lean = np.clip(0.5 * (left - right) / total, -0.5, 0.5)
+    lean = 0.5 * (left - right) / total
     vertex = here + lean * np.where(lean > 0.0, after - here, here - before)
-    cases = [falls, rises, smoothed]
-    place = np.select(cases, [0.5 * (here + after), 0.5 * (here + before), vertex], here)
     uniform, triangular = np.sqrt(1.0 / 12.0), np.sqrt(1.0 / 24.0)
-    widths = [after - here, here - before, 0.5 * (after - before)]
-    spread = np.select(cases, [w * uniform for w in widths], (after - before) * triangular)
-    return place, spread, falls | rises
+    place = np.where(smoothed, vertex, here + 0.5 * cliff * (far - here))
+    spread = np.where(
+        smoothed,
+        0.5 * (after - before) * uniform,
+        cliff * np.abs(far - here) * uniform + (1.0 - cliff) * (after - before) * triangular,
+    )
+    return place, spread, cliff > JUMP_SHARE

@@ -85,9 +85,9 @@ class _Reader:
     def read(self, source_vpk: float) -> LevelFeatures:
         """Both features by one linear model if it fits, else each on its own."""
         starts = {c.sign: self._start(c) for c in self.candidates}
-        joint, why = None, ""
+        joint = None
         if len(starts) == 2:
-            joint, why = read_both(self.samples, starts[-1], starts[1])
+            joint = read_both(self.samples, starts[-1], starts[1])
         covariance = 0.0
         features: dict[int, Feature] = {}
         if joint is not None:
@@ -96,7 +96,7 @@ class _Reader:
             self._note_scatter("level", joint)
         else:
             for candidate in self.candidates:
-                features[candidate.sign] = self._alone(candidate, starts[candidate.sign], why)
+                features[candidate.sign] = self._alone(candidate, starts[candidate.sign])
         return self._record(source_vpk, features, covariance)
 
     def _record(
@@ -135,12 +135,12 @@ class _Reader:
                 first = max(first, other.at + 1)
         return first, last
 
-    def _alone(self, candidate: Candidate, start: Start, why: str) -> Feature:
+    def _alone(self, candidate: Candidate, start: Start) -> Feature:
         """One feature by a linear model of its own, else by parabola or off the grid."""
         f, name = self.samples.frequency_hz, NAMES[candidate.sign]
         first, last = self._bounds(candidate)
         peak = read_peak(candidate.curve, candidate.at, candidate.sign, first, last)
-        linear, reason = read_one(self.samples, start, float(f[first - 1]), float(f[last + 1]))
+        linear, why = read_one(self.samples, start, float(f[first - 1]), float(f[last + 1]))
         if linear is not None:
             linear = linear.beside(peak.frequency_hz, peak.std_hz)
             if len(linear.fit.samples) < len(self.samples):
@@ -149,7 +149,7 @@ class _Reader:
             self._note_scatter(name, linear)
             return _linear_feature(linear, 0)
         read_off = "" if peak.method == "parabola" else " read off the grid"
-        self.flags.append(f"{name}: nonlinear peak{read_off}; {reason or why}")
+        self.flags.append(f"{name}: nonlinear peak{read_off}; {why}")
         if peak.jump:
             self.flags.append(f"{name}: the response jumps there; a repeat may jump elsewhere")
         zeta, zeta_std = self._half_power(candidate)
