@@ -149,6 +149,7 @@ def short_reproduction(monkeypatch):
     monkeypatch.setattr(paper, "reproduce", short)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("short_reproduction")
 def test_reproduce_gives_the_fields_that_scripts_use(capsys, tmp_path):
     result = document(["reproduce", "--plots", str(tmp_path / "plots")], capsys)
