@@ -8,7 +8,7 @@ repeatable, so a prediction is a distribution; it never runs a simulation.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,9 @@ __all__ = ["TAIL_FREEDOM", "Emulator", "Prediction"]
 
 TAIL_FREEDOM = 4.0
 """Degrees of freedom of Student's t, for the scatter of single runs."""
+
+GAIN_TOLERANCE = 0.005
+"""Spread of the tachometer's gain, which scales the whole response."""
 
 _FIT_ITERATIONS = 5
 _SPARE_DRAWS = 6
@@ -34,7 +37,8 @@ class Prediction:
 
     `mean`, `std` (3, rows): centre and scale of Student's t for a single run,
     the regression's own uncertainty included. `slopes` (k, 3, rows): change of
-    the mean per unit of each deviation. `runs` (near, 3, rows): single runs
+    the mean per unit of each deviation, the last one a common factor of the gain;
+    `sigmas` (k,) their prior standard deviations. `runs` (near, 3, rows): single runs
     brought to this place, less the mean, and `shares` (near,) their weights:
     they show the branches between which the motion may choose.
     """
@@ -42,6 +46,7 @@ class Prediction:
     mean: NDArray[np.float64]
     std: NDArray[np.float64]
     slopes: NDArray[np.float64]
+    sigmas: NDArray[np.float64]
     runs: NDArray[np.float64]
     shares: NDArray[np.float64]
 
@@ -61,22 +66,38 @@ class Emulator:
     blocks
         Rows that lie next to each other in one sweep, as slices: scatter is
         smoothed within them.
+    width
+        (d,): distance over which the response changes smoothly.
+    sigmas
+        (k,): prior standard deviation of each deviation.
     """
 
     places: NDArray[np.float64]
     deviations: NDArray[np.float64]
     channels: NDArray[np.float64]
     blocks: tuple[slice, ...]
+    width: NDArray[np.float64]
+    sigmas: NDArray[np.float64]
 
-    def predict(self, place: NDArray[np.float64], width: NDArray[np.float64]) -> Prediction:
-        """Local quadratic regression about `place` (d,), over a distance of `width` (d,).
+    def without(self, draws: NDArray[np.int64]) -> Emulator:
+        """The emulator that has not seen some draws."""
+        kept = np.setdiff1d(np.arange(len(self.places)), draws)
+        return replace(
+            self,
+            places=self.places[kept],
+            deviations=self.deviations[kept],
+            channels=self.channels[kept],
+        )
+
+    def predict(self, place: NDArray[np.float64]) -> Prediction:
+        """Local quadratic regression about `place` (d,).
 
         Raises
         ------
         AnalysisError
             If too few draws lie within reach.
         """
-        offset, near, w = self._neighbours(place, width)
+        offset, near, w = self._neighbours(place)
         basis = _basis(offset, self.deviations[near])
         count, terms = basis.shape
         # The phase may turn past 180 degrees; differences to a near draw may not.
@@ -86,18 +107,26 @@ class Emulator:
         variance = self._smoothed(fit.variance.reshape(shape))
         std = np.sqrt(variance * (1.0 + fit.leverage) + _LEAST_STD[:, None] ** 2)
         k = self.deviations.shape[1]
-        slopes = fit.coefficients[terms - k :].reshape((k, *shape))
-        runs = (values.reshape(count, -1) - basis @ fit.coefficients).reshape(count, *shape)
-        return Prediction(fit.coefficients[0].reshape(shape), std, slopes, runs, w / w.sum())
+        slopes = np.zeros((k + 1, *shape))
+        slopes[:k] = fit.coefficients[terms - k :].reshape((k, *shape))
+        slopes[k, 0] = 1.0
+        return Prediction(
+            mean=fit.coefficients[0].reshape(shape),
+            std=std,
+            slopes=slopes,
+            sigmas=np.append(self.sigmas, GAIN_TOLERANCE),
+            runs=(values.reshape(count, -1) - basis @ fit.coefficients).reshape(count, *shape),
+            shares=w / w.sum(),
+        )
 
     def _neighbours(
-        self, place: NDArray[np.float64], width: NDArray[np.float64]
+        self, place: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]:
         """Offsets, choice and weights of near draws; the reach grows until they suffice."""
         d = self.places.shape[1]
         needed = 1 + d + d * (d + 1) // 2 + self.deviations.shape[1] + _SPARE_DRAWS
         for widening in _WIDENINGS:
-            offset = (self.places - place) / (width * widening)
+            offset = (self.places - place) / (self.width * widening)
             distance = np.sqrt(np.sum(offset**2, axis=1))
             weight = np.clip(1.0 - (distance / 2.0) ** 3, 0.0, None) ** 3
             if weight.sum() >= needed:
@@ -167,7 +196,8 @@ def _fit_tailed(
     hat = np.linalg.solve(plain, (basis * weight[:, None]).T)
     used = float(np.einsum("ij,ji->", hat, basis * weight[:, None]))
     total = float(weight.sum())
-    return _Fit(coefficients, scale * total / max(total - used, 1.0), float(hat[0] @ hat[0]))
+    variance = np.asarray(scale * total / max(total - used, 1.0), dtype=float)
+    return _Fit(coefficients, variance, float(hat[0] @ hat[0]))
 
 
 def _basis(offset: NDArray[np.float64], deviations: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,8 +1,9 @@
-"""Fitting the free numbers of a machine to an observation: where simulations are placed, and what follows.
+"""Fitting the free numbers of a machine to an observation.
 
-Owns the two stages of every fit: a coarse look over the whole range, then a
-closer one where the likelihood lies, and the posterior on a grid. What is free
-(contribution ratio, total backlash) is the caller's; it decides nothing about
+Owns where simulations are placed: a coarse look over the whole range, then a
+closer one where the likelihood lies, and the posterior that follows. What is
+free (contribution ratio, total backlash) is the caller's; how far the answer
+can be trusted is found out in `analysis.calibration`. It decides nothing about
 causes.
 """
 
@@ -14,30 +15,29 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.emulator import Emulator, Prediction
+from analysis.calibration import calibrate
+from analysis.emulator import Emulator
 from analysis.ensemble import TOLERANCES, Draws, Machine, run_machines
 from analysis.likelihood import Match, match_prediction
 from analysis.observation import Observation
-from daq.errors import AnalysisError
 from sim.unit import Unit
 
 __all__ = ["Axis", "Posterior", "RATIO", "fit_posterior"]
 
 Progress = Callable[[float, str], None]
 
-INFORMATION = 0.3
-"""Share of a point's likelihood that counts.
-
-Neighbouring points of a sweep keep to the same branch of the motion and err
-together; this value makes stated intervals cover (docs/estimate.md).
-"""
-
 _COARSE_TEMPER = 0.05
+"""Share of the likelihood that narrows the search: neighbouring points err together."""
+
 _SIMULATED = ("R_m", "k_t", "J_L", "k_s1", "k_a")
 """Datasheet values whose spread is simulated; that of k_ts scales the gain alone."""
 
-_DEVIATION = 0.015
-_GROUPS = 6
+_DEVIATION = 0.0075
+"""Size of the simulated deviations: larger than the tolerance, so that slopes show."""
+
+_GROUPS = 8
+_PER_GROUP = 10
+_PLAIN = 48
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,7 @@ class Posterior:
     """Posterior of the free numbers on a regular grid.
 
     `values` one array per axis; `weight` (...) sums to one over the grid;
-    `best` and `match` where it is largest; `draws` all runs that were made.
+    `best` its centre and `match` what is left there; `draws` all runs made.
     """
 
     axes: tuple[Axis, ...]
@@ -103,37 +103,29 @@ def fit_posterior(
 
     rng = np.random.default_rng(seed)
     axes = tuple(axes)
-    coarse = _coarse_machines(axes, rng)
-    draws = run_machines(unit, coarse, observation, report(0.0, 0.45, "simulating the range"))
+    coarse = _coarse_machines(axes)
+    draws = run_machines(unit, coarse, observation, report(0.0, 0.35, "simulating the range"))
     scales = np.array([axis.scale for axis in axes])
-    look = _Look(observation, axes, draws, scales)
     grid = _grid(axes)
-    likely = _weights(look.log_likelihood(grid), _COARSE_TEMPER)
-
+    likely = _weights(_Look(observation, axes, draws, scales).log_likelihood(grid))
     fine = _fine_machines(axes, grid, likely, rng)
     draws = draws.joined(
-        run_machines(unit, fine, observation, report(0.45, 0.9, "simulating near the answer"))
+        run_machines(unit, fine, observation, report(0.35, 0.9, "simulating near the answer"))
     )
-    spread = np.sqrt(np.maximum(_moments(grid, likely)[1], 0.0))
-    width = np.clip(spread, 0.3 * scales, scales)
-    look = _Look(observation, axes, draws, width)
-    reachable = likely > 1e-4 * likely.max()
-    log_likelihood = np.full(len(grid), -np.inf)
-    log_likelihood[reachable] = look.log_likelihood(grid[reachable], INFORMATION)
-    if not np.any(np.isfinite(log_likelihood)):
-        raise AnalysisError("no simulated machine comes near the response; is it the right unit?")
-    weight = _weights(log_likelihood, 1.0)
-    top = int(np.argmax(weight))
-    match = look.match(grid[top], INFORMATION)
+    if progress is not None:
+        progress(0.9, "weighing the simulations")
+    look = _Look(observation, axes, draws, 0.6 * scales)
+    calibrated = calibrate(observation, look.emulator, rng)
+    weight = calibrated.density(grid)
+    best = np.clip(calibrated.mean, [axis.low for axis in axes], [axis.high for axis in axes])
     if progress is not None:
         progress(1.0, "done")
-    shape = tuple(_fine_count(axis) for axis in axes)
     return Posterior(
         axes,
         tuple(np.linspace(axis.low, axis.high, _fine_count(axis)) for axis in axes),
-        weight.reshape(shape),
-        tuple(float(v) for v in grid[top]),
-        match,
+        weight.reshape(tuple(_fine_count(axis) for axis in axes)),
+        tuple(float(v) for v in best),
+        look.match(best),
         draws,
     )
 
@@ -149,27 +141,26 @@ class _Look:
         width: NDArray[np.float64],
     ) -> None:
         self._observation = observation
-        self._width = width
         places = np.array([[_value(axis, m) for axis in axes] for m in draws.machines])
         deviations = np.array(
             [[dict(m.deviations).get(s, 0.0) for s in _SIMULATED] for m in draws.machines]
         )
         used = np.any(deviations != 0.0, axis=0)
-        self._emulator = Emulator(places, deviations[:, used], draws.channels, observation.blocks)
         symbols = [s for s, u in zip(_SIMULATED, used, strict=True) if u]
-        self._sigmas = np.array([TOLERANCES[s] for s in [*symbols, "k_ts"]])
+        self.emulator = Emulator(
+            places,
+            deviations[:, used],
+            draws.channels,
+            observation.blocks,
+            width,
+            np.array([TOLERANCES[s] for s in symbols]),
+        )
 
-    def match(self, place: NDArray[np.float64], information: float = 1.0) -> Match:
-        prediction = self._emulator.predict(place, self._width)
-        gain = np.zeros((1, *prediction.mean.shape))
-        gain[0, 0] = 1.0
-        scaled: Prediction = replace(prediction, slopes=np.concatenate([prediction.slopes, gain]))
-        return match_prediction(self._observation, scaled, self._sigmas, information)
+    def match(self, place: NDArray[np.float64]) -> Match:
+        return match_prediction(self._observation, self.emulator.predict(place))
 
-    def log_likelihood(
-        self, places: NDArray[np.float64], information: float = 1.0
-    ) -> NDArray[np.float64]:
-        return np.array([self.match(place, information).log_likelihood for place in places])
+    def log_likelihood(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.array([self.match(place).log_likelihood for place in places])
 
 
 def _value(axis: Axis, machine: Machine) -> float:
@@ -187,7 +178,7 @@ def _fine_count(axis: Axis) -> int:
     return 6 * (axis.coarse - 1) // 2 + 1
 
 
-def _coarse_machines(axes: Sequence[Axis], rng: np.random.Generator) -> list[Machine]:
+def _coarse_machines(axes: Sequence[Axis]) -> list[Machine]:
     lines = [np.linspace(axis.low, axis.high, axis.coarse) for axis in axes]
     places = np.stack([m.ravel() for m in np.meshgrid(*lines, indexing="ij")], axis=1)
     return [_machine_at(axes, place, seed) for seed, place in enumerate(places)]
@@ -210,7 +201,7 @@ def _fine_machines(
         high = np.array([axis.high for axis in axes])
         return np.clip(centre + step, low, high)
 
-    plain = 40 if len(axes) == 1 else 80
+    plain = _PLAIN * len(axes)
     machines = [_machine_at(axes, place(), 10_000 + i) for i in range(plain)]
     signs = _balanced_signs(_GROUPS, len(_SIMULATED), rng)
     for g in range(_GROUPS):
@@ -218,7 +209,7 @@ def _fine_machines(
             (symbol, float(_DEVIATION * sign))
             for symbol, sign in zip(_SIMULATED, signs[g], strict=True)
         )
-        for i in range(10):
+        for i in range(_PER_GROUP * len(axes)):
             machine = _machine_at(axes, place(), 20_000 + 100 * g + i)
             machines.append(replace(machine, deviations=deviations))
     return machines
@@ -243,9 +234,8 @@ def _machine_at(axes: Sequence[Axis], place: NDArray[np.float64], seed: int) -> 
     return machine
 
 
-def _weights(log_likelihood: NDArray[np.float64], temper: float) -> NDArray[np.float64]:
-    scaled = temper * (log_likelihood - np.max(log_likelihood))
-    weight = np.exp(scaled)
+def _weights(log_likelihood: NDArray[np.float64]) -> NDArray[np.float64]:
+    weight = np.exp(_COARSE_TEMPER * (log_likelihood - np.max(log_likelihood)))
     return np.asarray(weight / weight.sum())
 
 

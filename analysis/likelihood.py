@@ -4,9 +4,9 @@ Owns one likelihood: Student's t for every channel, with the scatter of single
 runs, the noise of the reading, the logarithm of both, and datasheet tolerances
 as priors that are fitted away. Heavy tails because a point with chaotic motion
 can lie far out; the log-variance term because without it a machine whose
-simulation scatters most would explain everything. And because the motion may
-hold to one of several branches over a stretch of the sweep, each short segment
-may be explained by the common run of machines or by any single one of them.
+simulation scatters most would explain everything. And because the motion
+may keep to one of several branches over a stretch of the sweep, the likelihood
+follows branches along it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
 
 from analysis.emulator import TAIL_FREEDOM, Prediction
 from analysis.observation import Observation
@@ -23,6 +22,14 @@ from analysis.observation import Observation
 __all__ = ["Match", "match_prediction"]
 
 _ITERATIONS = 12
+
+_CHANGE = 0.05
+_LOG_STAY, _LOG_CHANGE = np.log(1.0 - _CHANGE), np.log(_CHANGE)
+"""Chance per point that a motion changes its branch."""
+
+_LEAST_BRANCH_STD = 0.003
+_SCATTER_STD = 0.4
+"""Scatter about one single run: of a quiet one, and of the logarithm of the scatter itself."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,8 +49,7 @@ class Match:
 def match_prediction(
     observation: Observation,
     prediction: Prediction,
-    sigmas: NDArray[np.float64],
-    weight: float = 1.0,
+    branching: bool = True,
 ) -> Match:
     """Likelihood of an observation under a prediction.
 
@@ -51,12 +57,9 @@ def match_prediction(
     ----------
     observation, prediction
         Rows in the same order.
-    sigmas
-        (k,): prior standard deviation of each deviation whose slope the
-        prediction gives.
-    weight
-        Share of independent information in a row; below 1 where neighbouring
-        points err together.
+    branching
+        Whether to follow branches along the sweep, or to take every point for
+        itself (quicker, for one comparison among many).
     """
     difference = observation.values - prediction.mean
     difference[1] = np.angle(np.exp(1j * difference[1]))
@@ -64,32 +67,58 @@ def match_prediction(
     std[:2] = np.sqrt(std[:2] ** 2 + observation.noise**2)
     seen = np.isfinite(difference)
     y, s = difference[seen], std[seen]
-    slopes = prediction.slopes[:, seen]
-    best = np.zeros(len(sigmas))
+    slopes, sigmas = prediction.slopes[:, seen], prediction.sigmas
+    best: NDArray[np.float64] = np.zeros(len(sigmas))
     precision = np.diag(1.0 / sigmas**2)
     for _ in range(_ITERATIONS):
         z2 = ((y - best @ slopes) / s) ** 2
-        trust = weight * (TAIL_FREEDOM + 1.0) / (TAIL_FREEDOM + z2) / s**2
+        trust = (TAIL_FREEDOM + 1.0) / (TAIL_FREEDOM + z2) / s**2
         normal = (slopes * trust) @ slopes.T + precision
-        best = np.linalg.solve(normal, (slopes * trust) @ y)
+        best = np.asarray(np.linalg.solve(normal, (slopes * trust) @ y), dtype=float)
     residual = difference - np.tensordot(best, prediction.slopes, axes=1)
-    main = _by_segment(_log_tailed(residual, std), observation.segments)
-    apart = _log_tailed(residual - prediction.runs, std)
-    singly = np.log(prediction.shares)[:, None] + _by_segment(apart, observation.segments)
-    total = weight * np.logaddexp(main, logsumexp(singly, axis=0)).sum()
+    if branching:
+        total = _log_branching(residual, std, prediction, observation)
+    else:
+        total = float(_log_tailed(residual, std).sum())
     _, log_det = np.linalg.slogdet(normal @ np.diag(sigmas**2))
     total -= 0.5 * np.sum((best / sigmas) ** 2) + 0.5 * log_det
     return Match(float(total), best, residual, np.where(seen, std, np.nan))
+
+
+def _log_branching(
+    residual: NDArray[np.float64],
+    std: NDArray[np.float64],
+    prediction: Prediction,
+    observation: Observation,
+) -> float:
+    """Likelihood of a sweep that may keep to any branch and change it now and then.
+
+    A hidden Markov chain along the sweep: at each row the reading comes from
+    the common run of machines, or keeps to what one single run did, within the
+    scatter that this run shows itself.
+    """
+    common = _log_tailed(residual, std).sum(axis=0)
+    own = np.exp(prediction.mean[2] + prediction.runs[:, 2])
+    single = np.empty_like(prediction.runs)
+    single[:, :2] = np.sqrt(own**2 + observation.noise**2 + _LEAST_BRANCH_STD**2)[:, None]
+    single[:, 2] = _SCATTER_STD
+    alone = _log_tailed(residual - prediction.runs, single).sum(axis=1)
+    entry = np.log(np.append(0.5 * prediction.shares, 0.5) + 1e-12)
+    log_density = np.concatenate([alone, common[None]])
+    total = 0.0
+    for block in observation.blocks:
+        state = entry
+        for row in range(block.start, block.stop):
+            if row > block.start:
+                state = np.logaddexp(state + _LOG_STAY, entry + _LOG_CHANGE)
+            state = state + log_density[:, row]
+            norm = np.logaddexp.reduce(state)
+            total += norm
+            state = state - norm
+    return float(total)
 
 
 def _log_tailed(residual: NDArray[np.float64], std: NDArray[np.float64]) -> NDArray[np.float64]:
     """Log density of Student's t up to a constant; 0 where nothing was observed."""
     log_density = -0.5 * (TAIL_FREEDOM + 1.0) * np.log1p((residual / std) ** 2 / TAIL_FREEDOM)
     return np.where(np.isfinite(residual), log_density - np.log(std), 0.0)
-
-
-def _by_segment(
-    log_density: NDArray[np.float64], segments: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """Sums (..., segments) over channels and the rows of each segment."""
-    return np.add.reduceat(log_density.sum(axis=-2), segments, axis=-1)

@@ -24,8 +24,6 @@ CHANNELS = ("gain", "phase", "scatter")
 SETTLE_CYCLES, INTEGRATE_CYCLES = 20, 30
 """Assumed where a file does not say."""
 
-SEGMENT_ROWS = 6
-
 _QUIET_SHARE = 0.02
 _DEFAULT_NOISE_V = 5e-4
 
@@ -39,8 +37,7 @@ class Observation:
     per component at the input of the analyser, V. `noise` (rows,): the same
     relative to the response. `plans`: the sweep that a simulation must take,
     one for each set of levels that share their frequencies, with their rows.
-    `blocks`: the rows of each level. `segments`: first rows of short stretches
-    of a level over which the motion may keep to one branch.
+    `blocks`: the rows of each level.
     """
 
     values: NDArray[np.float64]
@@ -56,15 +53,6 @@ class Observation:
         starts = np.flatnonzero(np.diff(self.source_vpk, prepend=np.nan) != 0)
         ends = [*starts[1:], len(self)]
         return tuple(slice(int(a), int(b)) for a, b in zip(starts, ends, strict=True))
-
-    @property
-    def segments(self) -> NDArray[np.int64]:
-        """First rows of stretches of about `SEGMENT_ROWS` within each level."""
-        firsts = [
-            np.linspace(b.start, b.stop, max((b.stop - b.start) // SEGMENT_ROWS, 1) + 1)[:-1]
-            for b in self.blocks
-        ]
-        return np.concatenate(firsts).astype(np.int64)
 
     def __len__(self) -> int:
         return len(self.frequency_hz)
