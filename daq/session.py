@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -65,6 +65,9 @@ class Session:
         What to do.
     control
         Where a person asks for a pause or an end; one of its own if left out.
+    reopen
+        Connects to the same instrument once more, for making it safe when the
+        connection was lost; None where there is no such way.
     """
 
     def __init__(
@@ -73,9 +76,12 @@ class Session:
         store: Store,
         request: SessionRequest,
         control: SessionControl | None = None,
+        reopen: Callable[[], Analyser] | None = None,
     ) -> None:
         self.control = control or SessionControl()
         self._analyser = analyser
+        self._given = analyser
+        self._reopen = reopen
         self._store = store
         self._request = request
         self._pace = Pace()
@@ -113,12 +119,20 @@ class Session:
             # Whoever watched has left, or the program is told to end: nobody
             # is there to yield to, and the source must be off all the same.
             self._close(None)
+            self._let_go()
             raise
         finished = self._close(error)
+        self._let_go()
         yield SourceSafe(finished.source_state)
         yield finished
         if finished.error is not None:
             raise finished.error
+
+    def _let_go(self) -> None:
+        """Close a connection that the session opened itself."""
+        if self._analyser is not self._given:
+            self._analyser.close()
+            self._analyser = self._given
 
     # ------------------------------------------------------------ checks
 
@@ -310,7 +324,19 @@ class Session:
         return "interrupted", cut[1] if cut is not None else "nobody watched any more"
 
     def _make_safe(self) -> SourceState:
-        """Run the safe-off recipe to its end, whatever is pressed meanwhile."""
+        """Run the safe-off recipe to its end, over a new connection if the old one is dead."""
+        state = self._off()
+        if (
+            state is SourceState.UNKNOWN
+            and self._reopen is not None
+            and self._connect(self._reopen)
+        ):
+            state = self._off()
+            self._note_reconnection(state)
+        return state
+
+    def _off(self) -> SourceState:
+        """The recipe, begun again when a key press breaks it."""
         self._analyser.on_wait = None
         for _ in range(_SAFE_TRIES):
             with suppress(KeyboardInterrupt):
@@ -321,6 +347,22 @@ class Session:
                     return SourceState.UNKNOWN
             self.control.interrupt("interrupted from the keyboard")
         return SourceState.UNKNOWN
+
+    def _connect(self, reopen: Callable[[], Analyser]) -> bool:
+        try:
+            self._analyser.close()
+            self._analyser = reopen()
+        except LashbenchError:
+            return False
+        except KeyboardInterrupt:
+            self.control.interrupt("interrupted from the keyboard")
+            return False
+        return True
+
+    def _note_reconnection(self, state: SourceState) -> None:
+        # A journal that cannot be written does not change what is known.
+        with suppress(LashbenchError):
+            self._journal.note("reconnected", f"over a new connection: source {state.value}")
 
 
 def _next(points: Iterator[SweepPoint], requested_hz: float) -> SweepPoint:

@@ -75,8 +75,8 @@ class Journal:
             if event.kind == "lost point"
         }
         first = self.agenda.first_missing()
-        # Driving when it was last heard of: its program was killed.
-        if before.source_state is SourceState.ON and first is not None:
+        # Set up for its sweep and never ended: its program was killed.
+        if before.ended is None and before.readback and first is not None:
             lost.add(first)
         return frozenset(lost)
 
