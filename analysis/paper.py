@@ -28,8 +28,12 @@ __all__ = ["Reproduction", "ReproducedRow", "reproduce"]
 
 Progress = Callable[[float, str], None]
 
-PLATEAU_SPREAD = 0.03
-"""Single runs that scatter by more than this share of RF find no peak but a plateau."""
+PLATEAU_SPREAD = 0.024
+"""Single runs that scatter by more than this share of RF find no peak but a plateau.
+
+Over 64 runs a row the paper's scheme scatters by 1.5 to 1.8 % where there is a
+peak, by 3.6 % and more on the plateaus of EDSS.
+"""
 
 
 @dataclass(frozen=True, slots=True)
