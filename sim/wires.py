@@ -14,12 +14,14 @@ import struct
 import tempfile
 from pathlib import Path
 
+from daq.errors import LinkError
 from sim.adapter import FakeAdapter
 from sim.analyser35670a import Analyser35670A, TalkState
 
 __all__ = ["AdapterClient", "Listener", "RawClient", "Terminal"]
 
 _CHUNK = 65536
+_LONGEST_LINE = 4_000_000
 _REPLUG_S = 0.5
 """How long a pulled pseudo-terminal stays away."""
 
@@ -29,6 +31,8 @@ class Listener:
 
     def __init__(self, wire: socket.socket, adapter: FakeAdapter | None) -> None:
         self.wire = wire
+        self.owner: RawClient | None = None
+        """Who spoke last on a raw socket: the reply is his."""
         self._adapter = adapter
 
     def accept(self, instrument: Analyser35670A) -> RawClient | AdapterClient | None:
@@ -40,7 +44,7 @@ class Listener:
         wire.setblocking(False)
         wire.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         if self._adapter is None:
-            return RawClient(wire, instrument)
+            return RawClient(wire, instrument, self)
         return AdapterClient(wire, self._adapter)
 
 
@@ -98,26 +102,36 @@ class RawClient(_Client):
     whose reply is still due is interrupted (-410) by the next line.
     """
 
-    def __init__(self, wire: socket.socket, instrument: Analyser35670A) -> None:
+    def __init__(self, wire: socket.socket, instrument: Analyser35670A, listener: Listener) -> None:
         super().__init__(wire)
         self._instrument = instrument
-        self._asked = False
+        self._listener = listener
+        self._held = bytearray()
 
     def work(self, now_s: float) -> None:
         """Feed the instrument line by line, each reply first."""
         self._take_reply()
-        while self._in:
-            end = self._in.find(b"\n") + 1 or len(self._in)
-            taken = self._instrument.listen(bytes(self._in[:end]))
-            self._asked = True
-            del self._in[:taken]
+        while self._held or b"\n" in self._in:
+            if not self._held:
+                # Whole lines only, so that two clients' messages never mix.
+                end = self._in.find(b"\n") + 1
+                self._held += self._in[:end]
+                del self._in[:end]
+            self._listener.owner = self
+            del self._held[: self._instrument.listen(bytes(self._held))]
             self._take_reply()
-            if taken < end:
+            if self._held:
                 break
+        if len(self._in) > _LONGEST_LINE:
+            self.closed = True
         self._flush()
 
+    @property
+    def _owns(self) -> bool:
+        return self._listener.owner is self
+
     def _take_reply(self) -> None:
-        while self._asked and self._instrument.reply_ready:
+        while self._owns and self._instrument.reply_ready:
             talk = self._instrument.talk()
             if talk.state is not TalkState.DATA:
                 return
@@ -125,12 +139,13 @@ class RawClient(_Client):
 
     @property
     def waiting(self) -> bool:
-        """Also while a reply is due."""
-        return super().waiting or (self._asked and self._instrument.reply_due)
+        """Whether bytes are held back, or a reply is due."""
+        return bool(self._held or self._out) or (self._owns and self._instrument.reply_due)
 
     def close(self) -> None:
         """[S] A gateway that loses its client clears the instrument's queues."""
-        if self._asked:
+        if self._owns:
+            self._listener.owner = None
             self._instrument.device_clear()
         super().close()
 
@@ -173,6 +188,8 @@ class Terminal:
 
     def _plug(self) -> None:
         """Make the terminal; Linux and macOS only."""
+        if not hasattr(os, "openpty"):
+            raise LinkError("this system has no pseudo-terminals; serve --prologix-tcp instead")
         import tty
 
         master, slave = os.openpty()

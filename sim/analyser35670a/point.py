@@ -33,8 +33,10 @@ if TYPE_CHECKING:
 __all__ = ["CHANNELS", "Point", "Timing", "dwell_cycles", "take_point"]
 
 CHANNELS = 4
-MOST_CYCLES = 1000
-"""Settle and integrate cycles that are really driven at one point; more are only waited for."""
+_MOST_CYCLES = 1000
+_LONGEST_MOTION_S = 60.0
+"""[S] Bounds of what is really driven while a point settles, and while it integrates; the rest of
+longer times is only waited for."""
 _LEVEL_TRIES = 4
 _BURST = 4.0
 
@@ -75,8 +77,9 @@ def dwell_cycles(instrument: Analyser35670A, frequency_hz: float) -> tuple[int, 
     settle_s = settle.value if settle.unit == "S" else settle.value / frequency_hz
     asked = dwell.value * frequency_hz if dwell.unit == "S" else dwell.value
     integrate = max(1, round(min(asked, 1e12)))
-    settling = math.ceil(min(settle_s * frequency_hz - 1e-9, MOST_CYCLES))
-    return max(0, settling), min(integrate, MOST_CYCLES), settle_s, integrate / frequency_hz
+    most = max(1, min(_MOST_CYCLES, int(_LONGEST_MOTION_S * frequency_hz)))
+    settling = max(0, math.ceil(min(settle_s * frequency_hz - 1e-9, most)))
+    return settling, min(integrate, most), settle_s, integrate / frequency_hz
 
 
 def take_point(instrument: Analyser35670A, frequency_hz: float, key: tuple[int, int]) -> Point:

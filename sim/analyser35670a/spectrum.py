@@ -25,6 +25,8 @@ __all__ = ["Spectrum"]
 
 _CHANNELS = 2
 _SETTLE, _INTEGRATE = 20, 10
+_LOWEST_HZ = 1.0
+"""Below this a sine would take too long to simulate for the look of a spectrum."""
 _REAL = ("XFR:POW", "XFR:POW:COH")
 
 
@@ -68,7 +70,7 @@ class Spectrum:
         hz = instrument.settings.get("SOUR:FREQ").value
         level = instrument.source.level(instrument.agenda.now_s)
         sine = instrument.settings.get("SOUR:FUNC") == "SIN"
-        inside = max(start, 1e-9) <= hz <= stop
+        inside = max(start, _LOWEST_HZ) <= hz <= stop
         if instrument.settings.mode is Mode.FFT and sine and level > 0 and inside:
             offset = instrument.source.offset_v
             dwell = instrument.plant.dwell(hz, level, offset, _SETTLE, _INTEGRATE)

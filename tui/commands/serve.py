@@ -88,6 +88,9 @@ def serve(
     faults = [parse_fault(text) for text in fault or []]
     effects = tuple(parse_effect(text) for text in effect or [])
     servo = SteppedServo(load_unit(unit), ratio, effects, seed=seed)
+    # The first dwell may compile the engine, for longer than a client waits for a reply.
+    servo.dwell(1000.0, 1.0, 0.0, 0, 1)
+    servo.rest()
     choices = Choices(seed=seed, noise_v=noise, options=options)
     instrument = Analyser35670A(servo, choices, FaultBoard(faults))
     with Server(

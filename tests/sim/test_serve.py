@@ -1,0 +1,442 @@
+"""The served analyser, met as other people's programs meet it: sockets, terminals, PyVISA."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from daq.analyser import PointSettings
+from daq.errors import BenchTimeout, ConfigurationError, LinkError, ProtocolError
+from daq.hp35670a import HP35670A
+from daq.transports.base import Deadline
+from daq.transports.open import open_transport
+from sim.analyser35670a import Analyser35670A, Choices, LinearPlant
+from sim.faults import FaultBoard, parse_fault
+from sim.loopback import Loopback, open_loopback, read_loopback_settings
+from sim.serve import HOST, Server
+from sim.unit import load_unit
+
+IDENTITY = "HEWLETT-PACKARD,35670A,LASHSIM001,A.01.11"
+
+
+def known_answer(hz: float) -> complex:
+    return 0.1 * (1.0 + 1j * hz / 100.0)
+
+
+def instrument(*faults: str, **choices: Any) -> Analyser35670A:
+    board = FaultBoard([parse_fault(text) for text in faults])
+    return Analyser35670A(LinearPlant(known_answer), Choices(**choices), board)
+
+
+@contextlib.contextmanager
+def served(*faults: str, realtime: bool = False, dialect: str = "prologix", **choices: Any):
+    """A server on all wires, turning in a thread."""
+    server = Server(
+        instrument(*faults, **choices), realtime=realtime, tcp=0, prologix_tcp=0,
+        prologix_pty=True, dialect=dialect,
+    )  # fmt: skip
+    with server:
+        thread = threading.Thread(target=server.run)
+        thread.start()
+        try:
+            yield server
+        finally:
+            server.stop()
+            thread.join(10.0)
+            assert not thread.is_alive()
+
+
+def urls(server: Server) -> dict[str, str]:
+    host, port = server.addresses["tcp"].split(":")
+    return {
+        "tcp": f"TCPIP::{host}::{port}::SOCKET",
+        "prologix-tcp": f"prologix-tcp:{server.addresses['prologix_tcp']}",
+        "prologix": f"prologix:{server.addresses['prologix_pty']}",
+    }
+
+
+@contextlib.contextmanager
+def raw(server: Server) -> Iterator[socket.socket]:
+    host, port = server.addresses["tcp"].split(":")
+    with socket.create_connection((host, int(port)), timeout=5.0) as wire:
+        yield wire
+
+
+def line(wire: socket.socket) -> bytes:
+    data = b""
+    while not data.endswith(b"\n"):
+        part = wire.recv(1)
+        if not part:
+            break
+        data += part
+    return data
+
+
+# Raw TCP
+
+
+def test_raw_tcp_speaks_lines():
+    with served() as server, raw(server) as wire:
+        wire.sendall(b"*IDN?\n")
+        assert line(wire) == IDENTITY.encode() + b"\n"
+        wire.sendall(b"*ID")
+        time.sleep(0.05)
+        wire.sendall(b"N?\r\n*OPT?\n")
+        assert line(wire) == IDENTITY.encode() + b"\n"
+        assert line(wire) == b'"1D2"\n'
+        wire.sendall(b"JUNK\nSYST:ERR?\n")
+        assert line(wire) == b'-113,"Undefined header"\n'
+
+
+def test_it_listens_on_the_local_host_only():
+    with served() as server:
+        for name in ("tcp", "prologix_tcp"):
+            assert server.addresses[name].startswith("127.0.0.1:")
+        for listener in server._listeners:
+            assert listener.wire.getsockname()[0] == HOST
+
+
+def test_a_port_in_use_is_a_link_error():
+    with served() as server:
+        port = int(server.addresses["tcp"].split(":")[1])
+        with pytest.raises(LinkError, match=str(port)):
+            Server(instrument(), tcp=port)
+
+
+def test_the_instrument_outlives_its_clients():
+    with served() as server:
+        with raw(server) as wire:
+            wire.sendall(b"FREQ:STEP 77\n*IDN?\n")
+            line(wire)
+            wire.sendall(b"*IDN?\nFREQ:ST")
+        with raw(server) as wire:
+            wire.sendall(b"FREQ:STEP?\n")
+            assert line(wire) == b"+7.70000000000E+001\n"
+
+
+def test_two_clients_get_their_own_replies():
+    with served() as server, raw(server) as one, raw(server) as two:
+        for _ in range(20):
+            one.sendall(b"*OPT?\n")
+            assert line(one) == b'"1D2"\n'
+            two.sendall(b"SYST:VERS?\n")
+            assert line(two) == b"1992.0\n"
+
+
+def test_a_script_that_only_sleeps_finds_the_sweep_done():
+    with served() as server, raw(server) as wire:
+        wire.sendall(
+            b"*RST;*CLS\nINST:SEL SINE\nFREQ:RES:AUTO OFF\nFREQ:STAR 100;STOP 200;RES 51 PNT/SWP\n"
+            b"SOUR:VOLT 1 VPK\nABOR;:INIT\n"
+        )
+        time.sleep(0.5)
+        wire.sendall(b"STAT:OPER:COND?\nSYST:ERR?\n")
+        assert line(wire) == b"+0\n"
+        assert line(wire) == b'+0,"No error"\n'
+
+
+def test_realtime_takes_its_time():
+    with served(realtime=True) as server, raw(server) as wire:
+        begin = time.monotonic()
+        wire.sendall(b"*RST\n*OPC?\n")
+        assert line(wire) == b"+1\n"
+        assert 0.4 < time.monotonic() - begin < 1.5
+        wire.sendall(
+            b"INST:SEL SINE\nFREQ:RES:AUTO OFF\nFREQ:STAR 100;STOP 200;RES 3 PNT/SWP\n"
+            b"VOLT1:RANG 2 VPK\nVOLT2:RANG 2 VPK\nSOUR:VOLT 1 VPK\nABOR;:INIT;*OPC?\n"
+        )
+        begin = time.monotonic()
+        assert line(wire) == b"+1\n"
+        expected = sum(10 / hz + 0.5 for hz in (100, 133.33, 166.67))
+        assert time.monotonic() - begin == pytest.approx(expected, abs=0.4)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_noise_on_the_wires_breaks_nothing(seed):
+    rng = np.random.default_rng(seed)
+    alphabet = np.frombuffer(b"+\x1b\r\n;:#'\"? *0129ABORINITFREQSYST\x00\xff", dtype=np.uint8)
+    with served() as server:
+        wires = [server.addresses["tcp"], server.addresses["prologix_tcp"]]
+        for place in wires * 3:
+            host, port = place.split(":")
+            with socket.create_connection((host, int(port)), timeout=5.0) as wire:
+                for _ in range(20):
+                    wire.sendall(rng.choice(alphabet, rng.integers(1, 200)).tobytes())
+        with raw(server) as wire:
+            wire.sendall(b"*CLS\n*OPT?\n")
+            assert line(wire).endswith(b'"1D2"\n')
+
+
+# PyVISA, as a script uses it that knows nothing of this project
+
+
+@pytest.fixture
+def manager():
+    pyvisa = pytest.importorskip("pyvisa")
+    manager = pyvisa.ResourceManager("@py")
+    yield manager
+    manager.close()
+
+
+def plain_script(analyser: Any) -> tuple[np.ndarray, np.ndarray]:
+    """A sweep by the book of somebody else."""
+    analyser.write("*RST")
+    analyser.write("*CLS")
+    analyser.write("INST:SEL SINE")
+    analyser.write("FREQ:RES:AUTO OFF")
+    analyser.write("FREQ:STAR 100 HZ")
+    analyser.write("FREQ:STOP 180 HZ")
+    analyser.write("FREQ:RES 401 PNT/SWP")
+    analyser.write("CALC1:FEED 'XFR:POW:RAT 2,1'")
+    analyser.write("CALC1:FORM MLIN")
+    analyser.write("SOUR:VOLT 2 VPK")
+    analyser.write("FORM REAL,64")
+    analyser.write("ABOR;:INIT")
+    while int(analyser.query("STAT:OPER:COND?")) & 16:
+        time.sleep(0.01)
+    x = analyser.query_binary_values("CALC1:X:DATA?", datatype="d", is_big_endian=True)
+    y = analyser.query_binary_values("CALC1:DATA?", datatype="d", is_big_endian=True)
+    assert analyser.query("SYST:ERR?").strip() == '+0,"No error"'
+    return np.array(x), np.array(y)
+
+
+def test_pyvisa_over_a_socket(manager):
+    with served() as server:
+        host, port = server.addresses["tcp"].split(":")
+        analyser = manager.open_resource(
+            f"TCPIP::{host}::{port}::SOCKET", read_termination="\n", write_termination="\n"
+        )
+        analyser.timeout = 5000
+        assert analyser.query("*IDN?") == IDENTITY
+        x, y = plain_script(analyser)
+        assert y == pytest.approx([abs(known_answer(hz)) for hz in x], rel=0.02)
+        analyser.close()
+
+
+@pytest.mark.parametrize("wire", ["PRLGX-TCPIP", "PRLGX-ASRL"])
+def test_pyvisa_through_an_adapter(manager, wire):
+    with served() as server:
+        host, port = server.addresses["prologix_tcp"].split(":")
+        place = {
+            "PRLGX-TCPIP": f"PRLGX-TCPIP0::{host}::{port}::INTFC",
+            "PRLGX-ASRL": f"PRLGX-ASRL0::{server.addresses['prologix_pty']}::INTFC",
+        }[wire]
+        interface = manager.open_resource(place)
+        interface.timeout = 5000
+        analyser = manager.open_resource("GPIB0::11::INSTR")
+        assert analyser.query("*IDN?").strip() == IDENTITY
+        x, y = plain_script(analyser)
+        assert y == pytest.approx([abs(known_answer(hz)) for hz in x], rel=0.02)
+        analyser.write("*ESE 32;*SRE 32")
+        analyser.write("JUNK")
+        assert analyser.read_stb() == 96
+        analyser.clear()
+        assert "-113" in analyser.query("SYST:ERR?")
+        analyser.close()
+        interface.close()
+
+
+# Our own driver over every wire
+
+
+def measured(transport: Any) -> list[complex]:
+    analyser = HP35670A(transport)
+    try:
+        assert analyser.identify().simulated
+        analyser.prepare(100.0, 200.0, PointSettings(2.5, 5, 8))
+        return [point.gain for point in analyser.sweep([100.0, 150.0, 123.5, 200.0])]
+    finally:
+        assert str(analyser.make_safe()) == "confirmed-off"
+        analyser.close()
+
+
+def test_the_same_seed_gives_the_same_points_on_every_wire():
+    expected = measured(Loopback(instrument(seed=7)))
+    assert expected == pytest.approx(
+        [known_answer(hz) for hz in (100.0, 150.0, 123.5, 200.0)], rel=0.02
+    )
+    for wire in ("tcp", "prologix-tcp", "prologix"):
+        with served(seed=7) as server:
+            assert measured(open_transport(urls(server)[wire])) == expected, wire
+    with served(seed=7, dialect="ar488") as server:
+        assert measured(open_transport(urls(server)["prologix"])) == expected
+    assert measured(Loopback(instrument(seed=8))) != expected
+
+
+@pytest.mark.parametrize("wire", ["tcp", "prologix-tcp", "prologix"])
+def test_a_dropped_connection_leaves_the_source_on_and_can_be_met_again(wire):
+    with served("dropped-connection:point=2") as server:
+        transport = open_transport(urls(server)[wire])
+        analyser = HP35670A(transport)
+        analyser.prepare(100.0, 200.0, PointSettings(2.5, 5, 8))
+        with pytest.raises((LinkError, BenchTimeout)):
+            list(analyser.sweep([100.0, 150.0, 200.0]))
+        analyser.close()
+        assert server.instrument.output_vpk == 2.5
+        time.sleep(1.0)
+        again = HP35670A(open_transport(urls(server)[wire]))
+        assert str(again.make_safe()) == "confirmed-off"
+        again.close()
+        assert server.instrument.output_vpk == 0
+
+
+def test_the_name_of_the_terminal_stays_and_goes_with_the_server():
+    with served("dropped-connection:phase=prepare") as server:
+        path = server.addresses["prologix_pty"]
+        assert os.path.realpath(path).startswith("/dev/")
+        with raw(server) as wire:
+            wire.sendall(b"*CLS\n")
+            with pytest.raises(ConnectionError):
+                wire.recv(1)
+    assert not os.path.lexists(path)
+
+
+def test_an_ar488_on_a_terminal_starts_anew_when_it_is_opened():
+    import serial
+
+    with served(dialect="ar488") as server:
+        path = server.addresses["prologix_pty"]
+        with serial.Serial(path, timeout=2.0) as port:
+            assert port.read_until(b"\n") == b"AR488 starting\r\n"
+            port.write(b"++addr 11\n++addr\n")
+            assert port.read_until(b"\n") == b"11\r\n"
+        time.sleep(0.1)
+        with serial.Serial(path, timeout=2.0) as port:
+            port.read_until(b"\n")
+            port.write(b"++addr\n")
+            assert port.read_until(b"\n") == b"1\r\n"
+
+
+# The loopback
+
+
+def test_the_loopback_reports_what_other_wires_report():
+    soon = Deadline.after(0.2)
+    wire = Loopback(instrument())
+    wire.write("*IDN?", soon)
+    assert wire.read(soon) == IDENTITY
+    wire.write("*CLS", soon)
+    with pytest.raises(BenchTimeout, match="CLS"):
+        wire.read(Deadline.after(0.05))
+    with pytest.raises(ProtocolError, match="bytes"):
+        wire.write("X" * 200, soon)
+    wire.write("*IDN?", soon)
+    with pytest.raises(ProtocolError, match="block"):
+        wire.read_block(soon)
+    wire.close()
+    with pytest.raises(LinkError, match="closed"):
+        wire.write("*IDN?", soon)
+
+
+@pytest.mark.parametrize(
+    ("fault", "error"),
+    [("truncated-block:phase=prepare", ProtocolError),
+     ("wrong-length:phase=prepare", ProtocolError),
+     ("dropped-connection:phase=prepare", LinkError), ("silence:phase=prepare", BenchTimeout)],
+)  # fmt: skip
+def test_faults_on_the_loopback(fault, error):
+    wire = Loopback(instrument(fault))
+
+    def read() -> bytes:
+        wire.write("SYST:SET?", Deadline.after(0.1))
+        return wire.read_block(Deadline.after(0.1))
+
+    with pytest.raises(error):
+        read()
+
+
+def test_what_may_follow_sim():
+    wanted = read_loopback_settings(
+        "?ratio=0.5&seed=3&noise=0&speed=realtime&options=1D2,UFF"
+        "&fault=silence:point=4&effect=load-inertia:J_L=0.003"
+    )
+    assert (wanted.ratio, wanted.seed, wanted.noise_v, wanted.realtime) == (0.5, 3, 0.0, True)
+    assert wanted.options == "1D2,UFF"
+    assert wanted.faults[0].point == 4
+    assert wanted.effects[0].id == "load-inertia"
+    assert read_loopback_settings("") == read_loopback_settings("?")
+
+
+@pytest.mark.parametrize(
+    "rest", ["ratio=1", "?ratio=2", "?ratio=x", "?seed=1.5", "?speed=slow", "?colour=red", "?seed",
+             "?seed=1&seed=2", "?noise=-1"],
+)  # fmt: skip
+def test_bad_settings_of_sim_are_refused(rest):
+    with pytest.raises(ConfigurationError):
+        read_loopback_settings(rest)
+
+
+def test_sim_opens_with_the_gimbal_behind_it():
+    wire = open_transport("sim:?seed=1", {"sim": open_loopback(load_unit("adss"), 0.25)})
+    analyser = HP35670A(wire)
+    analyser.prepare(120.0, 160.0, PointSettings(2.5, 10, 10))
+    (point,) = analyser.sweep([150.0])
+    assert 0.01 < abs(point.gain) < 10
+    assert str(analyser.make_safe()) == "confirmed-off"
+
+
+# The verb
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_the_verb_prints_one_ready_line_and_ends_on_a_signal(number):
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tui.cli", "serve", "--unit", "adss", "--ratio", "0.25",
+         "--tcp", "0", "--prologix-tcp", "0", "--prologix-pty", "--speed", "fast",
+         "--fault", "slow-reply:seconds=0.1", "--seed", "3"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        assert process.stdout is not None
+        addresses = json.loads(process.stdout.readline())
+        assert set(addresses) == {"tcp", "prologix_tcp", "prologix_pty"}
+        host, port = addresses["tcp"].split(":")
+        with socket.create_connection((host, int(port)), timeout=5.0) as wire:
+            wire.sendall(b"*IDN?\n")
+            assert line(wire) == IDENTITY.encode() + b"\n"
+        assert os.path.exists(addresses["prologix_pty"])
+        process.send_signal(number)
+        rest, _notes = process.communicate(timeout=10)
+        assert process.returncode == 0
+        assert rest == ""
+        assert not os.path.lexists(addresses["prologix_pty"])
+    finally:
+        process.kill()
+        process.wait()
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "says"),
+    [
+        ([], 2, "--tcp"),
+        (["--tcp", "70000"], 2, "70000"),
+        (["--tcp", "0", "--fault", "nonsense"], 2, "nonsense"),
+        (["--tcp", "0", "--effect", "nonsense"], 2, "nonsense"),
+        (["--tcp", "0", "--noise", "-1"], 2, "noise"),
+        (["--tcp", "0", "--speed", "warp"], 2, "warp"),
+        (["--tcp", "0", "--ratio", "2"], 2, "ratio"),
+        (["--tcp", "0", "--unit", "nobody"], 2, "nobody"),
+    ],
+)
+def test_the_verb_refuses_in_one_line(words, code, says, capsys):
+    from tui.cli import main
+
+    given = dict(zip(words[::2], words[1::2], strict=True))
+    base = {"--unit": "adss", "--ratio": "0.25"} | given
+    assert main(["serve", *(word for pair in base.items() for word in pair)]) == code
+    captured = capsys.readouterr()
+    assert says in captured.err
+    assert len(captured.err.strip().splitlines()) == 1
+    assert captured.out == ""
