@@ -270,7 +270,7 @@ class Dialogue:
             queue = self.recover()
         except LashbenchError as failure:
             return type(error)(f"{error}; no recovery: {failure}; its state is unknown")
-        return type(error)(f"{error}; after a device clear{_told(queue)} its state is unknown")
+        return type(error)(f"{error}; after a device clear{_told(queue)}; its state is unknown")
 
 
 def _told(entries: Iterable[QueueEntry], lead: str = ", its queue held") -> str:
