@@ -24,6 +24,7 @@ __all__ = ["HOST", "Server"]
 
 HOST = "127.0.0.1"
 _TICK_S = 0.005
+_LIVELY_TICK_S = 0.0005
 _IDLE_S = 0.25
 _FAST_RESTART_S = 0.2
 
@@ -181,8 +182,11 @@ class Server:
         wait = _IDLE_S if due is None else min(due, _IDLE_S)
         busy = any(adapter.busy for adapter in self._adapters)
         busy = busy or any(client.waiting for client in self._clients)
-        # A pseudo-terminal is looked at in turns: the selector would spin on a closed one.
-        return min(wait, _TICK_S) if busy or self._terminal is not None else wait
+        if self._terminal is not None:
+            # It is looked at in turns: the selector would spin on one that nobody has open.
+            lively = self._terminal.lively(time.monotonic())
+            return min(wait, _LIVELY_TICK_S if lively else _TICK_S)
+        return min(wait, _TICK_S) if busy else wait
 
     def close(self) -> None:
         """Close every wire."""

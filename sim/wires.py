@@ -22,6 +22,7 @@ __all__ = ["AdapterClient", "Listener", "RawClient", "Terminal"]
 
 _CHUNK = 65536
 _LONGEST_LINE = 4_000_000
+_LIVELY_S = 0.2
 _REPLUG_S = 0.5
 """How long a pulled pseudo-terminal stays away."""
 
@@ -183,6 +184,7 @@ class Terminal:
         self._master = -1
         self._open_here = False
         self._away_until = 0.0
+        self._heard_s = -1.0
         self._out = bytearray()
         self._plug()
 
@@ -224,7 +226,12 @@ class Terminal:
             return False
         data = self._read()
         self._adapter.receive(data, now_s)
+        self._heard_s = now_s
         return bool(data)
+
+    def lively(self, now_s: float) -> bool:
+        """Whether a conversation is going on, so that it is worth looking often."""
+        return now_s - self._heard_s < _LIVELY_S
 
     def _read(self) -> bytes:
         try:

@@ -94,7 +94,7 @@ class ByTheClock:
         self._instrument = instrument
         self._rate = rate
         self._clock = clock
-        self._start_s = clock()
+        self._start_s = clock() - instrument.agenda.now_s / rate
 
     @property
     def _now_s(self) -> float:
