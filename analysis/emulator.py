@@ -23,7 +23,7 @@ TAIL_FREEDOM = 4.0
 GAIN_TOLERANCE = 0.005
 """Spread of the tachometer's gain, which scales the whole response."""
 
-_FIT_ITERATIONS = 5
+_FIT_ITERATIONS = 10
 _SPARE_DRAWS = 6
 _WIDENINGS = 1.25 ** np.arange(10)
 _SMOOTHING_ROWS = 2

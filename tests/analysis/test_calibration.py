@@ -1,0 +1,94 @@
+"""Calibration on a problem whose exact answer is known: intervals cover, and no wider than due."""
+
+import numpy as np
+import pytest
+
+from analysis.calibration import calibrate
+from analysis.emulator import Emulator
+from analysis.observation import observe
+from daq.frf import FrequencyResponse
+
+ROWS = 30
+SCATTER = 0.2
+SENSITIVITY = np.linspace(0.5, 2.0, ROWS)
+
+
+def channels(x, rng, branch=False):
+    """A response whose log gain follows x, in one piece or with errors shared by a half of it."""
+    values = np.zeros((3, ROWS))
+    values[0] = np.log(0.1) + SENSITIVITY * x + SCATTER * rng.standard_normal(ROWS)
+    values[1] = SCATTER * rng.standard_normal(ROWS)
+    values[2] = np.log(0.02) + 0.3 * rng.standard_normal(ROWS)
+    if branch:
+        values[0, : ROWS // 2] += SCATTER * rng.standard_normal()
+    return values
+
+
+def experiment(seed, branch):
+    rng = np.random.default_rng(seed)
+    truth = rng.uniform(0.3, 0.7)
+    x = rng.uniform(0.0, 1.0, 140)
+    drawn = np.array([channels(v, rng, branch) for v in x])
+    measured = channels(truth, rng, branch)
+    response = FrequencyResponse.from_arrays(
+        np.linspace(100.0, 130.0, ROWS),
+        2.5,
+        np.exp(measured[0] + 1j * measured[1]),
+        unit="ADSS",
+        gain_std_db=8.686 * np.exp(measured[2]),
+    )
+    emulator = Emulator(
+        x[:, None], np.zeros((140, 0)), drawn, (slice(0, ROWS),), np.array([0.3]), np.zeros(0)
+    )
+    return truth, calibrate(observe(response), emulator, rng)
+
+
+@pytest.mark.parametrize("branch", [False, True])
+def test_intervals_cover_and_are_not_wider_than_the_best_estimator_deserves(branch):
+    results = [experiment(seed, branch) for seed in range(40)]
+    z = np.array([(c.mean[0] - t) / np.sqrt(c.covariance[0, 0]) for t, c in results])
+    stated = np.median([np.sqrt(c.covariance[0, 0]) for _, c in results])
+    # With 95 % coverage 33 or fewer hits of 40 happen once in 500 times.
+    assert np.count_nonzero(np.abs(z) < 1.96) > 33
+    # The best unbiased estimator's error, from the covariance that made the data.
+    covariance = SCATTER**2 * np.eye(ROWS) + 0.005**2
+    if branch:
+        covariance[: ROWS // 2, : ROWS // 2] += SCATTER**2
+    best = 1.0 / np.sqrt(SENSITIVITY @ np.linalg.solve(covariance, SENSITIVITY))
+    assert best * 0.8 < stated < best * 2.5
+
+
+def test_two_free_numbers_are_told_apart():
+    rng = np.random.default_rng(3)
+    places = rng.uniform(0.0, 1.0, (200, 2))
+
+    def pair(a, b):
+        values = channels(a, rng)
+        values[1] += np.linspace(-1.0, 1.0, ROWS) * b
+        return values
+
+    truth = (0.4, 0.6)
+    measured = pair(*truth)
+    response = FrequencyResponse.from_arrays(
+        np.linspace(100.0, 130.0, ROWS),
+        2.5,
+        np.exp(measured[0] + 1j * measured[1]),
+        unit="ADSS",
+        gain_std_db=8.686 * np.exp(measured[2]),
+    )
+    emulator = Emulator(
+        places,
+        np.zeros((200, 0)),
+        np.array([pair(*p) for p in places]),
+        (slice(0, ROWS),),
+        np.array([0.3, 0.3]),
+        np.zeros(0),
+    )
+    found = calibrate(observe(response), emulator, rng)
+    z = (found.mean - truth) / np.sqrt(np.diag(found.covariance))
+    assert np.abs(z).max() < 4.0
+    assert np.all(np.sqrt(np.diag(found.covariance)) < 0.2)
+    grid = np.stack([m.ravel() for m in np.meshgrid(*[np.linspace(0, 1, 21)] * 2)], axis=1)
+    weight = found.density(grid)
+    assert weight.sum() == pytest.approx(1.0)
+    assert np.abs(weight @ grid - found.mean).max() < 0.1

@@ -1,0 +1,121 @@
+"""The estimate of stage backlash: known truths come back, inside intervals that cover."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.estimate import Estimate, estimate_features, estimate_response
+from analysis.paper_estimate import fit_features
+from daq.errors import InputError
+from daq.formats import read_response
+from daq.frf import DB_PER_NEPER, FrequencyResponse
+from daq.plan import SweepPlan, spaced_frequencies
+from sim.response import simulate
+from sim.unit import load_unit
+
+PRACTICE = Path(__file__).parents[1] / "data" / "practice"
+SHORT = SweepPlan(
+    spaced_frequencies(115.0, 160.0, 19), (2.5,), settle_cycles=10, integrate_cycles=12
+)
+
+
+def on_a_bench(response, seed, noise_v=5e-4):
+    """A simulated response as a bench reads it: noise added, errors stated as a bench does."""
+    rng = np.random.default_rng(seed)
+    noise = noise_v / response.source_vpk
+    reading = rng.standard_normal((2, len(response))) * noise
+    gain = response.gain + reading[0] + 1j * reading[1]
+    along = response.gain_std_db / DB_PER_NEPER
+    across = np.radians(response.phase_std_deg)
+    total = np.sqrt(along**2 + across**2 + 2.0 * (noise / np.abs(gain)) ** 2)
+    return replace(response, gain=gain, gain_std_db=DB_PER_NEPER * total)
+
+
+def within(found, truth, sigmas):
+    return abs(found.value - truth) <= sigmas * found.std
+
+
+@pytest.mark.parametrize("ratio", [0.15, 0.6])
+def test_a_short_sweep_tells_the_ratio_of_a_machine_off_its_datasheet(ratio):
+    unit = load_unit("adss")
+    machine = unit.with_parameters(
+        R_m=1.004 * unit.motor.R_m, J_L=0.995 * unit.load.J_L, k_ts=1.005 * unit.electronics.k_ts
+    )
+    measured = on_a_bench(simulate(machine, ratio, SHORT, seed=77), seed=1)
+    found = estimate_response(measured, unit)
+    # Four standard deviations: missed by chance in one of some thousand runs.
+    assert within(found.contribution_ratio, ratio, 4.0)
+    assert 0.002 < found.contribution_ratio.std < 0.15
+    low, high = found.contribution_ratio.interval95
+    assert 0.0 <= low < high <= 1.0
+    b_t = unit.backlash.b_t_deg
+    r = found.contribution_ratio.value
+    assert found.b1_deg.value == pytest.approx(r * b_t * unit.stage2.N)
+    assert found.b2_deg.value == pytest.approx((1.0 - r) * b_t)
+    assert (found.b_t_deg.value, found.b_t_deg.std) == (b_t, 0.0)
+
+
+def test_without_phase_and_errors_it_still_answers_and_is_not_surer():
+    unit = load_unit("adss")
+    measured = on_a_bench(simulate(unit, 0.5, SHORT, seed=5), seed=2)
+    bare = FrequencyResponse.from_arrays(
+        measured.frequency_hz,
+        measured.source_vpk,
+        np.abs(measured.gain),
+        phase_known=False,
+        unit="ADSS",
+        settle_cycles=10,
+        integrate_cycles=12,
+    )
+    full, less = estimate_response(measured, unit), estimate_response(bare, unit)
+    assert within(less.contribution_ratio, 0.5, 4.0)
+    assert less.contribution_ratio.std > 0.8 * full.contribution_ratio.std
+
+
+def test_the_same_seed_gives_the_same_answer():
+    unit = load_unit("adss")
+    measured = on_a_bench(simulate(unit, 0.4, SHORT, seed=9), seed=3)
+    one, two = (estimate_response(measured, unit, seed=4).to_json() for _ in range(2))
+    assert one == two
+    json.dumps(one, allow_nan=False)
+
+
+@pytest.mark.parametrize(("name", "truth"), [("practice-09", 0.9328), ("practice-10", 0.5484)])
+def test_practice_sets_with_nothing_hidden(name, truth):
+    response = read_response(PRACTICE / f"{name}.csv")
+    found: Estimate = estimate_response(response, load_unit(response.unit))
+    low, high = found.contribution_ratio.interval95
+    assert abs(found.contribution_ratio.value - truth) < 0.05
+    assert low < truth < high
+    assert found.contribution_ratio.std < 0.06
+    assert not found.warnings
+
+
+def test_the_papers_adss_frequencies_agree_with_the_microscope():
+    found = estimate_features(128.0, 137.0, load_unit("adss"))
+    low, high = found.contribution_ratio.interval95
+    assert low < 0.23 < high
+    assert high - low < 0.5
+    assert found.curve.minimum[0] < 10.0
+    assert not found.warnings
+    assert "error index" in "\n".join(found.summary())
+
+
+def test_the_papers_edss_frequencies_are_warned_about():
+    # No ratio brings the paper's model near 40 and 75 Hz: the least index is about 20 Hz.
+    found = fit_features(40.0, 75.0, load_unit("edss"))
+    least, std = found.curve.minimum
+    assert 15.0 < least < 25.0
+    assert least > 3.0 * std
+    assert any("lacks something" in warning for warning in found.warnings)
+
+
+@pytest.mark.parametrize(
+    ("arf", "rf"), [(137.0, 128.0), (0.0, 100.0), (-5.0, 10.0), (float("nan"), 100.0)]
+)
+def test_frequencies_that_cannot_be_are_refused(arf, rf):
+    with pytest.raises(InputError, match="ARF"):
+        estimate_features(arf, rf, load_unit("adss"))

@@ -1,0 +1,94 @@
+"""Channels of comparison: what is kept of a response, and what a simulation is made to show."""
+
+import numpy as np
+import pytest
+
+from analysis.observation import channels_of_cycles, observe
+from daq.errors import AnalysisError
+from daq.frf import DB_PER_NEPER, FrequencyResponse, PointFlag
+
+
+def response(levels=(1.5, 2.5), frequencies=(100.0, 110.0, 120.0), **changes):
+    f = np.tile(frequencies, len(levels))
+    v = np.repeat(levels, len(frequencies))
+    fields = {
+        "gain": 0.1 * np.exp(1j * np.linspace(-1.0, 1.0, len(f))),
+        "unit": "ADSS",
+        "gain_std_db": np.linspace(0.1, 1.0, len(f)),
+        "settle_cycles": 7,
+        "integrate_cycles": 9,
+        "direction": "down",
+    }
+    return FrequencyResponse.from_arrays(f, v, **{**fields, **changes})
+
+
+def test_channels_are_log_gain_phase_and_log_scatter():
+    one = response()
+    seen = observe(one)
+    np.testing.assert_allclose(seen.values[0], np.log(0.1))
+    np.testing.assert_allclose(seen.values[1], np.angle(one.gain))
+    np.testing.assert_allclose(np.exp(seen.values[2]) * DB_PER_NEPER, one.gain_std_db)
+
+
+def test_rows_come_by_level_and_ascending_frequency_whatever_the_file_order():
+    one = response()
+    order = np.array([4, 1, 5, 0, 3, 2])
+    shuffled, plain = observe(one.take(order)), observe(one)
+    np.testing.assert_array_equal(shuffled.frequency_hz, plain.frequency_hz)
+    np.testing.assert_array_equal(shuffled.values, plain.values)
+    assert [(b.start, b.stop) for b in plain.blocks] == [(0, 3), (3, 6)]
+
+
+def test_levels_on_one_grid_make_one_plan_with_the_sweeps_own_procedure():
+    ((plan, rows),) = observe(response()).plans
+    assert plan.levels_vpk == (1.5, 2.5)
+    assert (plan.settle_cycles, plan.integrate_cycles, plan.direction) == (7, 9, "down")
+    np.testing.assert_array_equal(rows, np.arange(6))
+
+
+def test_levels_on_different_grids_are_simulated_apart():
+    parts = observe(response().take(np.array([0, 1, 2, 3, 5]))).plans
+    assert [(p.levels_vpk, len(p.frequencies_hz), list(r)) for p, r in parts] == [
+        ((1.5,), 3, [0, 1, 2]),
+        ((2.5,), 2, [3, 4]),
+    ]
+
+
+def test_what_is_unknown_stays_unknown():
+    seen = observe(response(phase_known=False, gain=0.1, gain_std_db=np.nan))
+    assert np.all(np.isnan(seen.values[1]))
+    assert np.all(np.isnan(seen.values[2]))
+    assert np.all(np.isfinite(seen.values[0]))
+
+
+def test_spoilt_and_overloaded_points_do_not_count():
+    flags = [0, PointFlag.SPOILT, 0, 0, PointFlag.OVERLOAD, 0]
+    assert list(observe(response(flags=flags)).frequency_hz) == [100.0, 120.0, 100.0, 120.0]
+    with pytest.raises(AnalysisError, match="no usable point"):
+        observe(response(flags=PointFlag.SPOILT))
+
+
+def test_noise_is_that_of_the_quietest_points():
+    rng = np.random.default_rng(1)
+    f = np.linspace(100.0, 200.0, 200)
+    gain = np.full(200, 0.1)
+    scatter = np.hypot(
+        np.sqrt(2) * 5e-4 / 2.5 / gain, rng.exponential(0.05, 200) * (rng.random(200) < 0.8)
+    )
+    one = FrequencyResponse.from_arrays(
+        f, 2.5, gain, unit="ADSS", gain_std_db=DB_PER_NEPER * scatter
+    )
+    assert observe(one).noise_v == pytest.approx(5e-4, rel=0.1)
+
+
+def test_simulated_channels_show_mean_scatter_and_noise():
+    rng = np.random.default_rng(2)
+    truth = np.array([0.2 * np.exp(0.7j), 0.05 * np.exp(-2.0j)])
+    noise = np.array([0.01, 0.02])
+    cycles = 4000
+    spread = rng.standard_normal((2, cycles)) + 1j * rng.standard_normal((2, cycles))
+    channels = channels_of_cycles(truth[:, None] * (1 + 0.3 * spread), noise)
+    np.testing.assert_allclose(channels[0], np.log(np.abs(truth)), atol=0.02)
+    np.testing.assert_allclose(channels[1], np.angle(truth), atol=0.02)
+    expected = np.sqrt(2 * 0.3**2 / cycles + 2 * noise**2)
+    np.testing.assert_allclose(np.exp(channels[2]), expected, rtol=0.02)
