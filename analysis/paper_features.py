@@ -74,6 +74,8 @@ class Compared:
         Share of those runs below the printed frequency, ties counted half, %.
     exact_hz, exact_db, exact_std_hz
         The same procedure on the exact engine: medians and spread of single runs.
+    shift_std_hz
+        Standard error of `shift_hz`: of the difference of both medians.
     """
 
     published_hz: float
@@ -88,6 +90,7 @@ class Compared:
     exact_hz: float
     exact_db: float
     exact_std_hz: float
+    shift_std_hz: float
 
     @property
     def shift_hz(self) -> float:
@@ -136,7 +139,13 @@ def compare(
         exact_hz=float(np.median(exact_hz)),
         exact_db=float(np.median(exact_db)),
         exact_std_hz=_spread(exact_hz),
+        shift_std_hz=math.hypot(_median_error(runs_hz), _median_error(exact_hz)),
     )
+
+
+def _median_error(runs: NDArray[np.float64]) -> float:
+    # The median of normal draws is sqrt(pi/2) times as uncertain as their mean.
+    return math.sqrt(0.5 * math.pi / runs.size) * _spread(runs)
 
 
 def _spread(runs: NDArray[np.float64]) -> float:

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 __all__ = ["summarise"]
 
 _HEAD = (
-    "unit   ratio       printed      paper's scheme      runs    below     exact engine   shift"
-    "      printed    scheme"
+    "unit   ratio       printed      paper's scheme      runs    below     exact engine       shift"
+    "       printed    scheme"
 )
 _UNITS = (
-    "           %            Hz          Hz (1 std)        Hz        %       Hz (1 std)      Hz"
+    "           %            Hz          Hz (1 std)        Hz        %       Hz (1 std)  Hz (1 std)"
     "           dB        dB"
 )
 
@@ -51,6 +51,7 @@ def _line(row: PublishedRow, feature: Compared) -> str:
         f"{row.unit:<6}{row.ratio_percent:>6}{feature.published_hz:>14.0f}"
         f"{feature.value_hz:>14.1f} ({feature.std_hz:.1f}){runs:>12}{feature.percentile:>7.0f}"
         f"{feature.exact_hz:>11.1f} ({feature.exact_std_hz:.1f}){feature.shift_hz:>+8.1f}"
+        f" ({feature.shift_std_hz:.1f})"
         f"{printed_db:>13}{feature.value_db:>10.1f}"
     )
 

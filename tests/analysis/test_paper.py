@@ -63,6 +63,8 @@ def test_comparison_places_the_printed_number_among_the_runs():
     assert (got.value_hz, got.low_hz, got.high_hz) == (131.0, 130.0, 136.0)
     assert got.percentile == pytest.approx(40.0)
     assert got.shift_hz == -3.0
+    # sqrt(pi/2) times the errors of the means: 2.345/sqrt(5) and 1.414/sqrt(2).
+    assert got.shift_std_hz == pytest.approx(1.2533 * math.hypot(1.0488, 1.0), rel=1e-3)
     assert math.isnan(got.published_db)
     assert not got.differs_hz
     assert not got.differs_db
