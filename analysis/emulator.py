@@ -197,7 +197,8 @@ def _fit_tailed(
     used = float(np.einsum("ij,ji->", hat, basis * weight[:, None]))
     total = float(weight.sum())
     variance = np.asarray(scale * total / max(total - used, 1.0), dtype=float)
-    return _Fit(coefficients, variance, float(hat[0] @ hat[0]))
+    leverage = float(hat[0] @ hat[0])
+    return _Fit(np.asarray(coefficients, dtype=float), variance, leverage)
 
 
 def _basis(offset: NDArray[np.float64], deviations: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -66,7 +66,8 @@ def build_propagator(
         end[j] = constant[j] if law.law is Law.FRICTION else rising[j]
         kick[j] = carry @ end[j] + constant[j] - end[j]
     jw = 2j * np.pi * frequency_hz
-    drive = np.linalg.solve(jw * np.eye(n) - system.A, system.b.astype(complex))
+    response = np.linalg.solve(jw * np.eye(n) - system.A, system.b.astype(complex))
+    drive = np.asarray(response, dtype=complex)
     return Propagator(
         frequency_hz=frequency_hz,
         step_s=h,

@@ -8,7 +8,7 @@ error bar of every point. It judges nothing.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -21,7 +21,7 @@ from daq.frf import DB_PER_NEPER, FrequencyResponse, PointFlag
 from daq.plan import SweepPlan
 from sim.assembly import Law, PiecewiseLinearSystem
 from sim.effects import EffectSetting, drivetrain_with
-from sim.engine import HARMONICS, LONGEST_STEP_S, Stretch, advance
+from sim.engine import HARMONICS, LONGEST_STEP_S, Motion, Stretch, advance
 from sim.unit import Unit
 
 __all__ = [
@@ -310,6 +310,7 @@ def _sweep(
     parameters, start = _parameters(servos, len(levels)), _start(servos, len(levels))
     shape = (len(visited), plan.integrate_cycles, HARMONICS, len(amplitude))
     kept = np.empty(shape, dtype=complex)
+    motions: Iterator[Motion]
     if plan.from_rest:
         motions = (next(advance(system, parameters, start, [s], longest_step_s)) for s in stretches)
     else:
