@@ -46,7 +46,7 @@ _FULL_DISPLAYS = (401, 801)
 _HELD_BACK = 2
 """Newest displayed points not believed while the sweep runs: the next one may move them."""
 
-_LOOK_EVERY = 8
+_LOOK_EVERY = 3
 """Polls between two looks at the picture of a running sweep."""
 
 
@@ -142,8 +142,8 @@ class _Progress:
 
     upward: bool
     done: set[int] = field(default_factory=set)
-    seen: Voltage = Voltage(0)
-    """Status bits since the last look; they count for the points held back then as well."""
+    held: dict[int, Voltage] = field(default_factory=dict)
+    """Rows held back at the last look, with the status bits that were seen then."""
 
 
 def _set_up_sweep(
@@ -182,14 +182,17 @@ def _new_points(
         _confirm_unchanged(dialogue, setup)
     if held_back and not state & DeviceState.DISPLAY_READY:
         return
-    before, progress.seen = progress.seen, _read_voltage(dialogue)
-    flags = _flags(before | progress.seen)
     picture = read_picture(dialogue, setup.axis_hz)
+    # Read after the picture: an overload of the next point may count for these, none is lost.
+    seen = _read_voltage(dialogue)
     rows = np.flatnonzero(picture.measured) if held_back else np.arange(len(picture.measured))
-    ordered = rows if progress.upward else rows[::-1]
-    for row in ordered[: len(ordered) - held_back].tolist():
+    ordered = (rows if progress.upward else rows[::-1]).tolist()
+    sure = ordered[: len(ordered) - held_back]
+    held, progress.held = progress.held, dict.fromkeys(ordered[len(sure) :], seen)
+    for row in sure:
         if row not in progress.done:
             progress.done.add(row)
+            flags = _flags(seen | held.get(row, Voltage(0)))
             yield _point(setup, picture, row, float(picture.frequency_hz[row]), flags)
 
 

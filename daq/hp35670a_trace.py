@@ -7,6 +7,7 @@ datum is believed (programming guide, chapters 8, 18 and 23).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,7 +83,9 @@ def prove_byte_order(axis_hz: NDArray[np.float64], start_hz: float, stop_hz: flo
 def _is_ramp(axis_hz: NDArray[np.float64], start_hz: float, stop_hz: float) -> bool:
     if len(axis_hz) < 2 or not np.all(np.isfinite(axis_hz)):
         return False
-    step = (stop_hz - start_hz) / (len(axis_hz) - 1) + GRID_HZ
+    # The axis may leave out its last point; with log spacing the last step is the widest.
+    widest_hz = max(stop_hz - start_hz, stop_hz * math.log(stop_hz / start_hz))
+    step = widest_hz / (len(axis_hz) - 1) + GRID_HZ
     return bool(
         np.all(np.diff(axis_hz) > 0)
         and abs(axis_hz[0] - start_hz) <= step
