@@ -9,9 +9,8 @@ hold it, stop it or abort it.
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -22,6 +21,7 @@ from daq.errors import LashbenchError, MeasurementError
 from daq.frf import PointFlag
 from daq.limits import tightest
 from daq.preflight import check_identity, check_source, check_trial, take_trial
+from daq.repeat import compare
 from daq.session_agenda import Pace
 from daq.session_events import (
     CheckLine,
@@ -46,10 +46,8 @@ _LOOK_S = 0.05
 """How long a pause sleeps before it looks at the control again."""
 _SAFE_TRIES = 10
 """How often the safe-off recipe is begun again when a key press breaks it."""
-_REPEATS_SIGMA = 6.0
-"""Standard errors within which a run-in point must repeat the stored one."""
-_REPEATS_DB = 0.05
-"""Difference between two visits that is no sign of anything, dB."""
+_REFINED_RUN_IN = 8
+"""Points of the plan driven before those that refinement asks for."""
 
 
 class Session:
@@ -87,8 +85,9 @@ class Session:
         self._pace = Pace()
         self._in_hand: Place | None = None
         self._all_taken = False
+        self._refining = False
 
-    def run(self) -> Iterator[SessionEvent]:
+    def run(self) -> Generator[SessionEvent, None, None]:
         """Measure, yielding what happens; the last record is `Finished`.
 
         Closing the iterator early ends the session as an interruption does.
@@ -202,9 +201,12 @@ class Session:
             yield [float(hz) for hz in self._plan.visited_hz]
             return
         adaptive = AdaptiveSweep(self._plan, request.refinement, request.judge)
+        self._refining = False
         while frequencies := adaptive.ask():
             yield frequencies
+            self._refining = True
             adaptive.tell([self._agenda.stored(source_vpk, hz).point for hz in frequencies])
+        self._refining = False
         self._journal.note(
             "refinement",
             f"{adaptive.reason} at {source_vpk:g} V peak after {len(adaptive.points)} points",
@@ -217,13 +219,14 @@ class Session:
             min(plan.frequencies_hz), max(plan.frequencies_hz), self._settings(source_vpk)
         )
         yield from self._journal.settings(readback)
-        lead = self._agenda.run_in(source_vpk, run[0], self._request.run_in_points)
+        lead = self._lead(source_vpk, run[0])
         self._journal.source(SourceState.ON)
         yield LevelStarted(source_vpk, len(run))
         points = self._analyser.sweep([*lead, *run])
         try:
-            for requested_hz in lead:
-                yield from self._run_in(source_vpk, requested_hz, _next(points, requested_hz))
+            yield from self._run_in(source_vpk, lead, points)
+            if self.control.cut is not None:
+                return
             for requested_hz in run:
                 self._in_hand = source_vpk, requested_hz
                 yield self._commit(self._in_hand, _next(points, requested_hz))
@@ -250,17 +253,30 @@ class Session:
             self._pace.remaining_s(before_s - left_s, left_s),
         )
 
+    def _lead(self, source_vpk: float, first_hz: float) -> list[float]:
+        """What is driven again before the sweep goes on, for the motion to arrive as it would."""
+        if self._refining:
+            return self._agenda.coarse_run_in(source_vpk, first_hz, _REFINED_RUN_IN)
+        return self._agenda.run_in(source_vpk, first_hz, self._request.run_in_points)
+
     def _run_in(
-        self, source_vpk: float, requested_hz: float, point: SweepPoint
+        self, source_vpk: float, lead: Sequence[float], points: Iterator[SweepPoint]
     ) -> Iterator[SessionEvent]:
-        stored = self._agenda.stored(source_vpk, requested_hz).point
-        sigma = _distance(point, stored)
-        yield RunIn(source_vpk, point, sigma)
-        if sigma is not None and sigma > _REPEATS_SIGMA:
-            yield self._journal.warned(
-                f"{requested_hz:g} Hz at {source_vpk:g} V peak was {sigma:.1f} standard errors "
-                "away when driven again: the conditions are not those of before"
-            )
+        pairs = []
+        for requested_hz in lead:
+            point = _next(points, requested_hz)
+            pairs.append((point, self._agenda.stored(source_vpk, requested_hz).point))
+            yield RunIn(source_vpk, *pairs[-1])
+            if self.control.cut is not None:
+                return
+        repeated = compare(pairs)
+        if repeated is not None:
+            self._journal.note("run-in", f"at {source_vpk:g} V peak: {repeated}")
+            if repeated.differs:
+                yield self._journal.warned(
+                    f"driven again at {source_vpk:g} V peak: {repeated}; the conditions are not "
+                    "those of before"
+                )
 
     def _hold(self) -> Iterator[SessionEvent]:
         state = self._make_safe()
@@ -379,14 +395,3 @@ def _close(points: Iterator[SweepPoint]) -> None:
     close = getattr(points, "close", None)
     if close is not None:
         close()
-
-
-def _distance(point: SweepPoint, stored: SweepPoint) -> float | None:
-    """Difference of two visits in standard errors of the magnitude; None if one is unknown."""
-    if point.gain_std_db is None or stored.gain_std_db is None:
-        return None
-    sizes = abs(point.gain), abs(stored.gain)
-    if not all(size > 0 and math.isfinite(size) for size in sizes):
-        return None
-    apart_db = abs(20.0 * math.log10(sizes[0] / sizes[1]))
-    return apart_db / math.hypot(point.gain_std_db, stored.gain_std_db, _REPEATS_DB)

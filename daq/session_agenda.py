@@ -103,8 +103,14 @@ class Agenda:
                 return level, run[0]
         return None
 
-    def run_in(self, source_vpk: float, first_hz: float, points: int) -> list[float]:
-        """Stored frequencies that an unbroken sweep would have visited just before, in order."""
+    def run_in(self, source_vpk: float, first_hz: float, points: int | None) -> list[float]:
+        """Stored frequencies that an unbroken sweep would have visited just before, in order.
+
+        Parameters
+        ----------
+        points
+            At most so many; None for all of the level.
+        """
         down = self._plan.direction == "down"
         before = [
             hz
@@ -113,6 +119,12 @@ class Agenda:
         ]
         nearest = sorted(before, reverse=not down)[:points]
         return nearest[::-1]
+
+    def coarse_run_in(self, source_vpk: float, first_hz: float, points: int) -> list[float]:
+        """As `run_in`, of the plan's own frequencies only: refined ones lie too close together."""
+        coarse = {float(hz) for hz in self._plan.frequencies_hz}
+        lead = [hz for hz in self.run_in(source_vpk, first_hz, None) if hz in coarse]
+        return lead[-points:]
 
     def _add(self, places: Iterable[tuple[float, float]]) -> None:
         for place in places:

@@ -62,15 +62,11 @@ class LevelStarted:
 
 @dataclass(frozen=True, slots=True)
 class RunIn:
-    """A stored point driven again so that the motion arrives as in an unbroken sweep; not stored.
-
-    `sigma` is its distance from the stored one in standard errors of the
-    magnitude, None where no error is known.
-    """
+    """A stored point driven again so that the motion arrives as in an unbroken sweep; not kept."""
 
     source_vpk: float
     point: SweepPoint
-    sigma: float | None
+    stored: SweepPoint
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,7 +35,9 @@ class SessionRequest:
     plausible
         What the trial point must look like.
     run_in_points
-        Stored points driven again, unrecorded, before a sweep goes on in the middle.
+        Stored points driven again, unrecorded, before a level goes on in the
+        middle; None for all of that level so far. A servo with play has
+        branches that only an unbroken sweep stays on, so all is the preset.
     refinement, judge
         Go on around the features after the plan, see `daq.adaptive`.
 
@@ -52,7 +54,7 @@ class SessionRequest:
     slew_vpk_per_s: float = 10.0
     input_range_vpk: tuple[float | None, float | None] = (None, None)
     plausible: Plausibility = Plausibility()
-    run_in_points: int = 3
+    run_in_points: int | None = None
     refinement: Refinement | None = None
     judge: Judge | None = None
 
@@ -66,5 +68,7 @@ class SessionRequest:
                     f"band {low_hz:g} to {high_hz:g} Hz to measure again: give a measurement to "
                     "resume, and the lower frequency first"
                 )
+        if self.run_in_points is not None and self.run_in_points < 0:
+            raise InputError(f"a run-in of {self.run_in_points} points is none; give 0 or more")
         if (self.refinement is None) != (self.judge is None):
             raise InputError("refinement needs a target and someone to judge it")

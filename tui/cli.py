@@ -25,6 +25,9 @@ VERBS = {
     "extract": ("tui.commands.extract:extract", "Read ARF, RF and damping out of a response."),
     "estimate": ("tui.commands.estimate:estimate", "Tell the backlash of each gear stage."),
     "reproduce": ("tui.commands.reproduce:reproduce", "Compute the paper's tables and figures."),
+    "measure": ("tui.commands.measure:measure", "Measure a unit on the bench."),
+    "history": ("tui.commands.history:history", "List a bench's measurements and their trend."),
+    "export": ("tui.commands.export:export", "Write a stored measurement to a file."),
     "serve": ("tui.commands.serve:serve", "Serve a simulated 35670A on a wire."),
     "demo": ("tui.commands.demo:demo", "Do the whole job without hardware."),
 }

@@ -180,9 +180,9 @@ def test_stop_keeps_the_point_in_hand_and_can_be_resumed(store):
     rest = measured(store, again(1), analyser)
     assert rest[0].done == 5
     assert rest[-1].state == "complete"
-    # Trial, three points of run-in, then the rest; none of them marked as retaken.
-    assert [f for _, f in analyser.driven[:5]] == [100.0, 120.0, 130.0, 140.0, 150.0]
-    assert len(of(RunIn, rest)) == 3
+    # Trial, the level once more from its beginning, then the rest; none marked as retaken.
+    assert [f for _, f in analyser.driven[:7]] == [100.0, 100.0, 110.0, 120.0, 130.0, 140.0, 150.0]
+    assert len(of(RunIn, rest)) == 5
     assert len(of(PointStored, rest)) == 13
     assert not np.any(store.response(1).flags)
 
@@ -273,7 +273,7 @@ def test_a_pause_switches_the_source_off_and_goes_on_with_a_run_in(store):
 
     events = Watch(Session(analyser, store, new(), control), 4, hold).run()
     kinds = [type(e) for e in events if isinstance(e, PointStored | RunIn | Paused | GoingOn)]
-    assert kinds == ([PointStored] * 4 + [Paused, GoingOn] + [RunIn] * 3 + [PointStored] * 14)
+    assert kinds == ([PointStored] * 4 + [Paused, GoingOn] + [RunIn] * 4 + [PointStored] * 14)
     assert seen_off == [True]
     assert of(Paused, events)[0].source_state is SourceState.CONFIRMED_OFF
     assert events[-1].state == "complete"
@@ -370,9 +370,20 @@ def test_a_run_in_point_that_does_not_repeat_is_told(store):
     Watch(Session(FakeAnalyser(), store, new(), control), 5, control.stop).run()
     changed = FakeAnalyser(gain=lambda f: 1.1 * known_gain(f))
     events = measured(store, again(1), changed)
-    assert len(of(Warned, events)) == 3
-    assert "conditions are not those of before" in of(Warned, events)[0].text
-    assert [e.kind for e in store.events(1)].count("warning") == 3
+    (warning,) = of(Warned, events)
+    assert "5 points came again within 0.83 dB" in warning.text
+    assert "conditions are not those of before" in warning.text
+    assert [e.kind for e in store.events(1)].count("warning") == 1
+
+
+@pytest.mark.parametrize("points", [0, 2, 100])
+def test_a_shorter_run_in_can_be_asked_for(store, points):
+    control = SessionControl()
+    Watch(Session(FakeAnalyser(), store, new(), control), 14, control.stop).run()
+    analyser = FakeAnalyser()
+    measured(store, again(1, run_in_points=points), analyser)
+    lead = [100.0, 110.0, 120.0, 130.0, 140.0][5 - min(points, 5) :]
+    assert analyser.driven[1:] == [(1.0, f) for f in [*lead, 150.0, 160.0, 170.0, 180.0]]
 
 
 def test_other_settings_than_before_are_told(store):

@@ -1,0 +1,83 @@
+"""How an estimated quantity changes from measurement to measurement, with its error.
+
+Owns the straight line through values with error bars over time. What the
+values mean, and whether a change matters, is for others to say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from daq.errors import InputError
+
+__all__ = ["SECONDS_PER_DAY", "Trend", "fit_trend"]
+
+SECONDS_PER_DAY = 86400.0
+
+
+@dataclass(frozen=True, slots=True)
+class Trend:
+    """A line through values over time.
+
+    Parameters
+    ----------
+    mean, mean_std
+        Weighted mean of the values and one standard error.
+    slope_per_day, slope_std
+        Change per day and one standard error; None where fewer than two
+        moments or no error bars leave it open.
+    chi2, degrees
+        Squared distance of the values from the line (or from the mean where
+        there is no slope) in units of their errors, and degrees of freedom.
+    """
+
+    mean: float
+    mean_std: float
+    slope_per_day: float | None
+    slope_std: float | None
+    chi2: float
+    degrees: int
+
+
+def fit_trend(
+    times_s: Sequence[float], values: Sequence[float], stds: Sequence[float]
+) -> Trend | None:
+    """Fit a straight line by weighted least squares.
+
+    Parameters
+    ----------
+    times_s
+        Moments in s, any origin, shape (n,).
+    values, stds
+        Values and one standard error each, shape (n,); errors above 0.
+
+    Returns
+    -------
+    Trend or None
+        None without a single value.
+
+    Raises
+    ------
+    InputError
+        If the lists differ in length or an error is not above 0.
+    """
+    if not len(times_s) == len(values) == len(stds):
+        raise InputError("trend: times, values and errors differ in number")
+    if not values:
+        return None
+    days, y = np.asarray(times_s, float) / SECONDS_PER_DAY, np.asarray(values, float)
+    weight = 1.0 / np.square(np.asarray(stds, float))
+    if not np.all(np.isfinite(weight)) or not np.all(np.isfinite(y)):
+        raise InputError("trend: every value needs an error above 0")
+    total = float(weight.sum())
+    mean, middle = float(weight @ y / total), float(weight @ days / total)
+    spread = float(weight @ np.square(days - middle))
+    if spread <= 0.0:
+        chi2 = float(weight @ np.square(y - mean))
+        return Trend(mean, total**-0.5, None, None, chi2, len(y) - 1)
+    slope = float(weight @ ((days - middle) * y) / spread)
+    chi2 = float(weight @ np.square(y - mean - slope * (days - middle)))
+    return Trend(mean, total**-0.5, slope, spread**-0.5, chi2, len(y) - 2)

@@ -1,0 +1,106 @@
+"""From an instrument's address to a session on it, for the command line and the screens alike.
+
+Owns how lock, history, connection, session and watchdog are put together and
+taken apart again. It prints nothing and decides nothing about a measurement.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from contextlib import ExitStack, closing
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from daq.control import SessionControl
+    from daq.hp35670a import HP35670A
+    from daq.limits import Limits
+    from daq.session_events import SessionEvent
+    from daq.session_request import SessionRequest
+    from sim.unit import Unit
+
+__all__ = ["bench_session", "connect", "drives_hardware", "unit_limits"]
+
+
+def drives_hardware(url: str) -> bool:
+    """Whether something outside of this program may move when that address is measured."""
+    return not url.strip().startswith(("sim:", "replay:"))
+
+
+def unit_limits(unit: Unit) -> Limits:
+    """What a unit may be driven with, as limits of a session."""
+    from daq.limits import Limits
+
+    limits = unit.limits
+    return Limits(
+        set_by=f"unit {unit.name}",
+        source_vpk=limits.source_vpk,
+        source_offset_v=limits.source_offset_v,
+        start_hz=limits.start_hz,
+        stop_hz=limits.stop_hz,
+    )
+
+
+def connect(url: str, unit: Unit, transcript: Path | None = None) -> HP35670A:
+    """Open the instrument at an address; ``sim:`` is a simulated one with the unit behind it.
+
+    Parameters
+    ----------
+    transcript
+        New file that records the dialogue.
+
+    Raises
+    ------
+    ConfigurationError, LinkError, InputError
+        As `daq.transports.open.open_transport`.
+    """
+    from daq.hp35670a import HP35670A
+    from daq.transports.open import TransportFactory, open_transport
+
+    factories: dict[str, TransportFactory] = {}
+    if url.strip().startswith("sim:"):
+        from sim.loopback import open_loopback
+
+        factories["sim"] = open_loopback(unit)
+    return HP35670A(open_transport(url, factories, record=transcript))
+
+
+def bench_session(
+    url: str,
+    unit: Unit,
+    history: Path,
+    request: SessionRequest,
+    control: SessionControl,
+    transcript: Path | None = None,
+) -> Generator[SessionEvent, None, None]:
+    """Run a session and yield what it tells; close the iterator to end it early.
+
+    On hardware a watchdog stands by from before the first volt until the
+    source is proven off.
+
+    Raises
+    ------
+    LashbenchError
+        Before the first record: if history, lock or instrument cannot be had.
+        After the last: the fault that ended the session.
+    """
+    from daq.bench_lock import BenchLock
+    from daq.session import Session
+    from daq.session_events import Opened
+    from daq.store import Store
+    from daq.watchdog import Watchdog
+
+    is_real = drives_hardware(url)
+    reopen: Callable[[], HP35670A] | None = (lambda: connect(url, unit)) if is_real else None
+    with ExitStack() as stack:
+        store = stack.enter_context(Store(history, create=request.resume is None))
+        lock = stack.enter_context(BenchLock(history))
+        analyser = connect(url, unit, transcript)
+        stack.callback(analyser.close)
+        session = Session(analyser, store, request, control, reopen)
+        with closing(session.run()) as events:
+            for event in events:
+                if isinstance(event, Opened) and is_real:
+                    watchdog = Watchdog(url, history, event.measurement, lock.descriptor)
+                    stack.callback(watchdog.dismiss)
+                yield event

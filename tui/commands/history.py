@@ -1,0 +1,279 @@
+"""``lashbench history``: the measurements of a bench, and how a unit's backlash changes.
+
+Owns the options of the verb and the tables. Estimates that the history lacks
+are made by the analysis and kept, so that the next look is quick.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from daq.errors import ConfigurationError, InputError, LashbenchError
+from tui.options import Json
+from tui.output import Console, Injected
+
+if TYPE_CHECKING:
+    from daq.store import Store
+    from daq.store_records import Measurement
+
+__all__ = ["history"]
+
+_QUANTITIES = ("contribution_ratio", "b1_deg", "b2_deg")
+_BUDGET_S = 45.0
+"""Time after which `--estimate some` begins no further estimate."""
+_BAR = 41
+
+
+def history(
+    *,
+    db: Path,
+    unit: Annotated[str | None, Parameter(name="--unit")] = None,
+    estimate: Literal["none", "some", "all"] = "some",
+    json: Json = False,
+    console: Injected,
+) -> None:
+    """List the measurements of a bench, oldest first, with the trend of r, b1 and b2.
+
+    Complete measurements that were not estimated yet are estimated now, which
+    takes a while, and the result is kept in the history.
+
+    Parameters
+    ----------
+    db
+        File of the bench's history.
+    unit
+        Only measurements of this unit: adss, edss, the path of a unit file, or a name.
+    estimate
+        Which missing estimates to make: none, all, or some, that is to begin
+        no more of them after 45 s.
+    """
+    from daq.store import Store
+
+    with Store(db, read_only=True) as store:
+        measurements = store.measurements(_unit_name(unit, store))
+        known = {key: dict(e.document) for key, e in store.latest_estimates().items()}
+    lacking = [m for m in measurements if m.state == "complete" and m.id not in known]
+    if estimate != "none" and lacking:
+        known |= _estimates(db, lacking, estimate == "all", console)
+    rows = [_row(measurement, known.get(measurement.id, {})) for measurement in measurements]
+    trends = _trends(rows)
+    if json:
+        console.document({"measurements": rows, "trends": trends})
+    elif not rows:
+        console.data("no measurements; make one with: lashbench measure")
+    else:
+        console.data("\n".join([_table(rows), *_pictures(rows), *_lines(trends)]))
+
+
+def _unit_name(unit: str | None, store: Store) -> str | None:
+    """The name that units of the history bear."""
+    from sim.unit import load_unit
+
+    if unit is None:
+        return None
+    stored = {m.header.unit.lower() for m in store.measurements()}
+    if unit.lower() in stored:
+        return unit
+    try:
+        return load_unit(unit).name
+    except ConfigurationError as error:
+        names = ", ".join(sorted(stored)) or "none"
+        raise InputError(f"{error}; units in this history: {names}") from error
+
+
+def _estimates(
+    db: Path, lacking: Sequence[Measurement], every: bool, console: Console
+) -> dict[int, dict[str, Any]]:
+    """Make estimates and keep them where the history may be written."""
+    from importlib.metadata import version
+
+    from daq.store import Store
+
+    began_s = time.monotonic()
+    made: dict[int, dict[str, Any]] = {}
+    for count, measurement in enumerate(lacking):
+        if not every and made and time.monotonic() - began_s > _BUDGET_S:
+            console.note(
+                f"{len(lacking) - count} complete measurements are not estimated yet; run this "
+                "again, or with --estimate all"
+            )
+            break
+        console.note(f"estimating measurement {measurement.id}")
+        made[measurement.id] = _estimate(db, measurement, console)
+        try:
+            with Store(db) as store:
+                store.add_estimate(
+                    measurement.id, f"lashbench {version('lashbench')}", made[measurement.id]
+                )
+        except LashbenchError as error:
+            console.note(f"the estimate is shown but not kept: {error}")
+    return made
+
+
+def _estimate(db: Path, measurement: Measurement, console: Console) -> dict[str, Any]:
+    import tomllib
+
+    from analysis.estimate import estimate_response
+    from daq.store import Store
+    from sim.unit import load_unit, unit_from_mapping
+
+    text = measurement.header.configurations.get("unit")
+    try:
+        with Store(db, read_only=True) as store:
+            response = store.response(measurement.id)
+        name = f"unit of measurement {measurement.id}"
+        unit = (
+            load_unit(measurement.header.unit)
+            if text is None
+            else unit_from_mapping(tomllib.loads(text), source=name)
+        )
+        result = estimate_response(response, unit, progress=console.progress)
+        content: dict[str, Any] = result.to_json()
+    except (LashbenchError, ValueError) as error:
+        console.note(f"measurement {measurement.id} gives no estimate: {error}")
+        return {"failed": str(error)}
+    return content
+
+
+def _row(measurement: Measurement, estimate: dict[str, Any]) -> dict[str, Any]:
+    header = measurement.header
+    row: dict[str, Any] = {
+        "id": measurement.id,
+        "unit": header.unit,
+        "serial": header.serial,
+        "started": measurement.started,
+        "state": measurement.state,
+        "points": measurement.points,
+    }
+    row |= {name: estimate.get(name) for name in _QUANTITIES}
+    simulated = measurement.instrument is not None and measurement.instrument.simulated
+    return row | {
+        "flagged": measurement.flagged,
+        "planned": header.plan.points,
+        "levels_vpk": list(header.plan.levels_vpk),
+        "source_state": measurement.source_state.value,
+        "simulated": simulated,
+        "operator": header.operator,
+        "notes": header.notes,
+    }
+
+
+def _groups(rows: Sequence[dict[str, Any]]) -> dict[tuple[str, str], list[dict[str, Any]]]:
+    """Estimated measurements by unit and serial number."""
+    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for row in rows:
+        if row["contribution_ratio"] is not None:
+            groups.setdefault((row["unit"], row["serial"]), []).append(row)
+    return groups
+
+
+def _trends(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    from datetime import datetime
+
+    from analysis.trend import fit_trend
+
+    trends = []
+    for (unit, serial), group in _groups(rows).items():
+        for name in _QUANTITIES:
+            sure = [row for row in group if row[name] and row[name]["std"]]
+            trend = fit_trend(
+                [datetime.fromisoformat(row["started"]).timestamp() for row in sure],
+                [row[name]["value"] for row in sure],
+                [row[name]["std"] for row in sure],
+            )
+            if trend is None:
+                continue
+            slope = {"value": trend.slope_per_day, "std": trend.slope_std}
+            trends.append(
+                {
+                    "unit": unit,
+                    "serial": serial,
+                    "quantity": name,
+                    "measurements": len(sure),
+                    "mean": {"value": trend.mean, "std": trend.mean_std},
+                    "per_day": None if trend.slope_per_day is None else slope,
+                    "chi2": trend.chi2,
+                    "degrees": trend.degrees,
+                }
+            )
+    return trends
+
+
+def _table(rows: Sequence[dict[str, Any]]) -> str:
+    def shown(row: dict[str, Any], name: str, digits: int) -> str:
+        number = row[name]
+        return "-" if not number else f"{number['value']:.{digits}f} +- {number['std']:.{digits}f}"
+
+    return _aligned(
+        ("id", "started (UTC)", "unit", "serial", "state", "points", "r", "b1 / deg", "b2 / deg"),
+        [
+            (
+                str(row["id"]),
+                row["started"][:16].replace("T", " "),
+                row["unit"] + (" (SIMULATED)" if row["simulated"] else ""),
+                row["serial"] or "-",
+                row["state"],
+                f"{row['points']}/{row['planned']}",
+                shown(row, "contribution_ratio", 3),
+                shown(row, "b1_deg", 4),
+                shown(row, "b2_deg", 4),
+            )
+            for row in rows
+        ],
+    )
+
+
+def _aligned(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    widths = [max(len(row[column]) for row in (headers, *rows)) for column in range(len(headers))]
+    return "\n".join(
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in (headers, ["-" * width for width in widths], *rows)
+    )
+
+
+def _pictures(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """The contribution ratio of each unit as dots with error bars from 0 to 1."""
+    lines = []
+    for (unit, serial), group in _groups(rows).items():
+        name = f"{unit} {serial}".strip()
+        lines += [
+            "",
+            f"contribution ratio of {name}, one standard error",
+            f"{'':6}0{'':{_BAR - 2}}1",
+        ]
+        for row in group:
+            ratio = row["contribution_ratio"]
+            bar = _bar(ratio["value"], ratio["std"])
+            lines.append(f"{row['id']:>5} {bar}  {ratio['value']:.3f} +- {ratio['std']:.3f}")
+    return lines
+
+
+def _bar(value: float, std: float) -> str:
+    def place(ratio: float) -> int:
+        return round(min(max(ratio, 0.0), 1.0) * (_BAR - 1))
+
+    cells = ["."] * _BAR
+    for cell in range(place(value - std), place(value + std) + 1):
+        cells[cell] = "-"
+    cells[place(value)] = "o"
+    return "".join(cells)
+
+
+def _lines(trends: Sequence[dict[str, Any]]) -> list[str]:
+    lines = []
+    for trend in trends:
+        if trend["per_day"] is None:
+            continue
+        slope = trend["per_day"]
+        name = f"{trend['unit']} {trend['serial']}".strip()
+        lines.append(
+            f"{name}: {trend['quantity']} {trend['mean']['value']:.4g} "
+            f"+- {trend['mean']['std']:.2g}, {30 * slope['value']:+.3g} "
+            f"+- {30 * slope['std']:.2g} in 30 days"
+        )
+    return ["", *lines] if lines else []
