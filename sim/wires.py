@@ -260,6 +260,8 @@ class Terminal:
     def unplug(self, now_s: float) -> None:
         """Pull the cable; it is plugged in again a little later."""
         self.close_terminal()
+        # The system may give the old device to somebody else in the meantime.
+        Path(self.path).unlink(missing_ok=True)
         self._away_until = now_s + _REPLUG_S
 
     def close_terminal(self) -> None:

@@ -300,6 +300,11 @@ def test_the_name_of_the_terminal_stays_and_goes_with_the_server():
             wire.sendall(b"*CLS\n")
             with pytest.raises(ConnectionError):
                 wire.recv(1)
+        assert not os.path.lexists(path)
+        deadline = time.monotonic() + 5.0
+        while not os.path.exists(path):
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
     assert not os.path.lexists(path)
 
 
