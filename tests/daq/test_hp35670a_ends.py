@@ -18,7 +18,7 @@ from sim.faults import FaultBoard, parse_fault
 from sim.loopback import Loopback
 from sim.serve import Server
 
-SETTINGS = PointSettings(2.5, 5, 30)
+SETTINGS = PointSettings(2.5, 5, 30, slew_vpk_per_s=200.0)
 IMPATIENT = Timing(reply_s=0.4, block_s=0.8, overhead_s=0.5, margin=0.5)
 WIRES = ("tcp", "prologix_tcp", "prologix_pty")
 
