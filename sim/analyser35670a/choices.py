@@ -62,7 +62,6 @@ class Choices:
     """``*RST`` and ``SYST:PRES``."""
     calibration_s: float = 8.0
     self_test_s: float = 10.0
-    startup_s: float = 20.0
     calibrations_s: tuple[float, ...] = (300.0, 900.0, 1800.0, 3600.0)
     """When autocalibration runs in the first hour after power-on."""
     calibration_interval_s: float = 8400.0

@@ -87,7 +87,7 @@ def _pass_control(instrument: Analyser35670A, numbers: Numbers, arguments: Argum
     return None
 
 
-def _set_options(instrument: Analyser35670A) -> str:
+def _options(instrument: Analyser35670A) -> str:
     return Text().show(instrument.options)
 
 
@@ -145,7 +145,7 @@ COMMANDS = (
     Command("*ESR", None, _query(lambda i: show_integer(i.status.take_standard_event()))),
     Command("*IDN", None, _query(lambda i: i.choices.identity)),
     Command("*OPC", _do(lambda i: i.operations.request()), _do(_complete_later)),
-    Command("*OPT", None, _query(_set_options)),
+    Command("*OPT", None, _query(_options)),
     Command("*PCB", _pass_control),
     Command("*PSC", _power_on_clear,
             _query(lambda i: show_integer(int(i.status.power_on_clear)))),

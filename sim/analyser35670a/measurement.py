@@ -73,8 +73,10 @@ class Measurement:
             self._run(self._other_mode())
             return
         self.sweep = plan_sweep(instrument)
-        if not instrument.settings.get("AVER:IRES") or self.shown is None:
+        if not instrument.settings.get("AVER:IRES"):
             self.shown = self.sweep
+        elif self.shown is None:
+            self.shown = plan_sweep(instrument)
         self._run(self._sweep())
         self.check_level()
 

@@ -49,6 +49,10 @@ class Assembler:
     """Collects bytes until a unit is complete."""
 
     def __init__(self) -> None:
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget everything, as a device clear does."""
         self._text = bytearray()
         self._quote = 0
         self._block_left = 0
@@ -126,10 +130,6 @@ class Assembler:
         self.clear()
         self._in_message = not last
         return Unit(b"" if overflowed else text, last)
-
-    def clear(self) -> None:
-        """Forget everything, as a device clear does."""
-        self.__init__()  # type: ignore[misc]
 
 
 def split_header(text: bytes) -> tuple[str, bytes]:

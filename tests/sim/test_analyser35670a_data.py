@@ -164,6 +164,9 @@ def test_downward_sweeps_fill_from_the_top(swept):
 
 def test_fast_display_hides_new_points_until_the_end(swept):
     swept.write("AVER:IRES ON", "SOUR:VOLT 1 VPK", "ABOR;:INIT")
+    swept.wait(4.0)
+    assert swept.instrument.measurement.points_begun > 1
+    assert not swept.complexes("TRAC D1,TRAC1;:TRAC? D1").any()
     swept.run()
     first = swept.complexes("TRAC D1,TRAC1;:TRAC? D1")
     swept.write("ABOR;:INIT")
