@@ -23,8 +23,16 @@ __all__ = ["bench_session", "connect", "drives_hardware", "unit_limits"]
 
 
 def drives_hardware(url: str) -> bool:
-    """Whether something outside of this program may move when that address is measured."""
-    return not url.strip().startswith(("sim:", "replay:"))
+    """Whether something outside of this program may move when that address is measured.
+
+    Raises
+    ------
+    ConfigurationError
+        If it is no address.
+    """
+    from daq.transports.address import HostedAddress, ReplayFile, parse_address
+
+    return not isinstance(parse_address(url), HostedAddress | ReplayFile)
 
 
 def unit_limits(unit: Unit) -> Limits:

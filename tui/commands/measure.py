@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import sys
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -129,7 +129,7 @@ def measure(
     if dry_run:
         _show_plan(request, db, json, console)
         return 0
-    _confirm(instrument, request, db, yes, console)
+    _confirm(instrument, request, db, yes)
     return _run(instrument, subject, db, request, transcript, json, console)
 
 
@@ -153,9 +153,7 @@ def _show_plan(request: SessionRequest, db: Path, json: bool, console: Console) 
     )
 
 
-def _confirm(
-    instrument: str, request: SessionRequest, db: Path, yes: bool, console: Console
-) -> None:
+def _confirm(instrument: str, request: SessionRequest, db: Path, yes: bool) -> None:
     """Insist on a word before hardware is driven.
 
     Raises
@@ -166,7 +164,7 @@ def _confirm(
     from tui.bench import drives_hardware
     from tui.measure_options import plan_of
 
-    if yes or not drives_hardware(instrument):
+    if not drives_hardware(instrument) or yes:
         return
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
         raise InputError(
@@ -201,7 +199,9 @@ def _run(
     ):
         try:
             for event in events:
-                _tell(event, console)
+                # Whoever listened may have left; the measurement goes on without.
+                with suppress(BrokenPipeError):
+                    _tell(event, console)
                 if isinstance(event, Finished):
                     finished = event
         except LashbenchError as error:
@@ -283,11 +283,10 @@ def _contract_state(finished: Finished) -> str:
 def _complete(error: LashbenchError, finished: Finished) -> LashbenchError:
     """The error, with the loud words where the source was not proven off."""
     state = _contract_state(finished)
+    kept = f"{finished.points} point{'' if finished.points == 1 else 's'} kept"
     if state == "confirmed-off":
-        return type(error)(f"{error}; {finished.points} points kept, source confirmed off")
-    return type(error)(
-        f"{error}; {finished.points} points kept; SOURCE OFF {state.upper()}: switch it off by hand"
-    )
+        return type(error)(f"{error}; {kept}, source confirmed off")
+    return type(error)(f"{error}; {kept}; SOURCE OFF {state.upper()}: switch it off by hand")
 
 
 def _exit_code(finished: Finished) -> int:
