@@ -105,6 +105,11 @@ def test_a_few_queries_in_one_message_are_answered_in_one(controller):
     assert controller.ask("*OPT?;:FREQ:STEP 7;STEP?;:INST?") == '"1D2";+7.00000000000E+000;FFT'
 
 
+def test_a_late_reply_is_not_interrupted_by_the_rest_of_its_own_message(swept):
+    assert swept.ask("INIT;*OPC?;*OPT?") == '+1;"1D2"'
+    assert swept.errors() == []
+
+
 def test_device_clear_empties_queues_and_frees_the_parser(swept):
     swept.write("SOUR:VOLT 2 VPK;:JUNK", "*ESE 255;*SRE 4", "INIT;*OPC;*WAI")
     swept.instrument.listen(b"*IDN?\n")

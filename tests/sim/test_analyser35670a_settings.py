@@ -210,6 +210,7 @@ def test_ranges_beyond_the_ends_are_refused(controller):
 @pytest.mark.parametrize(
     ("sent", "vpk"),
     [("2.5011 VPK", 2.5), ("2.5013 VPK", 2.5025), ("0.1 VPK", 0.1), ("0.10013 VPK", 0.10025),
+     ("0.2514 VPK", 0.2515), ("0.2846 VPK", 0.285),
      ("1 VRMS", 1.415), ("13.979 DBVPK", 5.0), ("0 DBVPK", 1.0), ("5 VPK", 5.0)],
 )  # fmt: skip
 def test_levels_have_two_steps(controller, sent, vpk):
