@@ -151,7 +151,7 @@ def check_trial(
 
 def _implausible(point: SweepPoint, gain_db: float, plausible: Plausibility) -> str | None:
     if point.flags & PointFlag.OVERLOAD:
-        return "an input is overloaded"
+        return "an input is overloaded, its range is too small"
     if point.flags & PointFlag.SPOILT or not math.isfinite(abs(point.gain)):
         return "the reading is no number"
     if math.isnan(gain_db):

@@ -5,11 +5,14 @@ import json
 import math
 import os
 import signal
+import threading
+import time
 
 import numpy as np
 import pytest
 
 from daq.analyser import SourceState
+from daq.configs import config_path
 from daq.formats import read_response
 from daq.frf import PointFlag
 from daq.session_events import PointStored
@@ -265,8 +268,6 @@ def test_ctrl_z_does_not_halt_a_program_that_drives(run, monkeypatch):
 
 
 def test_a_pause_by_signal_and_on(run, monkeypatch, db):
-    import threading
-
     def hold():
         signal.raise_signal(signal.SIGUSR1)
         threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGUSR1)).start()
@@ -347,25 +348,33 @@ def test_resuming_a_complete_measurement_is_no_fault(run):
     assert json.loads(out)["points"] == 5
 
 
-def test_the_first_missing_point_is_retaken_and_says_so(run, db, monkeypatch):
-    from daq import hp35670a_sweeps
+def test_a_long_point_is_ended_at_once_and_retaken(run, db, tmp_path, monkeypatch):
+    monkeypatch.setattr("daq.hp35670a.calibrate", lambda dialogue: None)
+    bench = tmp_path / "bench.toml"
+    text = config_path("benches", "default").read_text()
+    bench.write_text(text + "channel1_range_vpk = 20.0\nchannel2_range_vpk = 20.0\n")
+    words = ["measure", "--unit", "adss", "--instrument", "sim:?ratio=0.3&speed=realtime"]
+    words += ["--bench", str(bench)]
+    words += ["--level", "2.5", "--start", "10", "--stop", "12", "--points", "3"]
+    words += ["--settle-cycles", "1", "--integrate-cycles", "5"]
+    pressed = []
 
-    whole, calls = hp35670a_sweeps.read_picture, []
-
-    def press(*words):
-        calls.append(1)
-        if len(calls) == 4:  # the trial point, then in the third of the sweep
-            signal.raise_signal(signal.SIGINT)
-        return whole(*words)
+    def later():
+        pressed.append(time.monotonic() + 0.2)
+        threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
 
     with monkeypatch.context() as patch:
-        patch.setattr(hp35670a_sweeps, "read_picture", press)
-        run(*measuring())
-    run(*measuring("--resume", "1"))
+        at_point(patch, 1, later)
+        code, out, _ = run(*words, "--json")
+    # The point in hand would have taken 0.5 s more; safe-off itself waits for the ramp.
+    assert code == 130
+    assert time.monotonic() - pressed[0] < 2.0
+    document = json.loads(out)
+    assert (document["points"], document["source_state"]) == (1, "confirmed-off")
+    assert run(*words[:4], "sim:?ratio=0.3", "--resume", "1")[0] == 0
     with Store(db) as store:
-        flags = [p.point.flags for p in store.points(1)]
-    assert len(flags) == 5
-    assert sum(bool(flag & PointFlag.RETAKEN) for flag in flags) <= 1
+        flags = [p.point.flags & PointFlag.RETAKEN for p in store.points(1)]
+    assert flags == [0, PointFlag.RETAKEN, 0]
 
 
 def test_a_band_is_measured_again(run, db):
