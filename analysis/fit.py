@@ -36,8 +36,8 @@ _DEVIATION = 0.0075
 """Size of the simulated deviations: larger than the tolerance, so that slopes show."""
 
 _GROUPS = 8
-_PER_GROUP = 10
-_PLAIN = 48
+_PER_GROUP = 14
+_PLAIN = 72
 
 
 @dataclass(frozen=True, slots=True)
