@@ -117,12 +117,10 @@ def _write_down(history: Path, measurement: int, text: str, state: str) -> None:
     from daq.store import Store
 
     with Store(history) as store:
-        store.note(measurement, "watchdog", text)
-        found = store.measurement(measurement)
-        # The session may have ended well and died before its last word here; and a
-        # point that was in hand must still be found by the next one.
-        if found.source_state is SourceState.ON:
+        # The session may have ended well and died before its last word here.
+        if store.measurement(measurement).source_state is SourceState.ON:
             store.set_source_state(measurement, SourceState(state))
+        store.note(measurement, "watchdog", text)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,69 @@
+"""A simulated analyser on real wires, in a thread of the test or in a process of its own."""
+
+import json
+import subprocess
+import sys
+import threading
+from contextlib import contextmanager
+
+from sim.analyser35670a import Analyser35670A, Choices
+from sim.analyser35670a.plant import LinearPlant
+from sim.faults import FaultBoard, parse_fault
+from sim.response import SteppedServo
+from sim.serve import Server
+from sim.unit import load_unit
+
+WIRES = ("tcp", "prologix_tcp", "prologix_pty")
+
+
+def url(name: str, place: str) -> str:
+    """The instrument address of what `serve` names."""
+    if name == "tcp":
+        host, port = place.rsplit(":", 1)
+        return f"TCPIP::{host}::{port}::SOCKET"
+    scheme = "prologix-tcp" if name == "prologix_tcp" else "prologix"
+    return f"{scheme}:{place}?addr=11"
+
+
+def linear_analyser(gain, faults=(), **choices) -> Analyser35670A:
+    """A noiseless instrument in front of a device with a known answer."""
+    settings = {"noise_v": 0.0, "converter_noise": 0.0} | choices
+    board = FaultBoard([parse_fault(fault) for fault in faults])
+    return Analyser35670A(LinearPlant(gain), Choices(**settings), board)
+
+
+def gimbal_analyser(ratio=0.3, seed=0, faults=(), unit="adss") -> Analyser35670A:
+    """What `serve` serves."""
+    board = FaultBoard([parse_fault(fault) for fault in faults])
+    plant = SteppedServo(load_unit(unit), ratio, seed=seed)
+    return Analyser35670A(plant, Choices(seed=seed), board)
+
+
+@contextmanager
+def served(instrument: Analyser35670A, wire: str = "tcp"):
+    """Serve in a thread, as fast as can be; yields the instrument's address."""
+    ports = {"tcp": {"tcp": 0}, "prologix_tcp": {"prologix_tcp": 0}}
+    wires = ports.get(wire, {"prologix_pty": True})
+    with Server(instrument, realtime=False, **wires) as server:
+        thread = threading.Thread(target=server.run)
+        thread.start()
+        try:
+            yield url(wire, server.addresses[wire])
+        finally:
+            server.stop()
+            thread.join()
+
+
+@contextmanager
+def serving(*words: str):
+    """``lashbench serve`` in a process of its own; yields the addresses by wire."""
+    command = [sys.executable, "-m", "tui.cli", "serve", *words]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    ) as process:
+        try:
+            places = json.loads(process.stdout.readline())
+            yield {name: url(name, place) for name, place in places.items()}
+        finally:
+            process.terminate()
+            process.wait(10)

@@ -1,0 +1,183 @@
+"""The same measurement over every wire, and what becomes of it when its program is killed."""
+
+import random
+import time
+
+import numpy as np
+import pytest
+from bench_server import WIRES, gimbal_analyser, linear_analyser, served
+from fake_analyser import known_gain
+from killed import begun, check_kept, end, killed_after, source_state, start, wait_for_watchdog
+
+from daq.analyser import SourceState
+from daq.bench_lock import BenchLock
+from daq.errors import MeasurementError
+from daq.frf import PointFlag
+from daq.store import Store
+from tui import cli
+
+PLAN = ["--level", "1.5", "--level", "2.5", "--start", "130", "--stop", "170", "--points", "5"]
+NUMBERS = (130.0, 170.0, 5, 3, 4, 1.5, 2.5)
+QUICK = ["--settle-cycles", "3", "--integrate-cycles", "4"]
+
+
+def measure(db, url, *words) -> int:
+    plan = [] if "--resume" in words else [*PLAN, *QUICK]
+    return cli.main(
+        ["measure", "--unit", "adss", "--instrument", url, *plan, "--db", str(db), "--yes", *words]
+    )
+
+
+def test_every_wire_gives_the_same_points(tmp_path):
+    db = tmp_path / "bench.db"
+    assert measure(db, "sim:?ratio=0.3&seed=4") == 0
+    for wire in WIRES:
+        with served(gimbal_analyser(seed=4), wire) as url:
+            assert measure(db, url) == 0
+    with Store(db) as store:
+        first, *others = ([p.point for p in store.points(m.id)] for m in store.measurements())
+        readbacks = [m.readback for m in store.measurements()]
+    assert len(first) == 10
+    assert len(others) == len(WIRES)
+    for other in others:
+        assert other == first
+    assert all(readback == readbacks[0] for readback in readbacks)
+
+
+def test_another_seed_gives_other_points(tmp_path):
+    db = tmp_path / "bench.db"
+    for seed in (4, 5):
+        assert measure(db, f"sim:?ratio=0.3&seed={seed}") == 0
+    with Store(db) as store:
+        first, second = ([p.point.gain for p in store.points(i)] for i in (1, 2))
+    assert not np.any(np.array(first) == np.array(second))
+
+
+@pytest.mark.parametrize("wire", ["tcp", "prologix_tcp"])
+def test_kill_9_at_random_moments_loses_nothing(tmp_path, wire):
+    """Two kills of one measurement, then on to the end: equal to an unbroken one."""
+    chance = random.Random(wire)
+    db = tmp_path / "bench.db"
+    with served(linear_analyser(known_gain), wire) as url:
+        assert measure(db, url) == 0
+        told = []
+        for _ in range(2):
+            told += killed_after(chance.uniform(0.1, 0.9), url, db, begun(db, 2), NUMBERS).told
+            check_kept(db, 2, told)
+        assert end(start(url, db, begun(db, 2), NUMBERS)).done
+        check_kept(db, 2, told)
+    with Store(db) as store:
+        unbroken, resumed = store.response(1), store.response(2)
+        assert store.measurement(2).state == "complete"
+        assert len(store.points(2, superseded=True)) == 10
+    np.testing.assert_array_equal(resumed.gain, unbroken.gain)
+    np.testing.assert_array_equal(resumed.frequency_hz, unbroken.frequency_hz)
+    assert not np.any(resumed.flags & ~int(PointFlag.RETAKEN))
+
+
+def test_after_a_kill_the_watchdog_switches_the_source_off(tmp_path):
+    db = tmp_path / "bench.db"
+    with served(linear_analyser(known_gain)) as url:
+        process = start(url, db, 0, (130.0, 170.0, 400, 3, 4, 2.0))
+        first = process.stdout.readline()
+        process.kill()
+        end(process)
+        assert first
+        assert "source confirmed-off" in wait_for_watchdog(db, 1)
+        assert source_state(url) is SourceState.CONFIRMED_OFF
+        with Store(db) as store:
+            found = store.measurement(1)
+        assert found.source_state is SourceState.CONFIRMED_OFF
+        assert (found.state, found.ended) == ("interrupted", None)
+
+
+def test_without_a_watchdog_the_next_start_finds_the_source_driving(tmp_path, monkeypatch, capsys):
+    db = tmp_path / "bench.db"
+    with served(linear_analyser(known_gain)) as url:
+        process = start(url, db, 0, (130.0, 170.0, 400, 3, 4, 2.0))
+        process.stdout.readline()
+        # Both at once, as when the machine dies: the child first, or it would act.
+        children = _children(process.pid)
+        for child in children:
+            child.kill()
+        process.kill()
+        end(process)
+        assert len(children) == 1
+        assert source_state(url) is SourceState.ON
+        with Store(db) as store:
+            assert store.measurement(1).source_state is SourceState.ON
+        short = ["--level", "1", "--start", "130", "--stop", "170", "--points", "3", *QUICK]
+        words = ["measure", "--unit", "adss", "--instrument", url, "--db", str(db), "--yes"]
+        assert cli.main([*words, *short]) == 0
+    assert "note  source: was found driving, or free to drive" in capsys.readouterr().err
+
+
+class _Process:
+    def __init__(self, number: int) -> None:
+        self.number = number
+
+    def kill(self) -> None:
+        import os
+        import signal
+
+        os.kill(self.number, signal.SIGKILL)
+
+
+def _children(parent: int) -> list[_Process]:
+    from pathlib import Path
+
+    found = []
+    for status in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = status.read_text().rsplit(")", 1)[1].split()
+        except OSError:
+            continue
+        if int(fields[1]) == parent:
+            found.append(_Process(int(status.parent.name)))
+    return found
+
+
+def test_two_sessions_do_not_share_a_bench(tmp_path):
+    db = tmp_path / "bench.db"
+    with served(linear_analyser(known_gain)) as url:
+        process = start(url, db, 0, (130.0, 170.0, 400, 3, 4, 2.0))
+        process.stdout.readline()
+        began = time.monotonic()
+        with pytest.raises(MeasurementError, match=rf"another session \(process {process.pid}\)"):
+            BenchLock(db)
+        assert time.monotonic() - began < 1.0
+        assert measure(db, url) == 1
+        process.terminate()
+        end(process)
+
+
+def test_the_lock_is_shared_with_the_watchdog_and_leaves_nothing(tmp_path):
+    db = tmp_path / "bench.db"
+    with served(linear_analyser(known_gain)) as url:
+        process = start(url, db, 0, (130.0, 170.0, 400, 3, 4, 2.0))
+        process.stdout.readline()
+        process.kill()
+        end(process)
+        # Whoever comes next waits for the watchdog and finds the source off.
+        with BenchLock(db):
+            with Store(db) as store:
+                assert "watchdog" in [event.kind for event in store.events(1)]
+            assert source_state(url) is SourceState.CONFIRMED_OFF
+    assert not db.with_name("bench.db-lock").exists()
+
+
+def test_a_lock_is_had_again_once_it_is_let_go(tmp_path):
+    db = tmp_path / "bench.db"
+    for _ in range(3):
+        with BenchLock(db) as lock:
+            assert lock.descriptor > 2
+            with pytest.raises(MeasurementError, match="another session"):
+                BenchLock(db)
+
+
+def test_the_lock_of_a_dead_owner_is_waited_for_with_a_bound(tmp_path):
+    db = tmp_path / "bench.db"
+    with BenchLock(db):
+        db.with_name("bench.db-lock").write_text("999999999\n")
+        with pytest.raises(MeasurementError, match="watchdog of a session that was killed"):
+            BenchLock(db, patience_s=0.3)
