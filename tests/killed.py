@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -60,10 +61,10 @@ def start(url: str, db: Path, resume: int, plan: tuple[float, ...]) -> subproces
     return process
 
 
-def end(process: subprocess.Popen) -> Killed:
-    """Read what was told, to the end of the program."""
+def end(process: subprocess.Popen, lines: Sequence[str] = ()) -> Killed:
+    """Read what was told, to the end of the program; some lines were read before."""
     told, done = [], False
-    for line in process.stdout:
+    for line in [*lines, *process.stdout]:
         if line == "done\n":
             done = True
         elif line.endswith("\n"):
@@ -75,13 +76,14 @@ def end(process: subprocess.Popen) -> Killed:
 
 
 def killed_after(
-    seconds: float, url: str, db: Path, resume: int, plan: tuple[float, ...]
+    points: int, seconds: float, url: str, db: Path, resume: int, plan: tuple[float, ...]
 ) -> Killed:
-    """Run, and kill with SIGKILL after a time counted from its beginning."""
+    """Run, and kill with SIGKILL some time after a number of points was told."""
     process = start(url, db, resume, plan)
+    lines = [process.stdout.readline() for _ in range(points)]
     time.sleep(seconds)
     os.kill(process.pid, signal.SIGKILL)
-    return end(process)
+    return end(process, lines)
 
 
 def check_kept(db: Path, measurement: int, told) -> None:

@@ -61,9 +61,13 @@ def test_kill_9_at_random_moments_loses_nothing(tmp_path, wire):
     with served(linear_analyser(known_gain), wire) as url:
         assert measure(db, url) == 0
         told = []
-        for _ in range(2):
-            told += killed_after(chance.uniform(0.1, 0.9), url, db, begun(db, 2), NUMBERS).told
-            check_kept(db, 2, told)
+        for points in (chance.randrange(0, 6), chance.randrange(0, 4)):
+            after = chance.uniform(0.0, 0.05 if points else 0.3)
+            left = killed_after(points, after, url, db, begun(db, 2), NUMBERS)
+            assert not left.done
+            told += left.told
+            if begun(db, 2):
+                check_kept(db, 2, told)
         assert end(start(url, db, begun(db, 2), NUMBERS)).done
         check_kept(db, 2, told)
     with Store(db) as store:
