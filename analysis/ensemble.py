@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from analysis.observation import Observation, channels_of_cycles
 from sim.effects import EffectSetting
-from sim.response import Servo, simulate_cycles
+from sim.response import START_SPREAD, Servo, simulate_cycles
 from sim.unit import Unit
 
 __all__ = ["TOLERANCES", "Draws", "Machine", "run_machines"]
@@ -35,6 +35,7 @@ class Machine:
     b_t_deg: float | None = None
     deviations: tuple[tuple[str, float], ...] = ()
     effects: tuple[EffectSetting, ...] = ()
+    start_spread: float = START_SPREAD
 
     def servo(self, unit: Unit) -> Servo:
         """The machine as something that can be simulated."""
@@ -44,7 +45,7 @@ class Machine:
             changes["b_t_deg"] = self.b_t_deg
         if changes:
             unit = unit.with_parameters(**changes)
-        return Servo.of(unit, self.ratio, self.effects, self.seed)
+        return Servo.of(unit, self.ratio, self.effects, self.seed, self.start_spread)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,6 +20,7 @@ from analysis.emulator import Emulator
 from analysis.ensemble import TOLERANCES, Draws, Machine, run_machines
 from analysis.likelihood import Match, match_prediction
 from analysis.observation import Observation
+from sim.response import START_SPREAD
 from sim.unit import Unit
 
 __all__ = ["Axis", "Posterior", "RATIO", "fit_posterior"]
@@ -228,7 +229,9 @@ def _balanced_signs(groups: int, count: int, rng: np.random.Generator) -> NDArra
 
 
 def _machine_at(axes: Sequence[Axis], place: NDArray[np.float64], seed: int) -> Machine:
-    machine = Machine(ratio=0.0, seed=seed)
+    # Nobody knows where the gears lie when a sweep starts, and at low drive that
+    # decides which branch it follows: half of the machines start anywhere.
+    machine = Machine(ratio=0.0, seed=seed, start_spread=START_SPREAD if seed % 2 else 1.0)
     for axis, value in zip(axes, place, strict=True):
         machine = axis.machine(machine, float(value))
     return machine

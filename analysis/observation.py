@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.errors import AnalysisError
-from daq.frf import DB_PER_NEPER, FrequencyResponse, PointFlag
+from daq.frf import DB_PER_NEPER, GAIN_STD_COMPONENTS, FrequencyResponse, PointFlag
 from daq.plan import SweepPlan
 
 __all__ = ["CHANNELS", "Observation", "channels_of_cycles", "observe"]
@@ -78,6 +78,7 @@ def observe(response: FrequencyResponse) -> Observation:
     level = np.concatenate([part.source_vpk for part in parts])
     frequency = np.concatenate([part.frequency_hz for part in parts])
     scatter = np.concatenate([part.gain_std_db for part in parts]) / DB_PER_NEPER
+    scatter = scatter * np.sqrt(2.0 / _components(response))
     noise_v = _reading_noise(scatter * np.abs(gain) * level)
     log_gain = np.log(gain)
     with np.errstate(divide="ignore"):
@@ -90,6 +91,14 @@ def observe(response: FrequencyResponse) -> Observation:
         noise=noise_v / (level * np.abs(gain)),
         plans=_plans(response, level, frequency),
     )
+
+
+def _components(response: FrequencyResponse) -> int:
+    """Over how many components of the reading its stated error counts the scatter.
+
+    Responses made here say so; others are taken to count both.
+    """
+    return 1 if response.provenance.get(GAIN_STD_COMPONENTS) == 1 else 2
 
 
 def _reading_noise(volts: NDArray[np.float64]) -> float:

@@ -19,10 +19,17 @@ from numpy.typing import NDArray
 from daq.errors import InputError
 from daq.plan import Direction
 
-__all__ = ["DB_PER_NEPER", "FrequencyResponse", "PointFlag"]
+__all__ = ["DB_PER_NEPER", "GAIN_STD_COMPONENTS", "FrequencyResponse", "PointFlag"]
 
 DB_PER_NEPER = 20.0 / np.log(10.0)
 """20 log10(e): a relative change of 1 in magnitude, in dB."""
+
+GAIN_STD_COMPONENTS = "gain_std_components"
+"""Provenance key: over how many components `gain_std_db` counts the scatter.
+
+Responses made here count it along the gain (1) and say so; files made elsewhere may count
+both components of the reading (2).
+"""
 
 
 class PointFlag(IntFlag):

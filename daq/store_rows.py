@@ -14,7 +14,7 @@ import sqlalchemy as sa
 
 from daq.analyser import Identity, SourceState, SweepPoint
 from daq.errors import FileFormatError
-from daq.frf import FrequencyResponse, PointFlag
+from daq.frf import GAIN_STD_COMPONENTS, FrequencyResponse, PointFlag
 from daq.store_records import Measurement, MeasurementHeader, StoredPoint, plan_from_text
 
 __all__ = ["measurement_of", "point_of", "point_row", "response_of"]
@@ -134,6 +134,7 @@ def _provenance(measurement: Measurement, rows: Sequence[StoredPoint]) -> dict[s
     header, instrument = measurement.header, measurement.instrument
     simulated = instrument is not None and instrument.simulated
     provenance: dict[str, Any] = {
+        GAIN_STD_COMPONENTS: 1,
         "kind": "simulated" if simulated else "measured",
         "measurement_id": measurement.id,
         "state": measurement.state,

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.errors import AnalysisError
-from daq.frf import FrequencyResponse
+from daq.frf import GAIN_STD_COMPONENTS, FrequencyResponse
 from daq.plan import SweepPlan
 from sim.assembly import Law, PiecewiseLinearSystem
 from sim.effects import EffectSetting, drivetrain_with
@@ -28,6 +28,7 @@ from sim.unit import Unit
 __all__ = [
     "DwellRecord",
     "PERIODIC_SCATTER",
+    "START_SPREAD",
     "response_of_cycles",
     "scatter_of_cycles",
     "Servo",
@@ -111,6 +112,7 @@ def simulate(
     (cycles,) = simulate_cycles([servo], plan, longest_step_s=longest_step_s)
     provenance = {
         "kind": "simulated",
+        GAIN_STD_COMPONENTS: 1,
         "software": f"lashbench {_version()}",
         "contribution_ratio": float(ratio),
         "effects": [{"id": e.id, **e.values} for e in effects],

@@ -28,10 +28,8 @@ def on_a_bench(response, seed, noise_v=5e-4):
     noise = noise_v / response.source_vpk
     reading = rng.standard_normal((2, len(response))) * noise
     gain = response.gain + reading[0] + 1j * reading[1]
-    along = response.gain_std_db / DB_PER_NEPER
-    across = np.radians(response.phase_std_deg)
-    total = np.sqrt(along**2 + across**2 + 2.0 * (noise / np.abs(gain)) ** 2)
-    return replace(response, gain=gain, gain_std_db=DB_PER_NEPER * total)
+    along = np.hypot(response.gain_std_db / DB_PER_NEPER, noise / np.abs(gain))
+    return replace(response, gain=gain, gain_std_db=DB_PER_NEPER * along)
 
 
 def within(found, truth, sigmas):

@@ -30,6 +30,13 @@ def test_channels_are_log_gain_phase_and_log_scatter():
     np.testing.assert_allclose(np.exp(seen.values[2]) * DB_PER_NEPER, one.gain_std_db)
 
 
+def test_an_error_counted_along_the_gain_alone_is_half_of_the_scatter():
+    both, along = response(), response(provenance={"gain_std_components": 1})
+    np.testing.assert_allclose(
+        observe(along).values[2] - observe(both).values[2], 0.5 * np.log(2.0)
+    )
+
+
 def test_rows_come_by_level_and_ascending_frequency_whatever_the_file_order():
     one = response()
     order = np.array([4, 1, 5, 0, 3, 2])

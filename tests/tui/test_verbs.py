@@ -132,12 +132,16 @@ def test_estimate_warns_where_the_response_is_of_another_unit(capsys):
 @pytest.mark.usefixtures("calls")
 def test_demo_goes_through_every_step(tmp_path, capsys):
     out = text(["demo", "--out", str(tmp_path / "here" / "demo")], capsys)
-    for heading in ("1. ", "2. ", "3. "):
+    for heading in ("1. ", "2. ", "3. ", "4. ", "5. "):
         assert f"\n{heading}" in "\n" + out
-    assert out.count("contribution ratio") == 2
+    assert "SIMULATED" in out
+    assert "source confirmed-off" in out
+    assert out.count("contribution ratio") == 3
     folder = tmp_path / "here" / "demo"
-    assert (folder / "response.png").read_bytes().startswith(b"\x89PNG")
-    assert len(read_response(folder / "response.csv")) == 183
+    for name in ("measured", "sample"):
+        assert (folder / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    assert len(read_response(folder / "measured.csv")) == 52
+    assert len(read_response(folder / "sample.csv")) == 183
 
 
 @pytest.fixture

@@ -19,41 +19,75 @@ if TYPE_CHECKING:
 __all__ = ["demo"]
 
 
+SERVED = "sim:?ratio=0.3&seed=1"
+"""The simulated bench: its unit has 30 % of its backlash in stage 1."""
+
+
 def demo(*, out: Path = Path("demo"), console: Injected) -> None:
-    """Do the whole job without hardware: response, features, backlash, figure.
+    """Do the whole job without hardware: measure, features, backlash, figure.
 
     Parameters
     ----------
     out
-        Directory for the figure and the response, made if it is not there.
+        Directory for the history, the responses and figures, made if it is not there.
     """
     began = time.perf_counter()
     prepare_directory(out)
+    console.data("1. A sweep on the simulated bench (SIMULATED: ADSS, 30 % in stage 1)\n")
+    measured = _measure(out / "bench.db", console)
+    console.data("\n2. Its anti-resonance (ARF) and resonance (RF)\n")
+    _show_features(measured, out, "measured", console)
+    console.data("\n3. Its backlash\n")
+    _estimate_response(measured, console)
+
+    sample = _sample(console)
+    console.data("\n4. A sweep that another program made (true contribution 93.3 %)\n")
+    _show_features(sample, out, "sample", console)
+    console.data("")
+    _estimate_response(sample, console)
+    console.data("\n5. Backlash of the paper's ADSS, from its measured ARF and RF\n")
+    _estimate_paper(console)
+    console.data(f"\nHistory, responses and figures are in {out}/.")
+    console.note(f"done in {time.perf_counter() - began:.0f} s")
+
+
+def _measure(history: Path, console: Console) -> FrequencyResponse:
+    """A session on the simulated analyser, as `measure` runs it."""
+    from daq.store import Store
+    from tui.commands.measure import measure
+
+    measure(
+        unit="adss",
+        instrument=SERVED,
+        level=[1.5, 2.5],
+        start=115.0,
+        stop=165.0,
+        points=26,
+        db=history,
+        operator="demo",
+        console=console,
+    )
+    with Store(history, read_only=True) as store:
+        return store.response(store.measurements()[-1].id)
+
+
+def _show_features(response: FrequencyResponse, out: Path, name: str, console: Console) -> None:
     from analysis.resonance import extract, summary
     from analysis.response_figure import save_response_figure
     from daq.formats import write_response
 
-    response = _response(console)
-    write_response(response, out / "response.csv")
+    write_response(response, out / f"{name}.csv")
     features = extract(response)
-    console.data(f"1. Anti-resonance (ARF) and resonance (RF) of {response.unit}\n")
     console.data("\n".join(summary(features)))
-    save_response_figure(response, features, out / "response.png")
-
-    console.data(f"\n2. Backlash of {response.unit}, from the response\n")
-    _estimate_response(response, console)
-    console.data("\n3. Backlash of the paper's ADSS, from its measured ARF and RF\n")
-    _estimate_paper(console)
-    console.data(f"\nThe response and its figure are in {out}/.")
-    console.note(f"done in {time.perf_counter() - began:.0f} s")
+    save_response_figure(response, features, out / f"{name}.png")
 
 
-def _response(console: Console) -> FrequencyResponse:
-    """The response to work on: a sweep that comes with lashbench."""
+def _sample(console: Console) -> FrequencyResponse:
+    """A sweep that comes with lashbench."""
     from daq.configs import sample_path
     from daq.formats import read_response
 
-    console.note("reading the sample sweep adss-sweep: simulated, true contribution 93.3 %")
+    console.note("reading the sample sweep adss-sweep")
     return read_response(sample_path("adss-sweep"))
 
 
