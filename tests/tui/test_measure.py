@@ -5,6 +5,7 @@ import json
 import math
 import os
 import signal
+import sqlite3
 import threading
 import time
 
@@ -471,7 +472,18 @@ def test_history_shows_the_trend_with_error_bars(run, db):
     bars = [line for line in out.splitlines() if "-o-" in line]
     assert len(bars) == 3
     assert [bar.index("o") for bar in bars] == sorted(bar.index("o") for bar in bars)
-    assert "in 30 days" in out
+    # Seconds apart, no slope per month is claimed; weeks apart it is.
+    assert "in 30 days" not in out
+    with sqlite3.connect(db) as raw:
+        for day in (1, 8, 15):
+            raw.execute(
+                "UPDATE measurements SET started = ? WHERE id = ?",
+                (f"2026-11-{day:02d}T12:00:00+00:00", (day + 6) // 7),
+            )
+    raw.close()
+    _, out, _ = run("history")
+    # A line through 0.30, 0.40, 0.55 a week apart rises by 0.125 a week.
+    assert "+0.536 +- 0.15 in 30 days" in out
 
 
 def test_missing_estimates_are_made_once_and_kept(run, db, monkeypatch):

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["history"]
 
+_SECONDS_PER_DAY = 86400.0
 _QUANTITIES = ("contribution_ratio", "b1_deg", "b2_deg")
 _BUDGET_S = 45.0
 """Time after which `--estimate some` begins no further estimate."""
@@ -195,6 +196,7 @@ def _trends(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
                     "serial": serial,
                     "quantity": name,
                     "measurements": len(sure),
+                    "span_days": _span_days(sure),
                     "mean": {"value": trend.mean, "std": trend.mean_std},
                     "per_day": None if trend.slope_per_day is None else slope,
                     "chi2": trend.chi2,
@@ -202,6 +204,13 @@ def _trends(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
                 }
             )
     return trends
+
+
+def _span_days(rows: Sequence[dict[str, Any]]) -> float:
+    from datetime import datetime
+
+    moments = [datetime.fromisoformat(row["started"]).timestamp() for row in rows]
+    return (max(moments) - min(moments)) / _SECONDS_PER_DAY
 
 
 def _table(rows: Sequence[dict[str, Any]]) -> str:
@@ -271,9 +280,12 @@ def _lines(trends: Sequence[dict[str, Any]]) -> list[str]:
             continue
         slope = trend["per_day"]
         name = f"{trend['unit']} {trend['serial']}".strip()
-        lines.append(
+        line = (
             f"{name}: {trend['quantity']} {trend['mean']['value']:.4g} "
-            f"+- {trend['mean']['std']:.2g}, {30 * slope['value']:+.3g} "
-            f"+- {30 * slope['std']:.2g} in 30 days"
+            f"+- {trend['mean']['std']:.2g}"
         )
+        # Minutes apart, a slope per month says nothing but how wide the bars are.
+        if trend["span_days"] >= 1.0:
+            line += f", {30 * slope['value']:+.3g} +- {30 * slope['std']:.2g} in 30 days"
+        lines.append(line)
     return ["", *lines] if lines else []
