@@ -1,7 +1,8 @@
 """The history of a bench: every measurement, committed point by point.
 
 Owns reading and writing of one SQLite file. A method that writes returns once
-the record is on the disk. Nothing is ever deleted or overwritten: a point that
+the record is committed: no death of the program undoes it, and the disk is
+asked for it at once. Nothing is ever deleted or overwritten: a point that
 is measured again supersedes the old one, which stays. The store judges nothing
 and knows no instrument.
 """
@@ -23,6 +24,7 @@ from daq.analyser import Identity, SourceState, SweepPoint
 from daq.errors import FileFormatError, InputError
 from daq.frf import FrequencyResponse, PointFlag
 from daq.store_file import WRITES, open_engine, telling_faults
+from daq.store_flush import Flusher
 from daq.store_records import (
     Estimate,
     Measurement,
@@ -54,6 +56,7 @@ class Store:
         self.path = Path(path)
         self._engine = open_engine(self.path, create=create, read_only=read_only)
         self._writer = self._engine.execution_options(**{WRITES: True})
+        self._flusher = Flusher(self.path.with_name(self.path.name + "-wal"))
 
     def __enter__(self) -> Self:
         return self
@@ -67,7 +70,8 @@ class Store:
         self.close()
 
     def close(self) -> None:
-        """Let go of the file; may be called twice."""
+        """Let go of the file, which is on the disk then; may be called twice."""
+        self._flusher.close()
         self._engine.dispose()
 
     # ------------------------------------------------------------ writing
@@ -171,7 +175,7 @@ class Store:
             self._update(connection, measurement, state="interrupted", ended=None)
 
     def finish(self, measurement: int, state: MeasurementState, source_state: SourceState) -> None:
-        """Record how a measurement ended, and what is known of the source."""
+        """Record how a measurement ended, and what is known of the source; the disk has it then."""
         with self._writing() as connection:
             self._update(
                 connection,
@@ -180,6 +184,7 @@ class Store:
                 source_state=source_state.value,
                 ended=_now(),
             )
+        self._flusher.now()
 
     def add_estimate(
         self, measurement: int, software: str, document: Mapping[str, Any]
@@ -270,6 +275,7 @@ class Store:
     def _writing(self) -> Iterator[sa.Connection]:
         with telling_faults(self.path), self._writer.begin() as connection:
             yield connection
+        self._flusher.soon()
 
     @contextmanager
     def _reading(self) -> Iterator[sa.Connection]:

@@ -1,8 +1,9 @@
 """Opening the SQLite file of a bench's history, and saying plainly what is wrong with it.
 
-Owns the connection settings on which "committed means kept" rests: write-ahead
-log, and a flush to the disk at every commit (`synchronous=FULL`), so that a
-committed point outlives a killed process and a power cut. It knows no tables.
+Owns the connection settings on which "committed means kept" rests: a
+write-ahead log, which outlives any death of the program and, whatever happens,
+leaves a file that is whole. That the log reaches the disk soon after each
+commit is `daq.store_flush`'s part. It knows no tables.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ def engine_of(path: Path, mode: str) -> sa.Engine:
 
     @event.listens_for(engine, "connect")
     def _settle(connection: sqlite3.Connection, _record: object) -> None:
-        connection.execute("PRAGMA synchronous = FULL")
+        connection.execute("PRAGMA synchronous = NORMAL")
         connection.execute("PRAGMA foreign_keys = ON")
 
     @event.listens_for(engine, "begin")

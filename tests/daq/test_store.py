@@ -5,6 +5,7 @@ import sqlite3
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -187,11 +188,56 @@ def test_a_plan_survives_as_text():
     assert plan_from_text(plan_text(PLAN)) == PLAN
 
 
-def test_commits_are_flushed_to_the_disk(store):
+def test_commits_survive_a_killed_program_and_a_cut_leaves_a_whole_file(store):
     with store._writer.connect() as connection:
-        assert connection.exec_driver_sql("PRAGMA synchronous").scalar_one() == 2
         assert connection.exec_driver_sql("PRAGMA journal_mode").scalar_one() == "wal"
+        assert connection.exec_driver_sql("PRAGMA synchronous").scalar_one() == 1
         assert connection.exec_driver_sql("PRAGMA foreign_keys").scalar_one() == 1
+
+
+def test_the_disk_is_asked_for_every_commit_without_waiting_for_it(store, monkeypatch):
+    measurement = store.begin(header())
+    flushed, go = [], threading.Event()
+
+    def slow(handle):
+        flushed.append(os.fstat(handle).st_ino)
+        go.wait(5.0)
+
+    monkeypatch.setattr(os, "fsync", slow)
+    log = os.stat(f"{store.path}-wal").st_ino
+    began = time.monotonic()
+    store.add_point(measurement, 1.5, 100.1, point(100.1))
+    assert time.monotonic() - began < 1.0
+    deadline = time.monotonic() + 5.0
+    while not flushed and time.monotonic() < deadline:
+        time.sleep(0.001)
+    assert flushed == [log]
+    # What comes while the disk is busy is asked for once more afterwards.
+    store.add_point(measurement, 1.5, 110.5, point(110.5))
+    go.set()
+    store.close()
+    assert flushed == [log, log]
+
+
+def test_the_end_of_a_measurement_waits_for_the_disk(store, monkeypatch):
+    measurement = store.begin(header())
+    done = []
+    monkeypatch.setattr(os, "fsync", lambda handle: (time.sleep(0.05), done.append(1)))
+    store.finish(measurement, "complete", SourceState.CONFIRMED_OFF)
+    assert done
+
+
+def test_a_disk_that_refuses_a_flush_is_told_with_the_next_record(store, monkeypatch):
+    measurement = store.begin(header())
+
+    def refuse(_handle):
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(os, "fsync", refuse)
+    with pytest.raises(MeasurementError, match="Input/output error"):
+        store.finish(measurement, "complete", SourceState.CONFIRMED_OFF)
+    with pytest.raises(MeasurementError, match="the disk refused the data"):
+        store.add_point(measurement, 1.5, 100.1, point(100.1))
 
 
 def test_a_failed_write_leaves_nothing_half_done(store):
