@@ -47,8 +47,8 @@ class Law(IntEnum):
 class Nonlinearity:
     """One scalar feedback p = law(y) of a piecewise-linear system.
 
-    `inlet` is g, `outlet` is c (both shape (n,)), `feedthrough` is d, `rate`
-    the row that gives y' where the law needs it.
+    `inlet` is g, `outlet` is c (both shape (n,)), `feedthrough` is d;
+    `stiffness` and `damping` are those of a play when it is closed.
     """
 
     name: str
@@ -56,7 +56,6 @@ class Nonlinearity:
     inlet: NDArray[np.float64]
     outlet: NDArray[np.float64]
     feedthrough: float
-    rate: NDArray[np.float64]
     stiffness: float
     damping: float
     parameters: tuple[float, float, float]
@@ -208,7 +207,6 @@ class Assembly:
                 inlet=forcing(acts),
                 outlet=row(looks),
                 feedthrough=feedthrough,
-                rate=row(looks, "'") if law is Law.PLAY else np.zeros(n),
                 stiffness=stiffness,
                 damping=damping,
                 parameters=(*parameters, 0.0, 0.0, 0.0)[:3],  # type: ignore[arg-type]

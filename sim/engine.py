@@ -5,14 +5,13 @@ exact in the linear part, symmetric in time where play acts, with friction that
 truly sticks, and returns the Fourier coefficients of every drive cycle. It
 knows nothing of gears, units or sweeps.
 
-How one step goes. Between switchings the system is linear, so the state is
-carried by matrix exponentials (`sim.propagator`). The laws close the loop at
-the end of each step: law j sees y_j = y0_j + beta_jj p_j, where y0_j is what it
-would see without its own newest force, and that scalar equation is solved in
-closed form (`sim.kernel`). A play's force is interpolated linearly over the
-step: second order, no numerical damping. Friction is constant over the step
-and either stops the motion at the end of it or flips where the velocity passes
-zero.
+How one step goes. Between switchings the system is linear, so its modes are
+carried exactly (`sim.propagator`). Each law's force is held over the step at
+the mean that the law has along it: with y0 and y1 what the law sees at both
+ends, y1 = ahead + beta p(y0, y1) is one scalar equation, solved in closed form
+(`sim.laws`, `sim.kernel`). The scheme is second order, the same forwards and
+backwards in time, and conserves the energy of springs and play; friction
+stops the motion at the end of a step or turns where the velocity passes zero.
 """
 
 from __future__ import annotations
@@ -24,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.assembly import Law, PiecewiseLinearSystem
-from sim.kernel import COLUMNS_BEYOND, COLUMNS_FIRST, step_cycles
-from sim.propagator import Propagator, build_propagator
+from sim.kernel import FORCES_AT_ONCE, MOST_LANES, ROWS_AT_ONCE, STRIBECK, step_cycles
+from sim.propagator import Modes, Propagator, build_propagator, find_modes
 
 __all__ = ["HARMONICS", "LONGEST_STEP_S", "Motion", "Stretch", "advance"]
 
@@ -36,7 +35,15 @@ LONGEST_STEP_S = 5e-6
 """Default bound of the step: a twentieth of the fastest mesh mode of the paper's units."""
 
 _LANE_MULTIPLE = 8
-_MOST_LANES = 64
+
+_CUBIC_SWEEPS = 8
+"""Both halves of a hardening shaft push the same tiny inertia: one pass does not settle them."""
+
+_COUPLED_SWEEPS = 4
+"""Passes where one play pushes another within a step, as through a heavily damped shaft."""
+
+_LOOSE = 1e-4
+"""Share of its motion that a play may take over from another before that counts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,38 +103,40 @@ def advance(
     Motion
         One per stretch, as soon as it is done.
     """
+    modes = find_modes(system)
     for stretch in stretches:
-        propagator = build_propagator(system, stretch.frequency_hz, longest_step_s)
-        motion = _dwell(system, propagator, parameters, state, stretch)
+        propagator = build_propagator(system, modes, stretch.frequency_hz, longest_step_s)
+        motion = _dwell(system, modes, propagator, parameters, state, stretch)
         state = motion.state
         yield motion
 
 
 def _dwell(
     system: PiecewiseLinearSystem,
+    modes: Modes,
     propagator: Propagator,
     parameters: NDArray[np.float64],
     state: NDArray[np.float64],
     stretch: Stretch,
 ) -> Motion:
     lanes = state.shape[1]
-    cycles = stretch.integrate_cycles
-    coefficients = np.empty((cycles, HARMONICS, lanes), dtype=complex)
+    coefficients = np.empty((stretch.integrate_cycles, HARMONICS, lanes), dtype=complex)
     peak = np.empty(lanes)
     final = np.empty_like(state)
-    tables = _tables(system, propagator)
-    for start in range(0, lanes, _MOST_LANES):
-        kept = np.arange(start, min(start + _MOST_LANES, lanes))
-        # Padding repeats a lane: an idle lane of zeros would run into denormals.
-        picked = np.resize(kept, -(-len(kept) // _LANE_MULTIPLE) * _LANE_MULTIPLE)
+    tables = _tables(system, modes, propagator)
+    for start in range(0, lanes, MOST_LANES):
+        kept = np.arange(start, min(start + MOST_LANES, lanes))
+        # Full vectors are faster, but for a lane alone. Padding repeats a lane: an idle lane
+        # of zeros would run into denormals.
+        width = -(-len(kept) // _LANE_MULTIPLE) * _LANE_MULTIPLE if lanes > 1 else 1
+        picked = np.resize(kept, width)
         sums, tops, ends = _run_block(
-            system, propagator, tables, parameters[..., picked], state[:, picked],
+            system, modes, propagator, tables, parameters[..., picked], state[:, picked],
             stretch, picked,
         )  # fmt: skip
-        width = len(kept)
-        coefficients[..., kept] = _coefficients(sums, propagator.steps_per_cycle)[..., :width]
-        peak[kept] = tops[:width]
-        final[:, kept] = ends[:, :width]
+        own = slice(0, len(kept))
+        coefficients[..., kept] = _coefficients(sums, propagator.steps_per_cycle)[..., own]
+        peak[kept], final[:, kept] = tops[own], ends[:, own]
     turn = np.exp(-1j * np.outer(np.arange(HARMONICS), stretch.phase))
     turn[0] = 1.0
     # The kernel counts the phase from the start of the stretch; results count
@@ -137,51 +146,64 @@ def _dwell(
 
 @dataclass(frozen=True, slots=True)
 class _Tables:
-    """What the kernel needs of the laws, fixed for one system and step."""
+    """What the kernel needs of the laws, fixed for one system and step.
 
+    `rows` (m, n), `feedthrough` (m,): what each law sees of state and input.
+    `look`, `gain`, `push`, `kinds`, `fixed`, `waves`, `sweeps`: see `sim.kernel`.
+    """
+
+    rows: NDArray[np.float64]
+    feedthrough: NDArray[np.float64]
+    look: NDArray[np.float64]
+    gain: NDArray[np.float64]
+    push: NDArray[np.float64]
     kinds: NDArray[np.int64]
     fixed: NDArray[np.float64]
-    rows: NDArray[np.float64]
-    rates: NDArray[np.float64]
-    beta: NDArray[np.float64]
-    beta_rate: NDArray[np.float64]
-    feedthrough: NDArray[np.float64]
-    matrix: NDArray[np.float64]
     waves: NDArray[np.float64]
+    sweeps: int
 
 
-def _tables(system: PiecewiseLinearSystem, propagator: Propagator) -> _Tables:
+def _tables(system: PiecewiseLinearSystem, modes: Modes, propagator: Propagator) -> _Tables:
     laws = system.nonlinearities
-    n, m = len(system.b), len(laws)
+    n, m, p = len(system.b), len(laws), modes.shapes.shape[1]
     rows = np.array([law.outlet for law in laws]).reshape(m, n)
-    rates = np.array([law.rate for law in laws]).reshape(m, n)
-    fixed = np.array(
-        [
-            (law.stiffness, law.damping, float(law.law is Law.FRICTION and law.parameters[1] != 0))
-            for law in laws
-        ]
-    ).reshape(m, 3)
-    beyond = -(-max(n + m - COLUMNS_FIRST, 0) // COLUMNS_BEYOND) * COLUMNS_BEYOND
-    matrix = np.zeros((n, COLUMNS_FIRST + beyond))
-    matrix[:, :n] = propagator.carry
-    matrix[:, n : n + m] = propagator.kick.T
+    push = np.pad(propagator.push, ((0, 0), (0, -m % FORCES_AT_ONCE if m else FORCES_AT_ONCE)))
+    look = np.vstack([rows, system.o]) @ modes.shapes
+    gain = look @ push
+    kinds = [
+        STRIBECK if law.law is Law.FRICTION and law.parameters[1] != 0.0 else int(law.law)
+        for law in laws
+    ]
+    fixed = [(law.stiffness, law.damping / propagator.step_s) for law in laws]
     angle = 2.0 * np.pi * np.arange(propagator.steps_per_cycle) / propagator.steps_per_cycle
     waves = np.stack([wave(k * angle) for k in (1, 2, 3) for wave in (np.cos, np.sin)], axis=1)
     return _Tables(
-        kinds=np.array([int(law.law) for law in laws], dtype=np.int64),
-        fixed=fixed,
         rows=rows,
-        rates=rates,
-        beta=rows @ propagator.end.T,
-        beta_rate=rates @ propagator.end.T,
         feedthrough=np.array([law.feedthrough for law in laws]),
-        matrix=matrix,
+        look=np.pad(look, ((0, 0), (0, max(ROWS_AT_ONCE - p, 0)))),
+        gain=gain,
+        push=push,
+        kinds=np.array(kinds, dtype=np.int64),
+        fixed=np.array(fixed).reshape(m, 2),
         waves=waves,
+        sweeps=_sweeps(kinds, gain, fixed),
     )
+
+
+def _sweeps(kinds: list[int], gain: NDArray[np.float64], fixed: list[tuple[float, float]]) -> int:
+    """How many passes over the laws settle what they do to each other within one step."""
+    if Law.CUBIC in kinds:
+        return _CUBIC_SWEEPS
+    plays = [j for j, kind in enumerate(kinds) if kind == Law.PLAY]
+    slope = np.array([fixed[j][0] + 2.0 * fixed[j][1] for j in plays])
+    taken_over = np.abs(gain[np.ix_(plays, plays)]) * slope
+    np.fill_diagonal(taken_over, 0.0)
+    return _COUPLED_SWEEPS if taken_over.max(initial=0.0) > _LOOSE else 1
 
 
 def _run_block(
     system: PiecewiseLinearSystem,
+    modes: Modes,
     propagator: Propagator,
     tables: _Tables,
     parameters: NDArray[np.float64],
@@ -189,61 +211,35 @@ def _run_block(
     stretch: Stretch,
     picked: NDArray[np.int64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    n, m, lanes = len(system.b), len(tables.kinds), len(picked)
     offset = stretch.offset[picked]
     phasor = stretch.amplitude[picked] * np.exp(1j * stretch.phase[picked])
     forced = propagator.drive[:, None] * phasor
     direct = tables.feedthrough[:, None]
+    seen = _times(tables.rows, state) + direct * (phasor.imag + offset)
     # Im(Y exp(i theta)) = Re(Y) sin(theta) + Im(Y) cos(theta), plus a constant.
-    drives = _sine_cosine_mean(tables.rows @ forced + direct * phasor, direct * offset)
-    rate_drives = _sine_cosine_mean(tables.rates @ forced, np.zeros((m, lanes)))
-    out_drive = _sine_cosine_mean((system.o @ forced)[None, :], np.zeros((1, lanes)))
-
-    columns = np.zeros((tables.matrix.shape[1], lanes))
-    seen = np.ascontiguousarray(tables.rows @ state + direct * (phasor.imag + offset))
-    p = _initial_forces(tables, parameters, seen, tables.rates @ state)
-    columns[:n] = state - forced.imag - propagator.end.T @ p
-    columns[n : n + m] = p
-    drift = propagator.drift[:, None] + propagator.offset_drift[:, None] * offset
-    sums = np.zeros((stretch.integrate_cycles, 7, lanes))
-    peak = np.zeros(lanes)
+    through = _times(np.vstack([tables.rows, system.o]), forced)
+    through[:-1] += direct * phasor
+    constant = np.vstack([direct * offset, np.zeros_like(offset)])
+    coordinates = _times(modes.weights, state - forced.imag)
+    sums = np.zeros((stretch.integrate_cycles, 7, len(picked)))
+    peak = np.zeros(len(picked))
     step_cycles(
-        tables.matrix, drift, columns, tables.kinds, tables.fixed,
-        np.ascontiguousarray(parameters), tables.rows,
-        tables.rates, tables.beta, tables.beta_rate, drives, rate_drives, system.o[None, :],
-        (system.o @ propagator.end.T)[None, :], out_drive, tables.waves, seen,
-        stretch.settle_cycles, sums, peak,
+        propagator.carry, tables.push,
+        propagator.drift[:, None] + propagator.offset_drift[:, None] * offset,
+        tables.look, tables.gain, tables.kinds, tables.fixed, parameters.reshape(-1, len(picked)),
+        np.stack([through.real, through.imag, constant], axis=1).reshape(-1, len(picked)),
+        tables.waves,
+        tables.sweeps, stretch.settle_cycles, coordinates, seen, sums, peak,
     )  # fmt: skip
-    end = columns[:n] + forced.imag + propagator.end.T @ columns[n : n + m]
-    return sums, peak, end
+    return sums, peak, _times(modes.shapes, coordinates) + forced.imag
 
 
-def _sine_cosine_mean(
-    phasor: NDArray[np.complex128], mean: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    return np.ascontiguousarray(np.stack([phasor.real, phasor.imag, mean], axis=1))
-
-
-def _initial_forces(
-    tables: _Tables,
-    parameters: NDArray[np.float64],
-    seen: NDArray[np.float64],
-    rate: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Each law's force at the very start; friction has not acted yet."""
-    p = np.zeros_like(seen)
-    for j, kind in enumerate(tables.kinds):
-        limit = parameters[j, 0]
-        if kind == Law.PLAY:
-            k, c = tables.fixed[j, 0], tables.fixed[j, 1]
-            p[j] = k * np.clip(seen[j], -limit, limit) + np.where(
-                np.abs(seen[j]) < limit, c * rate[j], 0.0
-            )
-        elif kind == Law.EXCESS:
-            p[j] = np.clip(seen[j], -limit, limit) - seen[j]
-        elif kind == Law.CUBIC:
-            p[j] = -limit * seen[j] ** 3
-    return p
+def _times(matrix: NDArray[np.float64], columns: NDArray) -> NDArray:
+    """Product in one order of additions; BLAS would choose it by the number of columns."""
+    total = np.zeros((len(matrix), columns.shape[1]), dtype=columns.dtype)
+    for row, column in enumerate(columns):
+        total += np.multiply.outer(matrix[:, row], column)
+    return total
 
 
 def _coefficients(sums: NDArray[np.float64], steps: int) -> NDArray[np.complex128]:

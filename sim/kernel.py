@@ -1,10 +1,24 @@
 """The compiled inner loop of the engine: many steps of many lanes.
 
-Owns nothing but arithmetic: the arrays it is given are the propagator's and
-the laws'. Lanes lie along the last axis everywhere, so that every loop over
-them is one run of vector operations; the shape of these loops is what makes it
-fast. A loop over lanes may hold no call and no branch that cannot become a
-select, and no function takes a slice: making one costs more than using it.
+Owns the scalar laws, the order of work in a step and the layout in memory; the
+numbers it is given are the propagator's. It knows no physics beyond the laws.
+(Laws and loop share a file because numba's cache on disk looks at this file
+alone to tell whether it is stale.)
+
+A law sees y at the start of the step (`y0`) and would see `ahead` at its end if
+it did not act; with its own force p, held over the step, it sees
+y1 = ahead + beta p. A force that comes from a potential W (play, a hardening
+spring) takes its mean along the step, p = (W(y1) - W(y0)) / (y1 - y0). Held
+over the step it does the work W(y1) - W(y0) whatever the motion inside the
+step was: no energy appears or vanishes, at any step.
+
+Lanes lie along the last axis everywhere, so that each loop over them is one
+run of vector operations. Three things keep these loops fast: rows lie a fixed
+distance apart (`MOST_LANES`), known to the compiler, which then need not test
+at run time whether they overlap; a loop over lanes holds no branch and no call
+that is left after inlining; and the parts are inlined by the machine's
+compiler, not by numba, which would rename arrays inside the step loop and
+count references in every step.
 """
 
 from __future__ import annotations
@@ -12,250 +26,341 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-__all__ = ["COLUMNS_BEYOND", "COLUMNS_FIRST", "step_cycles"]
+__all__ = ["FORCES_AT_ONCE", "MOST_LANES", "ROWS_AT_ONCE", "STRIBECK", "step_cycles"]
 
-COLUMNS_FIRST = 18
-"""Columns of the step matrix multiplied in one go: 13 states and 4 laws fit."""
+MOST_LANES = 64
+"""Lanes that one call can step; a full call costs little more than one of eight."""
 
-COLUMNS_BEYOND = 6
-"""Further columns come in lots of this size."""
+ROWS_AT_ONCE = 14
+"""Coordinates that are looked at in one go: 13 states as modes; further ones come in pairs."""
 
-_PLAY, _FRICTION, _EXCESS, _CUBIC = 0, 1, 2, 3
+FORCES_AT_ONCE = 4
+"""Forces that act in one go, two meshes and two frictions; further ones come in fours."""
 
-_inlined = njit(inline="always", fastmath=True, error_model="numpy")
+STRIBECK = 4
+"""Kind of a friction that peaks at rest; the other kinds are those of `sim.assembly.Law`."""
+
+_PLAY, _FRICTION, _EXCESS = 0, 1, 2
+
+_FLAGS = {"contract"}
+"""Fused multiply-add, but no re-ordering: a lane's result does not depend on its neighbours, and
+NaN stays NaN."""
+
+_CORRECTIONS = 2
+"""How often a play's share of the step is corrected; each leaves about 3 % of the error."""
+
+_FIRST_SWEEPS = 8
+
+_law = njit(inline="always", fastmath=_FLAGS, error_model="numpy")
 
 
-@_inlined
-def _multiply(matrix, drift, columns, rows):
-    """rows[i] = drift[i] + sum_j matrix[i, j] columns[j] over all lanes, unrolled over j."""
-    n, width = matrix.shape
-    lanes = rows.shape[1]
-    for i in range(n):
-        a0, a1, a2, a3, a4, a5 = (
-            matrix[i, 0],
-            matrix[i, 1],
-            matrix[i, 2],
-            matrix[i, 3],
-            matrix[i, 4],
-            matrix[i, 5],
-        )
-        a6, a7, a8, a9, a10, a11 = (
-            matrix[i, 6],
-            matrix[i, 7],
-            matrix[i, 8],
-            matrix[i, 9],
-            matrix[i, 10],
-            matrix[i, 11],
-        )
-        a12, a13, a14, a15, a16, a17 = (
-            matrix[i, 12],
-            matrix[i, 13],
-            matrix[i, 14],
-            matrix[i, 15],
-            matrix[i, 16],
-            matrix[i, 17],
-        )
+@_law
+def play_force(y0, ahead, d, k, c, beta):
+    """Mean of k clip(y, -d, d) over the step, and the damper c taken out while inside the play.
+
+    `c` is the damping over the step, c/h. With e = y - clip(y) the mean of
+    clip is (clip0 + clip1)/2 + q (e0 + e1)/2, where q is the share of the step
+    spent inside; q depends on y1, weakly.
+    """
+    half, damp = 0.5 * k * beta, c * beta
+    inverse = 1.0 / (1.0 - half - damp)
+    c0 = min(max(y0, -d), d)
+    e0 = y0 - c0
+    known = ahead + (half - damp) * c0
+    guess = known * inverse if e0 == 0.0 else known + (half + damp) * c0
+    moved = guess - y0
+    per_moved = 1.0 / (moved if abs(moved) > 1e-30 else 1.0)
+    q = (min(max(guess, -d), d) - c0) * per_moved
+    c1, e1 = c0, e0
+    for _ in range(_CORRECTIONS):
+        share = half * q
+        pulled = known + share * e0
+        inside = pulled * inverse
+        c1 = min(max(inside, -d), d)
+        # (1 - share) e1 = pulled + ..., by the series of 1/(1 - share): share is 0.1 at most.
+        series = 1.0 + share * (1.0 + share * (1.0 + share))
+        e1 = (pulled + (half + damp - 1.0) * c1) * series if abs(inside) > d else 0.0
+        # One Newton step carries the reciprocal over to the corrected motion.
+        moved = c1 + e1 - y0
+        per_moved *= 2.0 - moved * per_moved
+        q = min(max((c1 - c0) * per_moved, 0.0), 1.0)
+    return 0.5 * k * (c0 + c1 + q * (e0 + e1)) + c * (c1 - c0)
+
+
+@_law
+def friction_force(w0, ahead, most, beta):
+    """Force that opposes the motion w with `most`, stops it dead, or turns with it.
+
+    Where w passes zero inside the step, either what drives it is below
+    break-away and it stops there, or friction turns at the crossing and the
+    force is its mean.
+    """
+    start = w0 if w0 != 0.0 else ahead
+    sign = 1.0 if start > 0.0 else -1.0
+    slid = sign * ahead - beta * most
+    before = abs(w0)
+    share = before / (before - min(slid, -1e-300))
+    turned = most * sign * (1.0 - 2.0 * share)
+    stopped = -ahead / beta
+    crossing = stopped if abs(ahead - w0) <= beta * most else turned
+    return -most * sign if slid >= 0.0 else crossing
+
+
+@_law
+def peaked_friction(w, T, T_s, w_s):
+    """Stribeck's curve T + T_s exp(-(w/w_s)^2), to 1e-5 of its peak."""
+    u = w / w_s
+    x = min(u * u, 40.0) / 64.0
+    # exp(-64 x) as the 64th power of a Taylor series: a call to exp would break the vectors.
+    power = 1.0 - x * (1.0 - x * (0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x / 120.0))))
+    power *= power
+    power *= power
+    power *= power
+    power *= power
+    power *= power
+    power *= power
+    return T + T_s * power
+
+
+@_law
+def excess_force(y0, y1, limit):
+    """Mean of clip(y, -limit, limit) - y over the step; y itself does not feel it."""
+    c0, c1 = min(max(y0, -limit), limit), min(max(y1, -limit), limit)
+    moved = y1 - y0
+    q = (c1 - c0) / (moved if abs(moved) > 1e-30 else 1.0)
+    return -0.5 * (1.0 - q) * (y0 - c0 + y1 - c1)
+
+
+@_law
+def cubic_force(y0, ahead, last, k, beta):
+    """Mean of -k y^3 over the step, by two Newton steps from the last force."""
+    quarter = 0.25 * k
+    y1 = ahead + beta * last
+    miss = y1 - ahead + beta * quarter * (y0 * y0 + y1 * y1) * (y0 + y1)
+    y1 -= miss / (1.0 + beta * quarter * (y0 * y0 + 2.0 * y0 * y1 + 3.0 * y1 * y1))
+    miss = y1 - ahead + beta * quarter * (y0 * y0 + y1 * y1) * (y0 + y1)
+    y1 -= miss / (1.0 + beta * quarter * (y0 * y0 + 2.0 * y0 * y1 + 3.0 * y1 * y1))
+    return -quarter * (y0 * y0 + y1 * y1) * (y0 + y1)
+
+
+_part = njit(forceinline=True, fastmath=_FLAGS, error_model="numpy")
+
+
+@_part
+def _turn(carry, push, drift, q, force, lanes):
+    """Coordinates in pairs of rows: the forces of the last step push them, then they turn."""
+    for i in range(0, carry.shape[0], 2):
+        for k in range(FORCES_AT_ONCE, push.shape[1], 4):
+            _push_pair(push, i, k, q, force, lanes)
+        a0, a1, a2, a3 = push[i, 0], push[i, 1], push[i, 2], push[i, 3]
+        b0, b1, b2, b3 = push[i + 1, 0], push[i + 1, 1], push[i + 1, 2], push[i + 1, 3]
+        c00, c01, c10, c11 = carry[i, 0], carry[i, 1], carry[i + 1, 0], carry[i + 1, 1]
         for s in range(lanes):
-            rows[i, s] = (
-                drift[i, s]
-                + a0 * columns[0, s]
-                + a1 * columns[1, s]
-                + a2 * columns[2, s]
-                + a3 * columns[3, s]
-                + a4 * columns[4, s]
-                + a5 * columns[5, s]
-                + a6 * columns[6, s]
-                + a7 * columns[7, s]
-                + a8 * columns[8, s]
-                + a9 * columns[9, s]
-                + a10 * columns[10, s]
-                + a11 * columns[11, s]
-                + a12 * columns[12, s]
-                + a13 * columns[13, s]
-                + a14 * columns[14, s]
-                + a15 * columns[15, s]
-                + a16 * columns[16, s]
-                + a17 * columns[17, s]
-            )
-        for j in range(COLUMNS_FIRST, width, COLUMNS_BEYOND):
-            b0, b1, b2 = matrix[i, j], matrix[i, j + 1], matrix[i, j + 2]
-            b3, b4, b5 = matrix[i, j + 3], matrix[i, j + 4], matrix[i, j + 5]
+            p0, p1, p2, p3 = force[0, s], force[1, s], force[2, s], force[3, s]
+            one = q[i, s] + a0 * p0 + a1 * p1 + a2 * p2 + a3 * p3
+            other = q[i + 1, s] + b0 * p0 + b1 * p1 + b2 * p2 + b3 * p3
+            q[i, s] = drift[i, s] + c00 * one + c01 * other
+            q[i + 1, s] = drift[i + 1, s] + c10 * one + c11 * other
+
+
+@_part
+def _push_pair(push, i, k, q, force, lanes):
+    a0, a1, a2, a3 = push[i, k], push[i, k + 1], push[i, k + 2], push[i, k + 3]
+    b0, b1, b2, b3 = push[i + 1, k], push[i + 1, k + 1], push[i + 1, k + 2], push[i + 1, k + 3]
+    for s in range(lanes):
+        p0, p1, p2, p3 = force[k, s], force[k + 1, s], force[k + 2, s], force[k + 3, s]
+        q[i, s] += a0 * p0 + a1 * p1 + a2 * p2 + a3 * p3
+        q[i + 1, s] += b0 * p0 + b1 * p1 + b2 * p2 + b3 * p3
+
+
+@_part
+def _multiply(carry, push, drift, q, force, spare, lanes):
+    """The same where every coordinate feels every other; slower, and rarely needed."""
+    p = carry.shape[0]
+    for i in range(0, p, 2):
+        for k in range(0, push.shape[1], 4):
+            _push_pair(push, i, k, q, force, lanes)
+    for i in range(p):
+        for s in range(lanes):
+            spare[i, s] = drift[i, s]
+        for k in range(0, p, 2):
+            c0, c1 = carry[i, k], carry[i, k + 1]
             for s in range(lanes):
-                rows[i, s] += (
-                    b0 * columns[j, s]
-                    + b1 * columns[j + 1, s]
-                    + b2 * columns[j + 2, s]
-                    + b3 * columns[j + 3, s]
-                    + b4 * columns[j + 4, s]
-                    + b5 * columns[j + 5, s]
-                )
+                spare[i, s] += c0 * q[k, s] + c1 * q[k + 1, s]
+    for i in range(p):
+        for s in range(lanes):
+            q[i, s] = spare[i, s]
 
 
-@_inlined
-def _play(y0, columns, at, stiffness, beta, parameters, j):
-    """Solve y = y0 + beta p with p = k clip(y, -d, d)."""
-    gain = stiffness / (1.0 - stiffness * beta)
-    for s in range(y0.shape[1]):
-        bound = stiffness * parameters[j, 0, s]
-        columns[at, s] = min(max(gain * y0[0, s], -bound), bound)
+@_part
+def _look(look, waves, cosine, sine, q, free, lanes):
+    """What each law and the output would see at the end of the step without any force."""
+    for j in range(look.shape[0]):
+        l0, l1, l2, l3 = look[j, 0], look[j, 1], look[j, 2], look[j, 3]
+        l4, l5, l6, l7 = look[j, 4], look[j, 5], look[j, 6], look[j, 7]
+        l8, l9, l10, l11 = look[j, 8], look[j, 9], look[j, 10], look[j, 11]
+        l12, l13 = look[j, 12], look[j, 13]
+        at = 3 * j
+        for s in range(lanes):
+            free[j, s] = (
+                waves[at, s] * sine + waves[at + 1, s] * cosine + waves[at + 2, s]
+                + l0 * q[0, s] + l1 * q[1, s] + l2 * q[2, s] + l3 * q[3, s]
+                + l4 * q[4, s] + l5 * q[5, s] + l6 * q[6, s] + l7 * q[7, s]
+                + l8 * q[8, s] + l9 * q[9, s] + l10 * q[10, s] + l11 * q[11, s]
+                + l12 * q[12, s] + l13 * q[13, s]
+            )  # fmt: skip
+        for k in range(ROWS_AT_ONCE, look.shape[1], 2):
+            l0, l1 = look[j, k], look[j, k + 1]
+            for s in range(lanes):
+                free[j, s] += l0 * q[k, s] + l1 * q[k + 1, s]
 
 
-@_inlined
-def _damped_play(y0, columns, at, stiffness, damping, beta, beta_rate, parameters, j):
-    """Solve y = y0 + beta p, v = v0 + beta_rate p; p = k y + c v inside, k d sign(y) outside."""
-    inverse = 1.0 / (1.0 - stiffness * beta - damping * beta_rate)
-    for s in range(y0.shape[1]):
-        limit = parameters[j, 0, s]
-        inside = (stiffness * y0[0, s] + damping * y0[1, s]) * inverse
-        y = y0[0, s] + beta * inside
-        bound = stiffness * limit
-        outside = bound if y > 0.0 else -bound
-        columns[at, s] = inside if abs(y) < limit else outside
+@_part
+def _feel(gain, j, force, free, y, to, lanes):
+    """Row `to` of y: what row j sees with the forces as they stand."""
+    g0, g1, g2, g3 = gain[j, 0], gain[j, 1], gain[j, 2], gain[j, 3]
+    for s in range(lanes):
+        y[to, s] = (
+            free[j, s] + g0 * force[0, s] + g1 * force[1, s] + g2 * force[2, s] + g3 * force[3, s]
+        )
+    for k in range(FORCES_AT_ONCE, gain.shape[1], 4):
+        g0, g1, g2, g3 = gain[j, k], gain[j, k + 1], gain[j, k + 2], gain[j, k + 3]
+        for s in range(lanes):
+            y[to, s] += (
+                g0 * force[k, s] + g1 * force[k + 1, s]
+                + g2 * force[k + 2, s] + g3 * force[k + 3, s]
+            )  # fmt: skip
 
 
-@_inlined
-def _friction(y0, columns, at, seen, j, beta, torque):
-    """Solve w = w0 + beta p with -p in torque * sign(w), p constant over the step.
+@_part
+def _solve(kind, stiffness, damping, own, parameters, j, y, ahead, force, lanes):
+    """The force of law j, from what it saw at the start and would see ahead."""
+    at = 3 * j
+    if kind == _PLAY:
+        for s in range(lanes):
+            force[j, s] = play_force(
+                y[j, s], ahead[0, s], parameters[at, s], stiffness, damping, own
+            )
+    elif kind == _FRICTION:
+        for s in range(lanes):
+            force[j, s] = friction_force(y[j, s], ahead[0, s], parameters[at, s], own)
+    elif kind == STRIBECK:
+        for s in range(lanes):
+            w = 0.5 * (y[j, s] + ahead[0, s] + own * force[j, s])
+            most = peaked_friction(
+                w, parameters[at, s], parameters[at + 1, s], parameters[at + 2, s]
+            )
+            force[j, s] = friction_force(y[j, s], ahead[0, s], most, own)
+    elif kind == _EXCESS:
+        for s in range(lanes):
+            force[j, s] = excess_force(y[j, s], ahead[0, s], parameters[at, s])
+    else:
+        for s in range(lanes):
+            force[j, s] = cubic_force(y[j, s], ahead[0, s], force[j, s], parameters[at, s], own)
 
-    `seen[j]` is w at the start of the step. Where w passes zero inside the
-    step, either what drives it is below break-away and it stops there, or
-    friction flips at the crossing and p is its mean over the step.
+
+@_part
+def _accumulate(table, tick, y, m, total, lanes):
+    """Add the output, row m of y, to the Fourier sums and keep its largest magnitude."""
+    c1, s1, c2 = table[tick, 0], table[tick, 1], table[tick, 2]
+    s2, c3, s3 = table[tick, 3], table[tick, 4], table[tick, 5]
+    for s in range(lanes):
+        output = y[m, s]
+        total[0, s] += output
+        total[1, s] += c1 * output
+        total[2, s] += s1 * output
+        total[3, s] += c2 * output
+        total[4, s] += s2 * output
+        total[5, s] += c3 * output
+        total[6, s] += s3 * output
+        total[7, s] = max(total[7, s], abs(output))
+
+
+@njit(cache=True, fastmath=_FLAGS, error_model="numpy", nogil=True)
+def step_cycles(carry, push, drift_in, look, gain, kinds, fixed, parameters, waves, table,
+                sweeps, settle_cycles, start, seen, sums, peak):  # fmt: skip
+    """Step coordinates through settle and kept cycles.
+
+    Parameters
+    ----------
+    carry, push, drift_in
+        (p, 2) or (p, p); (p, f); (p, lanes): one step of coordinates q, p of
+        them, see `sim.propagator.Propagator`. f is the number of laws, padded.
+    look, gain
+        (m + 1, rows), (m + 1, f): what each law and, last, the output see of
+        the coordinates and of the forces.
+    kinds, fixed, parameters
+        (m,); (m, 2) stiffness and damping over the step; (3 m, lanes).
+    waves
+        (3 (m + 1), lanes): sine, cosine and constant part of what the drive
+        alone makes each of them see.
+    table
+        (steps, 6): cosine and sine of harmonics 1 to 3 over a cycle.
+    sweeps
+        How often the laws are solved in turn in each step.
+    start, seen
+        (p, lanes), (m, lanes): coordinates and what the laws see at the start;
+        overwritten by those at the end.
+    sums, peak
+        (cycles, 7, lanes), (lanes,): the sum, then the products of the output with each
+        column of `table` summed over each kept cycle; the largest magnitude.
     """
-    for s in range(y0.shape[1]):
-        w0, w, most = y0[0, s], seen[j, s], torque[2, s]
-        reach = beta * most
-        ahead = w if w != 0.0 else w0
-        sign = 1.0 if ahead > 0.0 else -1.0
-        slid = (w0 - sign * reach) * sign
-        start = abs(w)
-        share = start / max(start - slid, 1e-300)
-        flipped = -most * sign * (2.0 * share - 1.0)
-        stopped = -w0 / beta
-        turned = stopped if abs(w0 - w) <= reach else flipped
-        columns[at, s] = -most * sign if slid >= 0.0 else turned
-
-
-@_inlined
-def _friction_torque(torque, seen, j, parameters, stribeck):
-    """The most that friction can hold, with the Stribeck peak where there is one."""
-    for s in range(torque.shape[1]):
-        torque[2, s] = parameters[j, 0, s]
-    if stribeck:
-        for s in range(torque.shape[1]):
-            u = seen[j, s] / parameters[j, 2, s]
-            torque[2, s] += parameters[j, 1, s] * np.exp(-u * u)
-
-
-@_inlined
-def _excess(y0, columns, at, parameters, j):
-    """Set p = clip(y, -limit, limit) - y; what is clipped off does not act on y itself."""
-    for s in range(y0.shape[1]):
-        limit = parameters[j, 0, s]
-        columns[at, s] = min(max(y0[0, s], -limit), limit) - y0[0, s]
-
-
-@_inlined
-def _cubic(y0, columns, at, beta, parameters, j):
-    """Solve p = -k (y0 + beta p)^3 by two Newton steps from the last value."""
-    for s in range(y0.shape[1]):
-        k = parameters[j, 0, s]
-        p = columns[at, s]
-        y = y0[0, s] + beta * p
-        p -= (p + k * y * y * y) / (1.0 + 3.0 * beta * k * y * y)
-        y = y0[0, s] + beta * p
-        columns[at, s] = p - (p + k * y * y * y) / (1.0 + 3.0 * beta * k * y * y)
-
-
-@_inlined
-def _look(y0, to, rows, j, columns, n, drives, sine, cosine):
-    """y0[to] = rows[j] . z plus what the drive alone makes of it."""
-    for s in range(y0.shape[1]):
-        y0[to, s] = drives[j, 0, s] * sine + drives[j, 1, s] * cosine + drives[j, 2, s]
-    for i in range(n):
-        c = rows[j, i]
-        if c != 0.0:
-            for s in range(y0.shape[1]):
-                y0[to, s] += c * columns[i, s]
-
-
-@_inlined
-def _add_forces(y0, to, coupling, j, columns, n, but):
-    """Add what the newest forces, all but one, do to row j at the end of the step."""
-    for i in range(coupling.shape[1]):
-        c = coupling[j, i]
-        if i != but and c != 0.0:
-            for s in range(y0.shape[1]):
-                y0[to, s] += c * columns[n + i, s]
-
-
-@_inlined
-def _close_laws(kinds, fixed, parameters, rows, rates, beta, beta_rate, drives, rate_drives,
-                columns, n, sine, cosine, seen, work):  # fmt: skip
-    """Solve every law once at the end of a step; the forces p lie in columns[n:]."""
-    for j in range(kinds.shape[0]):
-        at = n + j
-        own = beta[j, j]
-        _look(work, 0, rows, j, columns, n, drives, sine, cosine)
-        _add_forces(work, 0, beta, j, columns, n, j)
-        if kinds[j] == _PLAY:
-            if fixed[j, 1] == 0.0:
-                _play(work, columns, at, fixed[j, 0], own, parameters, j)
-            else:
-                _look(work, 1, rates, j, columns, n, rate_drives, sine, cosine)
-                _add_forces(work, 1, beta_rate, j, columns, n, j)
-                _damped_play(work, columns, at, fixed[j, 0], fixed[j, 1], own,
-                             beta_rate[j, j], parameters, j)  # fmt: skip
-        elif kinds[j] == _FRICTION:
-            _friction_torque(work, seen, j, parameters, fixed[j, 2] != 0.0)
-            _friction(work, columns, at, seen, j, own, work)
-            for s in range(work.shape[1]):
-                seen[j, s] = work[0, s] + own * columns[at, s]
-        elif kinds[j] == _EXCESS:
-            _excess(work, columns, at, parameters, j)
-        else:
-            _cubic(work, columns, at, own, parameters, j)
-
-
-@_inlined
-def _accumulate(columns, n, out_row, out_end, table, tick, out_drive, sums, kept, peak, work):
-    """Add V_o at one step to the Fourier sums of the cycle."""
-    _look(work, 0, out_row, 0, columns, n, out_drive, table[tick, 1], table[tick, 0])
-    _add_forces(work, 0, out_end, 0, columns, n, -1)
-    for s in range(work.shape[1]):
-        peak[s] = max(peak[s], abs(work[0, s]))
-        sums[kept, 0, s] += work[0, s]
-    for k in range(table.shape[1]):
-        c = table[tick, k]
-        for s in range(work.shape[1]):
-            sums[kept, k + 1, s] += c * work[0, s]
-
-
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
-def step_cycles(matrix, drift, columns, kinds, fixed, parameters, rows, rates, beta, beta_rate,
-                drives, rate_drives, out_row, out_end, out_drive, table, seen, settle_cycles,
-                sums, peak):  # fmt: skip
-    """Step `columns` (z and p, (n + m padded, lanes)) in place through settle and kept cycles.
-
-    `sums` is (cycles, 7, lanes): the sum, then cosine and sine sums of harmonics
-    1 to 3 of V_o over each kept cycle, not normalised.
-    """
-    n, lanes = drift.shape
-    ticks = table.shape[0]
-    now, then = columns, np.zeros_like(columns)
-    work = np.empty((3, lanes))
+    p, lanes = start.shape
+    m = kinds.shape[0]
+    others = gain.copy()
+    for j in range(m):
+        others[j, j] = 0.0
+    rows, ticks = look.shape[1], table.shape[0]
+    q = np.zeros((rows, MOST_LANES))
+    spare = np.zeros((rows, MOST_LANES))
+    drift = np.zeros((p, MOST_LANES))
+    force = np.zeros((push.shape[1], MOST_LANES))
+    free = np.zeros((m + 1, MOST_LANES))
+    y = np.zeros((m + 1, MOST_LANES))
+    ahead = np.zeros((1, MOST_LANES))
+    wave = np.zeros((3 * (m + 1), MOST_LANES))
+    constant = np.zeros((3 * m, MOST_LANES))
+    total = np.zeros((8, MOST_LANES))
+    for s in range(lanes):
+        for i in range(p):
+            q[i, s] = start[i, s]
+            drift[i, s] = drift_in[i, s]
+        for j in range(m):
+            y[j, s] = seen[j, s]
+        for j in range(3 * m):
+            constant[j, s] = parameters[j, s]
+        for j in range(3 * m + 3):
+            wave[j, s] = waves[j, s]
     for cycle in range(settle_cycles + sums.shape[0]):
-        kept = cycle - settle_cycles
         for step in range(ticks):
             tick = step + 1 if step + 1 < ticks else 0
-            now, then = then, now
-            _multiply(matrix, drift, then, now)
-            for i in range(n, n + kinds.shape[0]):
+            if carry.shape[1] == 2:
+                _turn(carry, push, drift, q, force, lanes)
+            else:
+                _multiply(carry, push, drift, q, force, spare, lanes)
+            _look(look, wave, table[tick, 0], table[tick, 1], q, free, lanes)
+            # The first step knows no last forces to start from.
+            passes = sweeps if cycle + step > 0 else _FIRST_SWEEPS
+            for solved in range(passes * m):
+                j = solved % m
+                _feel(others, j, force, free, ahead, 0, lanes)
+                _solve(kinds[j], fixed[j, 0], fixed[j, 1], gain[j, j], constant, j, y, ahead,
+                       force, lanes)  # fmt: skip
+            for j in range(m + 1):
+                _feel(gain, j, force, free, y, j, lanes)
+            if cycle >= settle_cycles:
+                _accumulate(table, tick, y, m, total, lanes)
+        if cycle >= settle_cycles:
+            for k in range(7):
                 for s in range(lanes):
-                    now[i, s] = then[i, s]
-            _close_laws(kinds, fixed, parameters, rows, rates, beta, beta_rate, drives,
-                        rate_drives, now, n, table[tick, 1], table[tick, 0], seen,
-                        work)  # fmt: skip
-            if kept >= 0:
-                _accumulate(now, n, out_row, out_end, table, tick, out_drive, sums, kept,
-                            peak, work)  # fmt: skip
-    columns[:] = now
+                    sums[cycle - settle_cycles, k, s] = total[k, s]
+                    total[k, s] = 0.0
+    for i in range(0, p, 2):
+        for k in range(0, push.shape[1], 4):
+            _push_pair(push, i, k, q, force, lanes)
+    for s in range(lanes):
+        peak[s] = total[7, s]
+        for j in range(m):
+            seen[j, s] = y[j, s]
+        for i in range(p):
+            start[i, s] = q[i, s]

@@ -1,8 +1,14 @@
-"""Exact propagation of a driven linear system over one time step.
+"""Exact propagation of a driven linear system over one time step, mode by mode.
 
-Owns matrix exponentials and what follows from them for a step h: how the state
-is carried, how a force that is constant or rises linearly over the step acts,
-and the closed system's steady response to the drive. It steps nothing.
+Owns the eigenmodes of a system and what a step h does to them: each mode turns
+and decays, a force that is held over the step pushes it, and the drive gives
+the closed system's steady response. It steps nothing.
+
+In the coordinates of the modes the step matrix has nothing but blocks of two
+rows on its diagonal, which makes a step several times cheaper than the full
+matrix would, and one decomposition serves every drive frequency. A system
+whose modes nearly coincide (two free inertias, say) has no usable
+eigenvectors; it keeps its own coordinates and a full matrix.
 """
 
 from __future__ import annotations
@@ -13,92 +19,144 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm, matrix_balance
 
-from sim.assembly import Law, PiecewiseLinearSystem
+from sim.assembly import PiecewiseLinearSystem
 
-__all__ = ["FEWEST_STEPS", "Propagator", "build_propagator"]
+__all__ = ["FEWEST_STEPS", "Modes", "Propagator", "build_propagator", "find_modes"]
 
 FEWEST_STEPS = 256
 """Steps per drive cycle at least, so that harmonics 0 to 3 and the laws' kinks are resolved."""
 
+_WORST_CONDITION = 1e7
+"""Eigenvectors worse conditioned than this cost more digits than modes are worth."""
+
+
+@dataclass(frozen=True, slots=True)
+class Modes:
+    """Coordinates q of a system, x = shapes q and q = weights x; p of them for n states.
+
+    `rates` (p,) are the eigenvalues where q are modes: two rows belong
+    together, a complex pair (in its real form, marked in `turning` (p/2,)) or
+    two real modes. `rates` is empty where q are scaled states; `whole` (p, p)
+    is then the system's matrix in them.
+    """
+
+    shapes: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    rates: NDArray[np.complex128]
+    turning: NDArray[np.bool_]
+    whole: NDArray[np.float64]
+
 
 @dataclass(frozen=True, slots=True)
 class Propagator:
-    """One step of one system at one drive frequency; n states, m laws.
+    """One step of one system at one drive frequency; n states, p coordinates q, m laws.
 
-    The state is stepped as x = x_drive(t) + z + sum_j end_j p_j, where x_drive
-    is the closed system's steady response to the drive and p_j the newest
-    value of law j. So
+    The state is x = x_drive(t) + shapes q, where x_drive is the closed
+    system's steady response to the drive, of complex amplitude `drive` (n,)
+    for an input of 1 V. With the forces p_j of the laws held over the step
 
-        z_next = carry z + sum_j kick_j p_j + drift + offset_drift V_offset
+        q_next = carry q + sum_j push_j p_j + drift + offset_drift V_offset
 
-    `carry` is (n, n), `end` and `kick` (m, n), `drift` and `offset_drift`
-    (n,); `drive` (n,) is the complex amplitude of x_drive for an input of 1 V.
+    `carry` is (p, 2), the two columns that row i shares with its partner, or
+    (p, p); `push` (p, m); `drift` and `offset_drift` (p,).
     """
 
     frequency_hz: float
     step_s: float
     steps_per_cycle: int
     carry: NDArray[np.float64]
-    end: NDArray[np.float64]
-    kick: NDArray[np.float64]
+    push: NDArray[np.float64]
     drift: NDArray[np.float64]
     offset_drift: NDArray[np.float64]
     drive: NDArray[np.complex128]
 
 
-def build_propagator(
-    system: PiecewiseLinearSystem, frequency_hz: float, longest_step_s: float
-) -> Propagator:
-    """Propagator with a whole number of steps in each drive cycle.
+def find_modes(system: PiecewiseLinearSystem) -> Modes:
+    """Eigenmodes of a system with every mesh closed, or its states where it has no good ones."""
+    # Stiffness over inertia makes entries of 1e9 beside entries of 1; balancing
+    # keeps eigenvectors and exponentials accurate.
+    balanced, (scale, _) = matrix_balance(system.A, permute=False, separate=True)
+    rates, vectors = np.linalg.eig(balanced)
+    upper, real = np.flatnonzero(rates.imag > 0.0), np.flatnonzero(rates.imag == 0.0)
+    order = np.concatenate([np.repeat(upper, 2), real])
+    basis = vectors[:, order].real
+    basis[:, 1 : 2 * len(upper) : 2] = vectors[:, upper].imag
+    if not np.linalg.cond(basis) < _WORST_CONDITION:
+        return _unmoded(balanced, scale)
+    odd = len(order) % 2
+    return Modes(
+        shapes=np.pad(scale[:, None] * basis, ((0, 0), (0, odd))),
+        weights=np.pad(np.linalg.inv(basis) / scale, ((0, odd), (0, 0))),
+        rates=np.pad(rates[order], (0, odd)),
+        turning=np.arange((len(order) + odd) // 2) < len(upper),
+        whole=np.empty((0, 0)),
+    )
 
-    A play's force is interpolated linearly over the step, friction is constant
-    over it: the first makes the scheme symmetric in time, so that it neither
-    damps nor feeds the mesh modes, the second lets friction stop the motion
-    dead.
-    """
+
+def _unmoded(balanced: NDArray[np.float64], scale: NDArray[np.float64]) -> Modes:
+    odd = len(scale) % 2
+    return Modes(
+        shapes=np.pad(np.diag(scale), ((0, 0), (0, odd))),
+        weights=np.pad(np.diag(1.0 / scale), ((0, odd), (0, 0))),
+        rates=np.empty(0, dtype=complex),
+        turning=np.empty(0, dtype=bool),
+        whole=np.pad(balanced, (0, odd)),
+    )
+
+
+def build_propagator(
+    system: PiecewiseLinearSystem, modes: Modes, frequency_hz: float, longest_step_s: float
+) -> Propagator:
+    """Propagator with a whole number of steps in each drive cycle."""
     steps = max(int(np.ceil(1.0 / (frequency_hz * longest_step_s) - 1e-9)), FEWEST_STEPS)
     h = 1.0 / (frequency_hz * steps)
-    n, m = len(system.b), len(system.nonlinearities)
     inlets = [law.inlet for law in system.nonlinearities]
-    carry, constant, rising = _step_integrals(system.A, np.array([*inlets, system.f, system.b]), h)
-    end, kick = np.empty((m, n)), np.empty((m, n))
-    for j, law in enumerate(system.nonlinearities):
-        end[j] = constant[j] if law.law is Law.FRICTION else rising[j]
-        kick[j] = carry @ end[j] + constant[j] - end[j]
+    forcings = modes.weights @ np.array([*inlets, system.f, system.b]).T
+    if modes.rates.size:
+        carry, pushes = _turn(modes, forcings, h)
+    else:
+        carry, pushes = _exponential(modes.whole, forcings, h)
     jw = 2j * np.pi * frequency_hz
-    response = np.linalg.solve(jw * np.eye(n) - system.A, system.b.astype(complex))
-    drive = np.asarray(response, dtype=complex)
+    drive = np.linalg.solve(jw * np.eye(len(system.b)) - system.A, system.b.astype(complex))
     return Propagator(
         frequency_hz=frequency_hz,
         step_s=h,
         steps_per_cycle=steps,
         carry=carry,
-        end=end,
-        kick=kick,
-        drift=constant[m],
-        offset_drift=constant[m + 1],
-        drive=drive,
+        push=pushes[:, :-2],
+        drift=pushes[:, -2],
+        offset_drift=pushes[:, -1],
+        drive=np.asarray(drive, dtype=np.complex128),
     )
 
 
-def _step_integrals(
-    A: NDArray[np.float64], forcings: NDArray[np.float64], h: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """e^(A h), and the responses after h to forcings held at 1 and rising from 0 to 1.
+def _turn(
+    modes: Modes, forcings: NDArray[np.float64], h: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Carry (p, 2) of a step h, and what forcings (p, k) held over it add to the modes (p, k)."""
+    angle = modes.rates * h
+    still = np.where(angle == 0.0, 1.0, angle)
+    carry = _in_pairs(np.exp(angle), modes.turning)
+    held = _in_pairs(h * np.where(angle == 0.0, 1.0, np.expm1(angle) / still), modes.turning)
+    partners = forcings.reshape(-1, 2, forcings.shape[1])
+    pushes = np.einsum("irc,ick->irk", held.reshape(-1, 2, 2), partners)
+    return carry, pushes.reshape(forcings.shape)
 
-    One exponential of an augmented matrix gives all three (Van Loan 1978).
-    `forcings` is (k, n), the two responses as well.
-    """
-    n, k = A.shape[0], len(forcings)
-    # Stiffness over inertia makes entries of 1e9 beside entries of 1; balancing
-    # keeps the squarings inside the exponential accurate.
-    balanced, (scale, _) = matrix_balance(A * h, permute=False, separate=True)
-    augmented = np.zeros((n + 2 * k, n + 2 * k))
-    augmented[:n, :n] = balanced
-    augmented[:n, n : n + k] = forcings.T * h / scale[:, None]
-    augmented[n : n + k, n + k :] = np.eye(k)
+
+def _in_pairs(values: NDArray, turning: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """A function of the rates (p,) as the two columns of its blocks of two rows, (p, 2)."""
+    first, second = values[0::2], values[1::2]
+    top = np.stack([first.real, np.where(turning, first.imag, 0.0)], axis=1)
+    bottom = np.stack([np.where(turning, -first.imag, 0.0), second.real], axis=1)
+    return np.stack([top, bottom], axis=1).reshape(-1, 2)
+
+
+def _exponential(
+    A: NDArray[np.float64], forcings: NDArray[np.float64], h: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The same as `_turn` from one exponential of an augmented matrix (Van Loan 1978)."""
+    p, k = forcings.shape
+    augmented = np.zeros((p + k, p + k))
+    augmented[:p, :p], augmented[:p, p:] = A * h, forcings * h
     exponential = expm(augmented)
-    carry = exponential[:n, :n] * scale[:, None] / scale[None, :]
-    constant = (exponential[:n, n : n + k] * scale[:, None]).T
-    rising = (exponential[:n, n + k :] * scale[:, None]).T
-    return carry, constant, rising
+    return np.ascontiguousarray(exponential[:p, :p]), exponential[:p, p:]

@@ -314,7 +314,7 @@ def _linear_key(system: PiecewiseLinearSystem) -> bytes:
     for law in system.nonlinearities:
         stribeck = float(law.law is Law.FRICTION and law.parameters[1] != 0.0)
         fixed = np.array([law.law, law.feedthrough, law.stiffness, law.damping, stribeck])
-        parts += [law.inlet, law.outlet, law.rate, fixed]
+        parts += [law.inlet, law.outlet, fixed]
     return b"".join(np.ascontiguousarray(part, dtype=float).tobytes() for part in parts)
 
 

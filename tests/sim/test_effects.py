@@ -84,7 +84,7 @@ def test_effect_does_what_the_equations_with_it_do(text, without):
     assert decibel < 0.02
     assert degree < 0.2
     assert np.abs(got[2:] - expected[2:]).max() < 1e-3 * abs(expected[1])
-    assert abs(got[0] - expected[0]) < 1e-3 * abs(expected[1])
+    assert abs(got[0] - expected[0]) < 2e-3 * abs(expected[1])
     # A case that the effect does not change would prove nothing.
     assert abs(expected[1] / without[1] - 1.0) > 3e-3
 

@@ -57,9 +57,9 @@ def without_losses(unit, ratio):
 @pytest.mark.parametrize("ratio", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("name", UNITS)
 def test_a_chain_without_losses_keeps_its_energy(name, ratio):
-    history = energies(without_losses(UNITS[name], ratio), seed=1, samples=50)
-    assert np.abs(history - 1.0).max() < 0.3
-    assert abs(history.mean() - 1.0) < 0.05
+    # 0.5 s of free motion, thousands of impacts; up to 1e-4 was measured, on EDSS at 0.5.
+    history = energies(without_losses(UNITS[name], ratio), seed=1, samples=125)
+    assert np.abs(history - 1.0).max() < 5e-4
 
 
 @settings(max_examples=25, deadline=None)
@@ -80,21 +80,25 @@ def test_free_motion_never_gains_energy(name, ratio, b_t_deg, T_f_m, T_f_L, c_s1
     effects = [parse_effect(f"{key}={value}") for key, value in chosen.items()]
     drivetrain = drivetrain_with(unit, ratio, effects).replacing("motor", k_t=0.0, k_b=0.0)
     history = energies(drivetrain, seed, samples=20, lanes=4)
-    assert np.diff(history, axis=0).max() < 0.05
+    assert np.diff(history, axis=0).max() < 1e-5
     assert history.min() >= 0.0
 
 
-def test_friction_brings_free_motion_to_rest_and_rest_is_still():
-    dampers = ["shaft-damping:c_s1=0.02", "mesh1-damping:c_g1=0.2", "mesh2-damping:c_2=2"]
-    drivetrain = drivetrain_with(ADSS, 0.25, [parse_effect(text) for text in dampers])
-    drivetrain = drivetrain.replacing("motor", k_t=0.0, k_b=0.0)
-    system = drivetrain.system()
+DAMPERS = ["shaft-damping:c_s1=0.02", "mesh1-damping:c_g1=0.2", "mesh2-damping:c_2=2"]
+
+
+@pytest.mark.parametrize(("b_t_deg", "creep"), [(0.0, 1e-11), (0.066, 1e-5)])
+def test_friction_brings_free_motion_to_rest_and_rest_is_still(b_t_deg, creep):
+    unit = ADSS.with_parameters(b_t_deg=b_t_deg)
+    drivetrain = drivetrain_with(unit, 0.25, [parse_effect(text) for text in DAMPERS])
+    system = drivetrain.replacing("motor", k_t=0.0, k_b=0.0).system()
     x = kicked(system, 8, np.random.default_rng(5))
-    _, x = drive(system, x, 10.0, 5)
-    frictions = [law for law in system.nonlinearities if law.law is Law.FRICTION]
-    for law in frictions:
-        assert np.abs(law.outlet @ x).max() < 1e-12
+    _, x = drive(system, x, 10.0, 10)
+    for law in system.nonlinearities:
+        if law.law is Law.FRICTION:
+            assert np.abs(law.outlet @ x).max() < 1e-12
     _, later = drive(system, x, 10.0, 2)
     for name in ("th_m", "th_L"):
         row = system.states.index(name)
-        assert np.abs(later[row] - x[row]).max() < 1e-12
+        # With play, gear 1 still drifts to and fro between its stops, ever slower.
+        assert np.abs(later[row] - x[row]).max() < creep
