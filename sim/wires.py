@@ -259,9 +259,10 @@ class Terminal:
 
     def unplug(self, now_s: float) -> None:
         """Pull the cable; it is plugged in again a little later."""
-        self.close_terminal()
-        # The system may give the old device to somebody else in the meantime.
+        # The name goes first: who hears the hang-up must not find the old device by it,
+        # which the system may give to somebody else.
         Path(self.path).unlink(missing_ok=True)
+        self.close_terminal()
         self._away_until = now_s + _REPLUG_S
 
     def close_terminal(self) -> None:

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.stats import fisher_exact
 from matplotlib.image import imread
 from oracle import rk4
 
@@ -165,19 +166,25 @@ def test_paper_scheme_meets_table_2_in_every_row():
             assert abs(np.median(read.rf_hz) - row.rf_hz) <= 4.0, row
 
 
-def test_step_of_the_exact_engine_is_fine_enough_for_edss(monkeypatch):
-    # At 78 Hz a step of 5 us ends on another branch, 6 dB higher; the oracle's 2 us do not.
+def test_both_motions_of_edss_are_met_as_often_as_the_oracle_meets_them(monkeypatch):
+    # At 78 Hz two motions coexist, one of them at -6 dB; too coarse a step falls for it.
     unit = load_unit("edss")
     plays = stage_backlash(0.75, unit.backlash.b_t_deg, unit.stage2.N).half_plays_rad
     monkeypatch.setitem(paper_runs.BANDS_HZ, "EDSS", (78.0, 78.0))
     (exact,) = paper_runs.exact_runs_db("EDSS", [75], 16, 0, lambda share: None)
     generator = np.random.default_rng(0)
     gains = []
-    for _ in range(6):
+    for _ in range(10):
         state = np.zeros(len(rk4.STATES))
         state[rk4.STATES.index("th_L")] = generator.uniform(-1e-3, 1e-3) * plays[1]
         cycles, _ = rk4.simulate_cycles(unit.parameters, *plays, 2.5, 78.0, 100, state=state)
         gains.append(20.0 * np.log10(abs(cycles[60:, 1].mean())))
-    # Runs scatter by 3.7 dB, medians of 16 and 6 by 1.2 and 1.9 dB.
-    assert np.median(exact) == pytest.approx(np.median(gains), abs=4.5)
-    assert np.median(exact) < -8.0
+    exact, oracle = np.ravel(exact), np.array(gains)
+    high = [np.count_nonzero(runs > -8.0) for runs in (exact, oracle)]
+    table = [[high[0], exact.size - high[0]], [high[1], oracle.size - high[1]]]
+    # Exact test: equal machines differ by more than this once in a thousand times.
+    assert fisher_exact(table).pvalue > 1e-3
+    # On the other motion runs scatter by 2 dB; medians of five or more by 1 dB at most.
+    low = [np.median(runs[runs <= -8.0]) for runs in (exact, oracle) if np.any(runs <= -8.0)]
+    assert len(low) == 2
+    assert low[0] == pytest.approx(low[1], abs=4.0)
