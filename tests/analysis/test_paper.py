@@ -5,9 +5,9 @@ import math
 
 import numpy as np
 import pytest
-from scipy.stats import fisher_exact
 from matplotlib.image import imread
 from oracle import rk4
+from scipy.stats import fisher_exact
 
 from analysis import paper_runs
 from analysis.paper import reproduce
