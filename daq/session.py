@@ -46,6 +46,8 @@ _LOOK_S = 0.05
 """How long a pause sleeps before it looks at the control again."""
 _SAFE_TRIES = 10
 """How often the safe-off recipe is begun again when a key press breaks it."""
+_RECONNECT_S = 0.3
+"""Pause before a dead connection is opened anew; a gateway must see first that it is gone."""
 _REFINED_RUN_IN = 8
 """Points of the plan driven before those that refinement asks for."""
 
@@ -367,6 +369,7 @@ class Session:
     def _connect(self, reopen: Callable[[], Analyser]) -> bool:
         try:
             self._analyser.close()
+            time.sleep(_RECONNECT_S)
             self._analyser = reopen()
         except LashbenchError:
             return False

@@ -1,0 +1,148 @@
+"""What every fault leads to, found out by provoking it; the table of docs/faults.md is made here.
+
+Run as ``python tests/fault_table.py`` it provokes all of them with the
+driver's own time limits and writes the table into the page. The tests provoke
+them with shorter limits and compare.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from bench_server import linear_analyser, served  # noqa: E402
+
+from daq.control import SessionControl
+from daq.errors import LashbenchError
+from daq.hp35670a_setup import Timing
+from daq.session_events import Finished
+from sim.faults import CATALOGUE
+from sim.unit import load_unit
+from tui.bench import bench_session
+from tui.measure_options import PlanOptions, session_request
+
+PAGE = Path(__file__).parents[1] / "docs" / "faults.md"
+BEGIN, END = "<!-- table begins -->", "<!-- table ends -->"
+WIRES = ("tcp", "prologix_tcp")
+POINTS = 6
+
+DEADLINES_S = {"silence": 60, "stuck-measuring-bit": 60, "stuck-parser": 45}
+"""Bound of the whole session with the driver's own limits, s; 30 s for all others."""
+DEADLINE_S = 30
+
+
+IN_MID_SWEEP = ("slow-reply", "garbage-bytes", "truncated-block", "wrong-length", "missing-eoi")
+"""Faults of a reply, which strike at the first one unless told otherwise."""
+
+FOR_A_MOMENT = ("lost-power", "adapter-reset")
+"""Faults that last for a while, kept short of any time limit."""
+
+
+def ordered(name: str) -> str:
+    """The fault as it is ordered: all that can do so strike in the sweep, not in the checks."""
+    if name in IN_MID_SWEEP:
+        return f"{name}:point=4,phase=read-out"
+    return f"{name}:point=3,seconds=0.3" if name in FOR_A_MOMENT else name
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a session with a fault in it ended."""
+
+    code: int
+    state: str
+    points: int
+    flagged: int
+    source: str
+    elapsed_s: float
+    said: str
+
+    def __str__(self) -> str:
+        flagged = f", {self.flagged} flagged" if self.flagged else ""
+        return f"{self.code}, {self.points} of {POINTS} points{flagged}, {self.source}"
+
+
+def provoke(fault: str, wire: str, folder: Path) -> Outcome:
+    """Measure on a simulated analyser with one fault."""
+    unit, history = load_unit("adss"), folder / f"{fault.partition(':')[0]}-{wire}.db"
+    options = PlanOptions((2.5,), 130.0, 170.0, POINTS, settle_cycles=3, integrate_cycles=4)
+    began, finished, error = time.monotonic(), None, None
+    with served(linear_analyser(lambda hz: 0.3, [fault]), wire) as url:
+        remarks = {"serial": "", "operator": "", "notes": ""}
+        request = session_request(
+            options, "adss", unit, url, history,
+            recipe=None, bench="default", resume=None, remeasure=None, run_in=None,
+            remarks=remarks,
+        )  # fmt: skip
+        try:
+            for event in bench_session(url, unit, history, request, SessionControl()):
+                finished = event if isinstance(event, Finished) else finished
+        except LashbenchError as fault_told:
+            error = fault_told
+    assert finished is not None, error
+    assert finished.error is error
+    return Outcome(
+        0 if error is None else error.exit_code,
+        finished.state,
+        finished.points,
+        finished.flagged,
+        finished.source_state.value,
+        time.monotonic() - began,
+        "" if error is None else str(error),
+    )
+
+
+def provoke_all(folder: Path, faults: dict[str, str]) -> dict[tuple[str, str], Outcome]:
+    """Every fault on every wire, side by side: most of the time is waiting."""
+    jobs = [(name, wire) for name in faults for wire in WIRES]
+    with ThreadPoolExecutor(8) as pool:
+        outcomes = pool.map(lambda job: provoke(faults[job[0]], job[1], folder), jobs)
+        return dict(zip(jobs, outcomes, strict=True))
+
+
+def short_timing() -> Timing:
+    """Limits for tests: outcomes are the same, waits are not."""
+    return Timing(reply_s=1.0, block_s=1.5, overhead_s=3.0)
+
+
+def rows(outcomes: dict[tuple[str, str], Outcome]) -> list[str]:
+    """The table, one row a fault."""
+    lines = [
+        "| fault | what it is | on raw TCP | through an adapter | ends within |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for name, kind in CATALOGUE.items():
+        cells = [str(outcomes[name, wire]) for wire in WIRES]
+        bound = DEADLINES_S.get(name, DEADLINE_S)
+        lines.append(f"| `{name}` | {kind.does} | {' | '.join(cells)} | {bound} s |")
+    return lines
+
+
+def written_rows() -> list[str]:
+    """The table as the page has it."""
+    text = PAGE.read_text(encoding="utf-8")
+    return text[text.index(BEGIN) + len(BEGIN) : text.index(END)].strip().splitlines()
+
+
+def main() -> None:
+    """Provoke all, check the deadlines, write the table."""
+    with tempfile.TemporaryDirectory() as folder:
+        outcomes = provoke_all(Path(folder), {name: ordered(name) for name in CATALOGUE})
+    for (name, wire), outcome in outcomes.items():
+        line = f"{name:22} {wire:13} {outcome.elapsed_s:5.1f} s  {outcome}  {outcome.said[:90]}"
+        print(line)  # noqa: T201
+        assert outcome.elapsed_s < DEADLINES_S.get(name, DEADLINE_S)
+    text = PAGE.read_text(encoding="utf-8")
+    before, after = text[: text.index(BEGIN)], text[text.index(END) :]
+    table = "\n".join(rows(outcomes))
+    PAGE.write_text(f"{before}{BEGIN}\n\n{table}\n\n{after}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,45 @@
+"""Every fault that the simulated analyser has, provoked again and held against docs/faults.md."""
+
+import re
+from pathlib import Path
+
+import pytest
+from fault_table import CATALOGUE, ordered, provoke_all, rows, short_timing, written_rows
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def outcomes(tmp_path_factory):
+    patch = pytest.MonkeyPatch()
+    patch.setattr("daq.hp35670a.Timing", short_timing)
+    patch.setattr("daq.hp35670a_safe._BUDGET_S", 4.0)
+    faults = {name: ordered(name) for name in CATALOGUE}
+    faults["slow-reply"] += ",seconds=0.5"
+    try:
+        return provoke_all(tmp_path_factory.mktemp("faults"), faults)
+    finally:
+        patch.undo()
+
+
+def test_the_page_says_what_happens(outcomes):
+    assert rows(outcomes) == written_rows()
+
+
+def test_every_end_is_one_of_those_that_are_documented(outcomes):
+    for (name, wire), outcome in outcomes.items():
+        assert outcome.code in (0, 1, 3, 4), (name, wire)
+        assert (outcome.code == 0) == (outcome.state == "complete"), (name, wire)
+        assert (outcome.code == 0) == (outcome.said == ""), (name, wire)
+        # Only an instrument that says nothing any more leaves the source unproven.
+        assert (outcome.source == "confirmed-off") == (name != "silence"), (name, wire)
+        assert outcome.elapsed_s < 40.0, (name, wire)
+
+
+def test_the_tests_that_the_page_names_exist():
+    page = (ROOT / "docs" / "faults.md").read_text()
+    sources = "".join(path.read_text() for path in (ROOT / "tests").rglob("test_*.py"))
+    named = set(re.findall(r"`(test_\w+)`", page))
+    assert len(named) > 15
+    for name in named:
+        assert f"def {name}(" in sources, name
