@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 
 from daq.errors import FileFormatError, InputError
 from daq.formats.atomic import write_text
+from daq.formats.csv_columns import EXTRA_KEYS, extra_columns, extra_comments
 from daq.formats.toml import toml_key, toml_value
 from daq.frf import FrequencyResponse, PointFlag
 
@@ -52,6 +53,7 @@ _PROCEDURE = (
     "from_rest",
     "point_flags",
     "spoilt_points",
+    *EXTRA_KEYS,
 )
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\Z")
 
@@ -105,6 +107,7 @@ def read(path: Path) -> FrequencyResponse:
         magnitude * np.exp(1j * angle),
         phase_known=known,
         gain_std_db=table["gain_std_db"],
+        **extra_columns(table.comments, len(table.lines), path),
         provenance={"kind": "measured"} | provenance,
         **procedure,
     )
@@ -161,6 +164,7 @@ def _comments(kept: FrequencyResponse, spoilt: FrequencyResponse) -> dict[str, A
     }
     if np.any(kept.flags):
         comments["point_flags"] = kept.flags
+    comments |= extra_comments(kept)
     comments |= {k: v for k, v in kept.provenance.items() if k not in _PROCEDURE}
     listed = list(kept.provenance.get("spoilt_points", []))
     listed += np.column_stack([spoilt.frequency_hz, spoilt.source_vpk]).tolist()
