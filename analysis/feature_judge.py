@@ -38,6 +38,8 @@ def judge_features(points: Sequence[SweepPoint]) -> list[tuple[float, float, flo
         is not found.
     """
     latest = {point.frequency_hz: point for point in points}
+    if not latest:
+        return [_NOT_FOUND, _NOT_FOUND]
     response = FrequencyResponse.from_arrays(
         list(latest),
         1.0,

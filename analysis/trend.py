@@ -66,18 +66,19 @@ def fit_trend(
     """
     if not len(times_s) == len(values) == len(stds):
         raise InputError("trend: times, values and errors differ in number")
-    if not values:
+    if len(values) == 0:
         return None
-    days, y = np.asarray(times_s, float) / SECONDS_PER_DAY, np.asarray(values, float)
-    weight = 1.0 / np.square(np.asarray(stds, float))
-    if not np.all(np.isfinite(weight)) or not np.all(np.isfinite(y)):
-        raise InputError("trend: every value needs an error above 0")
+    times, y, std = (np.asarray(column, dtype=float) for column in (times_s, values, stds))
+    if not np.all(np.isfinite(times) & np.isfinite(y) & np.isfinite(std) & (std > 0)):
+        raise InputError("trend: every value needs a moment, and an error above 0")
+    # From the first moment on, so that a far origin costs no digits.
+    days, weight = (times - times.min()) / SECONDS_PER_DAY, 1.0 / np.square(std)
     total = float(weight.sum())
     mean, middle = float(weight @ y / total), float(weight @ days / total)
-    spread = float(weight @ np.square(days - middle))
-    if spread <= 0.0:
+    if not np.any(days):
         chi2 = float(weight @ np.square(y - mean))
         return Trend(mean, total**-0.5, None, None, chi2, len(y) - 1)
+    spread = float(weight @ np.square(days - middle))
     slope = float(weight @ ((days - middle) * y) / spread)
     chi2 = float(weight @ np.square(y - mean - slope * (days - middle)))
     return Trend(mean, total**-0.5, slope, spread**-0.5, chi2, len(y) - 2)

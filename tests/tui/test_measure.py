@@ -466,7 +466,7 @@ def test_history_shows_the_trend_with_error_bars(run, db):
     assert (trend["unit"], trend["serial"], trend["measurements"]) == ("ADSS", "S", 3)
     assert trend["mean"]["value"] == pytest.approx(1.25 / 3)
     assert trend["mean"]["std"] == pytest.approx(0.05 / math.sqrt(3))
-    assert trend["per_day"]["value"] > 0
+    assert trend["per_day"] is None
     _, out, _ = run("history")
     assert "0.300 +- 0.050" in out
     bars = [line for line in out.splitlines() if "-o-" in line]
@@ -484,6 +484,20 @@ def test_history_shows_the_trend_with_error_bars(run, db):
     _, out, _ = run("history")
     # A line through 0.30, 0.40, 0.55 a week apart rises by 0.125 a week.
     assert "+0.536 +- 0.15 in 30 days" in out
+    assert "differ by more than their errors" not in out
+
+
+def test_values_that_do_not_agree_are_not_passed_off_as_one(run, db):
+    for _ in range(2):
+        run(*measuring("--serial", "S"))
+    with Store(db) as store:
+        for measurement, ratio in ((1, 0.20), (2, 0.60)):
+            estimated(store, measurement, ratio)
+    document = json.loads(run("history", "--json")[1])
+    (trend,) = [t for t in document["trends"] if t["quantity"] == "contribution_ratio"]
+    assert trend["per_day"] is None
+    assert trend["chi2"] == pytest.approx(2 * (0.2 / 0.05) ** 2)
+    assert "differ by more than their errors" in run("history")[1]
 
 
 def test_missing_estimates_are_made_once_and_kept(run, db, monkeypatch):

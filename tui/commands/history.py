@@ -28,6 +28,8 @@ _QUANTITIES = ("contribution_ratio", "b1_deg", "b2_deg")
 _BUDGET_S = 45.0
 """Time after which `--estimate some` begins no further estimate."""
 _BAR = 41
+_SCATTER = 4.0
+"""Mean squared distance in standard errors from which values are said to differ."""
 
 
 def history(
@@ -174,8 +176,6 @@ def _groups(rows: Sequence[dict[str, Any]]) -> dict[tuple[str, str], list[dict[s
 
 
 def _trends(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    from datetime import datetime
-
     from analysis.trend import fit_trend
 
     trends = []
@@ -183,7 +183,7 @@ def _trends(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         for name in _QUANTITIES:
             sure = [row for row in group if row[name] and row[name]["std"]]
             trend = fit_trend(
-                [datetime.fromisoformat(row["started"]).timestamp() for row in sure],
+                _moments_s(sure),
                 [row[name]["value"] for row in sure],
                 [row[name]["std"] for row in sure],
             )
@@ -196,7 +196,6 @@ def _trends(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
                     "serial": serial,
                     "quantity": name,
                     "measurements": len(sure),
-                    "span_days": _span_days(sure),
                     "mean": {"value": trend.mean, "std": trend.mean_std},
                     "per_day": None if trend.slope_per_day is None else slope,
                     "chi2": trend.chi2,
@@ -206,11 +205,16 @@ def _trends(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     return trends
 
 
-def _span_days(rows: Sequence[dict[str, Any]]) -> float:
+def _moments_s(rows: Sequence[dict[str, Any]]) -> list[float]:
+    """When each was begun; measurements of one day count as made at the same moment.
+
+    Minutes apart, a slope would say nothing but how wide the bars are.
+    """
     from datetime import datetime
 
-    moments = [datetime.fromisoformat(row["started"]).timestamp() for row in rows]
-    return (max(moments) - min(moments)) / _SECONDS_PER_DAY
+    moments_s = [datetime.fromisoformat(row["started"]).timestamp() for row in rows]
+    apart_s = max(moments_s, default=0.0) - min(moments_s, default=0.0)
+    return moments_s if apart_s >= _SECONDS_PER_DAY else [0.0] * len(rows)
 
 
 def _table(rows: Sequence[dict[str, Any]]) -> str:
@@ -276,16 +280,17 @@ def _bar(value: float, std: float) -> str:
 def _lines(trends: Sequence[dict[str, Any]]) -> list[str]:
     lines = []
     for trend in trends:
-        if trend["per_day"] is None:
+        if trend["measurements"] < 2:
             continue
-        slope = trend["per_day"]
         name = f"{trend['unit']} {trend['serial']}".strip()
         line = (
             f"{name}: {trend['quantity']} {trend['mean']['value']:.4g} "
             f"+- {trend['mean']['std']:.2g}"
         )
-        # Minutes apart, a slope per month says nothing but how wide the bars are.
-        if trend["span_days"] >= 1.0:
+        slope = trend["per_day"]
+        if slope is not None:
             line += f", {30 * slope['value']:+.3g} +- {30 * slope['std']:.2g} in 30 days"
+        if trend["chi2"] > _SCATTER * max(trend["degrees"], 1):
+            line += "; they differ by more than their errors"
         lines.append(line)
     return ["", *lines] if lines else []
