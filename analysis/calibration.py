@@ -26,7 +26,7 @@ _FLOOR = 0.03
 
 _SQUASH = 0.6
 _REACH = 2.0
-_NEAREST = 200
+_NEAREST = 180
 """Runs that take part: the answer is learned where it lies."""
 
 

@@ -1,7 +1,7 @@
 """Fitting the free numbers of a machine to an observation.
 
-Owns where simulations are placed: a coarse look over the whole range, then a
-closer one where the likelihood lies, and the posterior that follows. What is
+Owns where simulations are placed: a coarse look over the whole range, then
+closer ones about the answer so far, and the posterior that follows. What is
 free (contribution ratio, total backlash) is the caller's; how far the answer
 can be trusted is found out in `analysis.calibration`. It decides nothing about
 causes.
@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.calibration import calibrate
+from analysis.calibration import Calibrated, calibrate
 from analysis.emulator import Emulator
 from analysis.ensemble import TOLERANCES, Draws, Machine, run_machines
 from analysis.likelihood import Match, match_prediction
@@ -27,9 +27,6 @@ __all__ = ["Axis", "Posterior", "RATIO", "fit_posterior"]
 
 Progress = Callable[[float, str], None]
 
-_COARSE_TEMPER = 0.05
-"""Share of the likelihood that narrows the search: neighbouring points err together."""
-
 _SIMULATED = ("R_m", "k_t", "J_L", "k_s1", "k_a")
 """Datasheet values whose spread is simulated; that of k_ts scales the gain alone."""
 
@@ -38,7 +35,9 @@ _DEVIATION = 0.0075
 
 _GROUPS = 8
 _PER_GROUP = 14
-_PLAIN = 72
+_FIRST, _PLAIN = 32, 48
+_REACH = 2.5
+"""Runs lie up to so many standard deviations from the answer so far."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,20 +103,19 @@ def fit_posterior(
 
     rng = np.random.default_rng(seed)
     axes = tuple(axes)
-    coarse = _coarse_machines(axes)
-    draws = run_machines(unit, coarse, observation, report(0.0, 0.35, "simulating the range"))
     scales = np.array([axis.scale for axis in axes])
-    grid = _grid(axes)
-    likely = _weights(_Look(observation, axes, draws, scales).log_likelihood(grid))
-    fine = _fine_machines(axes, grid, likely, rng)
-    draws = draws.joined(
-        run_machines(unit, fine, observation, report(0.35, 0.9, "simulating near the answer"))
+    draws = run_machines(
+        unit, _coarse_machines(axes), observation, report(0.0, 0.2, "simulating the range")
     )
-    if progress is not None:
-        progress(0.9, "weighing the simulations")
+    # The regression leans towards where its runs are: each round is centred anew.
+    for low, high, plain, groups in ((0.2, 0.4, _FIRST, 0), (0.4, 0.95, _PLAIN, _GROUPS)):
+        found = calibrate(observation, _Look(observation, axes, draws, scales).emulator, rng)
+        machines = _fine_machines(axes, found, plain * len(axes), groups, rng)
+        text = "simulating near the answer"
+        draws = draws.joined(run_machines(unit, machines, observation, report(low, high, text)))
     look = _Look(observation, axes, draws, 0.6 * scales)
     calibrated = calibrate(observation, look.emulator, rng)
-    weight = calibrated.density(grid)
+    weight = calibrated.density(_grid(axes))
     best = np.clip(calibrated.mean, [axis.low for axis in axes], [axis.high for axis in axes])
     if progress is not None:
         progress(1.0, "done")
@@ -160,9 +158,6 @@ class _Look:
     def match(self, place: NDArray[np.float64]) -> Match:
         return match_prediction(self._observation, self.emulator.predict(place))
 
-    def log_likelihood(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.array([self.match(place).log_likelihood for place in places])
-
 
 def _value(axis: Axis, machine: Machine) -> float:
     value = getattr(machine, axis.name)
@@ -187,31 +182,34 @@ def _coarse_machines(axes: Sequence[Axis]) -> list[Machine]:
 
 def _fine_machines(
     axes: Sequence[Axis],
-    grid: NDArray[np.float64],
-    likely: NDArray[np.float64],
+    found: Calibrated,
+    plain: int,
+    groups: int,
     rng: np.random.Generator,
 ) -> list[Machine]:
-    """Machines where the answer may lie: some as in the datasheet, some off it in known ways."""
-    mean, variance = _moments(grid, likely)
-    reach = np.array([0.3 * axis.scale for axis in axes])
+    """Machines evenly about the answer: some as in the datasheet, some off it in known ways."""
+    low = np.array([axis.low for axis in axes])
+    high = np.array([axis.high for axis in axes])
+    least = np.array([0.4 * axis.scale for axis in axes])
+    reach = _REACH * np.maximum(np.sqrt(np.diag(found.covariance)), least)
+    centre = np.clip(found.mean, low, high)
+    bottom, top = np.maximum(centre - reach, low), np.minimum(centre + reach, high)
 
     def place() -> NDArray[np.float64]:
-        centre = grid[rng.choice(len(grid), p=likely)]
-        step = rng.uniform(-1.5, 1.5, len(axes)) * np.maximum(np.sqrt(variance), reach)
-        low = np.array([axis.low for axis in axes])
-        high = np.array([axis.high for axis in axes])
-        return np.clip(centre + step, low, high)
+        return rng.uniform(bottom, top)
 
-    plain = _PLAIN * len(axes)
-    machines = [_machine_at(axes, place(), 10_000 + i) for i in range(plain)]
-    signs = _balanced_signs(_GROUPS, len(_SIMULATED), rng)
-    for g in range(_GROUPS):
+    first = int(rng.integers(2**30))
+    machines = [_machine_at(axes, place(), first + i) for i in range(plain)]
+    if not groups:
+        return machines
+    signs = _balanced_signs(groups, len(_SIMULATED), rng)
+    for g in range(groups):
         deviations = tuple(
             (symbol, float(_DEVIATION * sign))
             for symbol, sign in zip(_SIMULATED, signs[g], strict=True)
         )
         for i in range(_PER_GROUP * len(axes)):
-            machine = _machine_at(axes, place(), 20_000 + 100 * g + i)
+            machine = _machine_at(axes, place(), first + 1000 * (g + 1) + i)
             machines.append(replace(machine, deviations=deviations))
     return machines
 
@@ -235,15 +233,3 @@ def _machine_at(axes: Sequence[Axis], place: NDArray[np.float64], seed: int) -> 
     for axis, value in zip(axes, place, strict=True):
         machine = axis.machine(machine, float(value))
     return machine
-
-
-def _weights(log_likelihood: NDArray[np.float64]) -> NDArray[np.float64]:
-    weight = np.exp(_COARSE_TEMPER * (log_likelihood - np.max(log_likelihood)))
-    return np.asarray(weight / weight.sum())
-
-
-def _moments(
-    grid: NDArray[np.float64], weight: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    mean = weight @ grid
-    return mean, weight @ (grid - mean) ** 2
