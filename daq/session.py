@@ -35,6 +35,7 @@ from daq.session_events import (
     SessionEvent,
     SourceSafe,
 )
+from daq.session_instrument import HeldInstrument
 from daq.session_journal import Journal, Place
 from daq.session_request import SessionRequest
 from daq.store import Store
@@ -44,10 +45,6 @@ __all__ = ["Session"]
 
 _LOOK_S = 0.05
 """How long a pause sleeps before it looks at the control again."""
-_SAFE_TRIES = 10
-"""How often the safe-off recipe is begun again when a key press breaks it."""
-_RECONNECT_S = 0.3
-"""Pause before a dead connection is opened anew; a gateway must see first that it is gone."""
 _REFINED_RUN_IN = 8
 """Points of the plan driven before those that refinement asks for."""
 
@@ -79,9 +76,7 @@ class Session:
         reopen: Callable[[], Analyser] | None = None,
     ) -> None:
         self.control = control or SessionControl()
-        self._analyser = analyser
-        self._given = analyser
-        self._reopen = reopen
+        self._instrument = HeldInstrument(analyser, self.control, reopen)
         self._store = store
         self._request = request
         self._pace = Pace()
@@ -109,7 +104,7 @@ class Session:
         error: Exception | None = None
         try:
             yield self._opened()
-            self._analyser.on_wait = self.control.check
+            self._instrument.listen()
             yield from self._check()
             yield from self._measure()
         except Cancelled:
@@ -120,20 +115,14 @@ class Session:
             # Whoever watched has left, or the program is told to end: nobody
             # is there to yield to, and the source must be off all the same.
             self._close(None)
-            self._let_go()
+            self._instrument.let_go()
             raise
         finished = self._close(error)
-        self._let_go()
+        self._instrument.let_go()
         yield SourceSafe(finished.source_state)
         yield finished
         if finished.error is not None:
             raise finished.error
-
-    def _let_go(self) -> None:
-        """Close a connection that the session opened itself."""
-        if self._analyser is not self._given:
-            self._analyser.close()
-            self._analyser = self._given
 
     # ------------------------------------------------------------ checks
 
@@ -147,12 +136,12 @@ class Session:
         journal = self._journal
         yield from journal.told([self._limits()])
         self.control.check()
-        identity = self._analyser.identify()
+        identity = self._instrument.analyser.identify()
         yield from journal.told(
             check_identity(identity, journal.before.instrument if journal.before else None)
         )
         journal.instrument(identity)
-        yield from journal.told(check_source(self._analyser))
+        yield from journal.told(check_source(self._instrument.analyser))
         journal.source(SourceState.CONFIRMED_OFF)
         self.control.check()
         nothing_to_drive = self._agenda.finished and self._request.refinement is None
@@ -160,7 +149,7 @@ class Session:
             return
         journal.source(SourceState.ON)
         point, trial = take_trial(
-            self._analyser, self._plan, self._settings(min(self._plan.levels_vpk))
+            self._instrument.analyser, self._plan, self._settings(min(self._plan.levels_vpk))
         )
         journal.note(
             "trial point",
@@ -217,14 +206,14 @@ class Session:
     def _sweep(self, source_vpk: float, run: Sequence[float]) -> Iterator[SessionEvent]:
         """Drive neighbouring points, with a run-in where the level was under way already."""
         plan = self._plan
-        readback = self._analyser.prepare(
+        readback = self._instrument.analyser.prepare(
             min(plan.frequencies_hz), max(plan.frequencies_hz), self._settings(source_vpk)
         )
         yield from self._journal.settings(readback)
         lead = self._lead(source_vpk, run[0])
         self._journal.source(SourceState.ON)
         yield LevelStarted(source_vpk, len(run))
-        points = self._analyser.sweep([*lead, *run])
+        points = self._instrument.analyser.sweep([*lead, *run])
         try:
             yield from self._run_in(source_vpk, lead, points)
             if self.control.cut is not None:
@@ -292,7 +281,7 @@ class Session:
         while self.control.paused and self.control.cut is None:
             time.sleep(_LOOK_S)
         if self.control.cut is None:
-            self._analyser.on_wait = self.control.check
+            self._instrument.listen()
             self._journal.note("go on", "after a pause")
             yield GoingOn()
 
@@ -342,46 +331,13 @@ class Session:
         return "interrupted", cut[1] if cut is not None else "nobody watched any more"
 
     def _make_safe(self) -> SourceState:
-        """Run the safe-off recipe to its end, over a new connection if the old one is dead."""
-        state = self._off()
-        if (
-            state is SourceState.UNKNOWN
-            and self._reopen is not None
-            and self._connect(self._reopen)
-        ):
-            state = self._off()
-            self._note_reconnection(state)
+        had_new = self._instrument.is_new_connection
+        state = self._instrument.make_safe()
+        if self._instrument.is_new_connection and not had_new:
+            # A journal that cannot be written does not change what is known.
+            with suppress(LashbenchError):
+                self._journal.note("reconnected", f"over a new connection: source {state.value}")
         return state
-
-    def _off(self) -> SourceState:
-        """The recipe, begun again when a key press breaks it."""
-        self._analyser.on_wait = None
-        for _ in range(_SAFE_TRIES):
-            with suppress(KeyboardInterrupt):
-                try:
-                    return self._analyser.make_safe()
-                except Exception:
-                    # It promises not to raise; one that does has proven nothing.
-                    return SourceState.UNKNOWN
-            self.control.interrupt("interrupted from the keyboard")
-        return SourceState.UNKNOWN
-
-    def _connect(self, reopen: Callable[[], Analyser]) -> bool:
-        try:
-            self._analyser.close()
-            time.sleep(_RECONNECT_S)
-            self._analyser = reopen()
-        except LashbenchError:
-            return False
-        except KeyboardInterrupt:
-            self.control.interrupt("interrupted from the keyboard")
-            return False
-        return True
-
-    def _note_reconnection(self, state: SourceState) -> None:
-        # A journal that cannot be written does not change what is known.
-        with suppress(LashbenchError):
-            self._journal.note("reconnected", f"over a new connection: source {state.value}")
 
 
 def _next(points: Iterator[SweepPoint], requested_hz: float) -> SweepPoint:

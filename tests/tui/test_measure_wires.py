@@ -53,7 +53,7 @@ def test_another_seed_gives_other_points(tmp_path):
     assert not np.any(np.array(first) == np.array(second))
 
 
-@pytest.mark.parametrize("wire", ["tcp", "prologix_tcp"])
+@pytest.mark.parametrize("wire", ["tcp", "prologix_pty"])
 def test_kill_9_at_random_moments_loses_nothing(tmp_path, wire):
     """Two kills of one measurement, then on to the end: equal to an unbroken one."""
     chance = random.Random(wire)

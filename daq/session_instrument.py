@@ -1,0 +1,99 @@
+"""The instrument as a session holds it: made safe whatever happens, over a new wire if need be.
+
+Owns the promise that the safe-off recipe runs to its end, and the second
+connection where the first is dead. It measures nothing and knows no store.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import suppress
+
+from daq.analyser import Analyser, SourceState
+from daq.control import SessionControl
+from daq.errors import LashbenchError
+
+__all__ = ["HeldInstrument"]
+
+_SAFE_TRIES = 10
+"""How often the safe-off recipe is begun again when a key press breaks it."""
+_RECONNECT_S = 0.3
+"""Pause before a dead connection is opened anew; a gateway must see first that it is gone."""
+
+
+class HeldInstrument:
+    """An analyser for the length of a session.
+
+    Parameters
+    ----------
+    analyser
+        Connected, and closed by whoever gave it.
+    control
+        Told of key presses that came as exceptions.
+    reopen
+        Connects once more; None where there is no such way.
+    """
+
+    def __init__(
+        self,
+        analyser: Analyser,
+        control: SessionControl,
+        reopen: Callable[[], Analyser] | None,
+    ) -> None:
+        self.analyser = analyser
+        """The connection in use."""
+        self._given = analyser
+        self._control = control
+        self._reopen = reopen
+
+    @property
+    def is_new_connection(self) -> bool:
+        """Whether the connection in use is one that was opened here."""
+        return self.analyser is not self._given
+
+    def listen(self) -> None:
+        """Let waits be ended by the control."""
+        self.analyser.on_wait = self._control.check
+
+    def make_safe(self) -> SourceState:
+        """Run the safe-off recipe to its end, over a new connection if the old one is dead."""
+        state = self._off()
+        if (
+            state is SourceState.UNKNOWN
+            and self._reopen is not None
+            and self._connect(self._reopen)
+        ):
+            state = self._off()
+        return state
+
+    def let_go(self) -> None:
+        """Close a connection that was opened here."""
+        if self.is_new_connection:
+            self.analyser.close()
+            self.analyser = self._given
+
+    def _off(self) -> SourceState:
+        """The recipe, begun again when a key press breaks it."""
+        self.analyser.on_wait = None
+        for _ in range(_SAFE_TRIES):
+            with suppress(KeyboardInterrupt):
+                try:
+                    return self.analyser.make_safe()
+                except Exception:
+                    # It promises not to raise; one that does has proven nothing.
+                    return SourceState.UNKNOWN
+            self._control.interrupt("interrupted from the keyboard")
+        return SourceState.UNKNOWN
+
+    def _connect(self, reopen: Callable[[], Analyser]) -> bool:
+        try:
+            self.analyser.close()
+            time.sleep(_RECONNECT_S)
+            self.analyser = reopen()
+        except LashbenchError:
+            return False
+        except KeyboardInterrupt:
+            self._control.interrupt("interrupted from the keyboard")
+            return False
+        return True
