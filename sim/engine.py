@@ -126,9 +126,9 @@ def _dwell(
     tables = _tables(system, modes, propagator)
     for start in range(0, lanes, MOST_LANES):
         kept = np.arange(start, min(start + MOST_LANES, lanes))
-        # Full vectors are faster, but for a lane alone. Padding repeats a lane: an idle lane
-        # of zeros would run into denormals.
-        width = -(-len(kept) // _LANE_MULTIPLE) * _LANE_MULTIPLE if lanes > 1 else 1
+        # Whole vectors cost less than three lanes one by one. Padding repeats a lane: an idle
+        # lane of zeros would run into denormals.
+        width = -(-len(kept) // _LANE_MULTIPLE) * _LANE_MULTIPLE if len(kept) > 2 else len(kept)
         picked = np.resize(kept, width)
         sums, tops, ends = _run_block(
             system, modes, propagator, tables, parameters[..., picked], state[:, picked],

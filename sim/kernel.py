@@ -193,9 +193,9 @@ def _multiply(carry, push, drift, q, force, spare, lanes):
 
 
 @_part
-def _look(look, waves, cosine, sine, q, free, lanes):
-    """What each law and the output would see at the end of the step without any force."""
-    for j in range(look.shape[0]):
+def _look(look, rows, waves, cosine, sine, q, free, lanes):
+    """What the laws, and the output in the last row, would see at the end without any force."""
+    for j in range(rows):
         l0, l1, l2, l3 = look[j, 0], look[j, 1], look[j, 2], look[j, 3]
         l4, l5, l6, l7 = look[j, 4], look[j, 5], look[j, 6], look[j, 7]
         l8, l9, l10, l11 = look[j, 8], look[j, 9], look[j, 10], look[j, 11]
@@ -310,9 +310,9 @@ def step_cycles(carry, push, drift_in, look, gain, kinds, fixed, parameters, wav
     others = gain.copy()
     for j in range(m):
         others[j, j] = 0.0
-    rows, ticks = look.shape[1], table.shape[0]
-    q = np.zeros((rows, MOST_LANES))
-    spare = np.zeros((rows, MOST_LANES))
+    ticks = table.shape[0]
+    q = np.zeros((look.shape[1], MOST_LANES))
+    spare = np.zeros((look.shape[1], MOST_LANES))
     drift = np.zeros((p, MOST_LANES))
     force = np.zeros((push.shape[1], MOST_LANES))
     free = np.zeros((m + 1, MOST_LANES))
@@ -332,13 +332,14 @@ def step_cycles(carry, push, drift_in, look, gain, kinds, fixed, parameters, wav
         for j in range(3 * m + 3):
             wave[j, s] = waves[j, s]
     for cycle in range(settle_cycles + sums.shape[0]):
+        rows = m + 1 if cycle >= settle_cycles else m
         for step in range(ticks):
             tick = step + 1 if step + 1 < ticks else 0
             if carry.shape[1] == 2:
                 _turn(carry, push, drift, q, force, lanes)
             else:
                 _multiply(carry, push, drift, q, force, spare, lanes)
-            _look(look, wave, table[tick, 0], table[tick, 1], q, free, lanes)
+            _look(look, rows, wave, table[tick, 0], table[tick, 1], q, free, lanes)
             # The first step knows no last forces to start from.
             passes = sweeps if cycle + step > 0 else _FIRST_SWEEPS
             for solved in range(passes * m):
@@ -346,7 +347,7 @@ def step_cycles(carry, push, drift_in, look, gain, kinds, fixed, parameters, wav
                 _feel(others, j, force, free, ahead, 0, lanes)
                 _solve(kinds[j], fixed[j, 0], fixed[j, 1], gain[j, j], constant, j, y, ahead,
                        force, lanes)  # fmt: skip
-            for j in range(m + 1):
+            for j in range(rows):
                 _feel(gain, j, force, free, y, j, lanes)
             if cycle >= settle_cycles:
                 _accumulate(table, tick, y, m, total, lanes)
