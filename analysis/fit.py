@@ -30,14 +30,11 @@ Progress = Callable[[float, str], None]
 _SIMULATED = ("R_m", "k_t", "J_L", "k_s1", "k_a")
 """Datasheet values whose spread is simulated; that of k_ts scales the gain alone."""
 
-_DEVIATION = 0.0075
-"""Size of the simulated deviations: larger than the tolerance, so that slopes show."""
+_FIRST_GROUPS, _GROUPS, _PER_GROUP = 4, 20, 8
+"""Groups of machines that share their deviations, and so are stepped together; machines in each."""
 
-_GROUPS = 8
-_PER_GROUP = 14
-_FIRST, _PLAIN = 32, 48
 _REACH = 2.5
-"""Runs lie up to so many standard deviations from the answer so far."""
+"""Machines lie up to so many standard deviations from the answer so far."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,9 +105,9 @@ def fit_posterior(
         unit, _coarse_machines(axes), observation, report(0.0, 0.2, "simulating the range")
     )
     # The regression leans towards where its runs are: each round is centred anew.
-    for low, high, plain, groups in ((0.2, 0.4, _FIRST, 0), (0.4, 0.95, _PLAIN, _GROUPS)):
+    for low, high, groups in ((0.2, 0.4, _FIRST_GROUPS), (0.4, 0.95, _GROUPS)):
         found = calibrate(observation, _Look(observation, axes, draws, scales).emulator, rng)
-        machines = _fine_machines(axes, found, plain * len(axes), groups, rng)
+        machines = _fine_machines(axes, found, groups * len(axes), rng)
         text = "simulating near the answer"
         draws = draws.joined(run_machines(unit, machines, observation, report(low, high, text)))
     look = _Look(observation, axes, draws, 0.6 * scales)
@@ -181,13 +178,13 @@ def _coarse_machines(axes: Sequence[Axis]) -> list[Machine]:
 
 
 def _fine_machines(
-    axes: Sequence[Axis],
-    found: Calibrated,
-    plain: int,
-    groups: int,
-    rng: np.random.Generator,
+    axes: Sequence[Axis], found: Calibrated, groups: int, rng: np.random.Generator
 ) -> list[Machine]:
-    """Machines evenly about the answer: some as in the datasheet, some off it in known ways."""
+    """Machines evenly about the answer so far, each group of them off its datasheet in its own way.
+
+    They differ from the datasheet as units do, so that what the regression gets
+    wrong about them is what it will get wrong about a unit.
+    """
     low = np.array([axis.low for axis in axes])
     high = np.array([axis.high for axis in axes])
     least = np.array([0.4 * axis.scale for axis in axes])
@@ -199,31 +196,15 @@ def _fine_machines(
         return rng.uniform(bottom, top)
 
     first = int(rng.integers(2**30))
-    machines = [_machine_at(axes, place(), first + i) for i in range(plain)]
-    if not groups:
-        return machines
-    signs = _balanced_signs(groups, len(_SIMULATED), rng)
+    machines = []
     for g in range(groups):
         deviations = tuple(
-            (symbol, float(_DEVIATION * sign))
-            for symbol, sign in zip(_SIMULATED, signs[g], strict=True)
+            (symbol, float(rng.normal(0.0, TOLERANCES[symbol]))) for symbol in _SIMULATED
         )
-        for i in range(_PER_GROUP * len(axes)):
-            machine = _machine_at(axes, place(), first + 1000 * (g + 1) + i)
+        for i in range(_PER_GROUP):
+            machine = _machine_at(axes, place(), first + 1000 * g + i)
             machines.append(replace(machine, deviations=deviations))
     return machines
-
-
-def _balanced_signs(groups: int, count: int, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Signs (groups, count), each column half plus and half minus, columns unlike each other."""
-    column = np.repeat([1.0, -1.0], groups // 2)
-    best, least = None, np.inf
-    for _ in range(200):
-        trial = np.stack([rng.permutation(column) for _ in range(count)], axis=1)
-        likeness = float(np.abs(np.corrcoef(trial.T) - np.eye(count)).max())
-        if likeness < least:
-            best, least = trial, likeness
-    return np.asarray(best)
 
 
 def _machine_at(axes: Sequence[Axis], place: NDArray[np.float64], seed: int) -> Machine:
