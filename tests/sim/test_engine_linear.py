@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 from side_by_side import ADSS, EDSS, FRICTIONLESS, drive, state_space
 
+from sim import propagator
+from sim.drivetrain import paper_drivetrain
 from sim.effects import drivetrain_with, parse_effect
+from sim.propagator import build_propagator, find_modes
 
 FREQUENCIES = np.geomspace(1.0, 1000.0, 16)
 C_S1 = 2e-3
@@ -60,3 +63,54 @@ def test_a_constant_offset_turns_the_motor_at_its_free_speed():
     p = ADSS.parameters
     speed = p["k_a"] * 0.4 * p["k_t"] / (p["k_t"] * p["k_b"] + p["R_m"] * p["B_m"])
     assert kept[0, 0, 0].real == pytest.approx(p["k_ts"] * speed, rel=1e-6)
+
+
+def state_step(system, modes):
+    """Step matrix and push in the coordinates of the states, from those of the modes."""
+    step = build_propagator(system, modes, 120.0, 5e-6)
+    carry = step.carry
+    if carry.shape[1] == 2:
+        carry = np.zeros((len(step.carry), len(step.carry)))
+        for row in range(len(carry)):
+            pair = row - row % 2
+            carry[row, pair : pair + 2] = step.carry[row]
+    return modes.shapes @ carry @ modes.weights, modes.shapes @ step.push, step.step_s
+
+
+@pytest.mark.parametrize("unit", [ADSS, EDSS], ids=["adss", "edss"])
+@pytest.mark.parametrize("effects", [(), ("shaft-damping:c_s1=0.1", "amplifier-lag:tau_a=1e-4")])
+def test_one_step_is_the_matrix_exponential_by_modes_and_without(unit, effects, monkeypatch):
+    system = drivetrain_with(unit, 0.3, [parse_effect(text) for text in effects]).system()
+    n, inlets = len(system.b), np.array([law.inlet for law in system.nonlinearities]).T
+    by_modes = find_modes(system)
+    assert by_modes.rates.size >= n
+    monkeypatch.setattr(propagator, "_WORST_CONDITION", 0.0)
+    without = find_modes(system)
+    assert without.rates.size == 0
+    scale = np.sqrt(np.maximum(np.diag(system.energy), 1e-9))
+    for modes in (by_modes, without):
+        carry, push, h = state_step(system, modes)
+        # The exponential of a 128th of the step, multiplied and added up: another way there.
+        fine = np.eye(n)
+        term = np.eye(n)
+        held = np.zeros((n, n))
+        for order in range(1, 12):
+            held += term * (h / 128) / order
+            term = term @ system.A * (h / 128) / order
+            fine += term
+        exact, area = np.eye(n), np.zeros((n, n))
+        for _ in range(128):
+            area, exact = area + exact @ held, exact @ fine
+        for found, expected in ((carry, exact), (push, area @ inlets)):
+            apart = np.abs(found - expected) * scale[:, None]
+            assert apart.max() < 1e-8 * (np.abs(expected) * scale[:, None]).max()
+
+
+def test_modes_or_not_the_motion_with_play_and_friction_is_the_same(monkeypatch):
+    system = paper_drivetrain(ADSS, 0.25).system()
+    start = np.zeros(len(system.states))
+    kept, state = drive(system, start, 130.0, 2, amplitude=2.5)
+    monkeypatch.setattr(propagator, "_WORST_CONDITION", 0.0)
+    again, other = drive(system, start, 130.0, 2, amplitude=2.5)
+    assert np.abs(again - kept).max() < 1e-7
+    assert other[:, 0] == pytest.approx(state[:, 0], rel=1e-6, abs=1e-6)
