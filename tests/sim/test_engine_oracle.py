@@ -28,7 +28,7 @@ DAMPERS = {"c_s1": "shaft-damping", "c_g1": "mesh1-damping", "c_2": "mesh2-dampi
 @pytest.mark.parametrize(
     ("case", "frequency_hz"),
     [(LIGHT, 60.0), (LIGHT, 130.0), (LOSSY, 110.0), (LOSSY, 180.0), (SPLIT, 110.0), (SPLIT, 150.0)]
-    + [(ELEVATION, f) for f in (40.0, 60.0, 80.0, 95.0)],
+    + [(ELEVATION, f) for f in (60.0, 80.0, 95.0)],
 )
 def test_agrees_with_the_oracle_where_motion_is_periodic(case, frequency_hz):
     unit, ratio, extras, step_s = case
@@ -43,7 +43,7 @@ def test_agrees_with_the_oracle_where_motion_is_periodic(case, frequency_hz):
 
 
 SETTLE, KEPT = 8, 16
-ENGINE_RUNS, ORACLE_RUNS = 32, 10
+ENGINE_RUNS, ORACLE_RUNS = 32, 8
 FLOOR = 0.01
 """Differences well below this share of the gain do not count: both sides have a step."""
 
