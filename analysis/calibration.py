@@ -26,6 +26,9 @@ _FLOOR = 0.03
 
 _SQUASH = 0.6
 _REACH = 2.0
+_MARGIN = 1.3
+"""Factor on stated errors: machines drawn anew were missed by so much more than those left out."""
+
 _NEAREST = 180
 """Runs that take part: the answer is learned where it lies."""
 
@@ -49,13 +52,23 @@ def calibrate(observation: Observation, emulator: Emulator, rng: np.random.Gener
     """Estimate the place of an observation among the draws of an emulator.
 
     Kernel ridge regression from squashed channels to places, its ridge chosen
-    by leave-one-out error, first among all draws, then among the nearest.
+    by what it gets wrong about machines left out, first among all draws, then among the nearest.
     """
     readings = _readings(observation, emulator, rng)
-    first = _regress(observation, readings, emulator.places)
+    kin = _kin(emulator.deviations)
+    first = _regress(observation, readings, emulator.places, kin)
     distance = np.abs((emulator.places - first.mean) / emulator.width).max(axis=1)
     near = np.sort(np.argsort(distance, kind="stable")[:_NEAREST])
-    return _regress(observation, readings[near], emulator.places[near])
+    return _regress(observation, readings[near], emulator.places[near], kin[near])
+
+
+def _kin(deviations: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Label (draws,): machines that share their deviations share it, the rest stand alone."""
+    _, label = np.unique(deviations, axis=0, return_inverse=True)
+    label = np.asarray(label, dtype=np.int64).reshape(-1)
+    alone = ~np.any(deviations != 0.0, axis=1)
+    label[alone] = label.max(initial=0) + 1 + np.arange(np.count_nonzero(alone))
+    return label
 
 
 def _readings(
@@ -69,7 +82,10 @@ def _readings(
 
 
 def _regress(
-    observation: Observation, readings: NDArray[np.float64], places: NDArray[np.float64]
+    observation: Observation,
+    readings: NDArray[np.float64],
+    places: NDArray[np.float64],
+    kin: NDArray[np.int64],
 ) -> Calibrated:
     features, asked = _features(observation, readings)
     count = len(features)
@@ -79,19 +95,23 @@ def _regress(
     likeness = np.exp(-((features - asked) ** 2).mean(axis=-1) / scale)
     centre = places.mean(axis=0)
     spread = places.std(axis=0) + 1e-12
+    families = [np.flatnonzero(kin == label) for label in np.unique(kin)]
 
     def fitted(ridge: float) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
         inverse = np.linalg.inv(kernel + ridge * np.eye(count))
         dual = inverse @ (places - centre)
-        # What a regression without a run gets wrong about it, in closed form.
-        error = dual / np.diag(inverse)[:, None]
+        # What a regression without a machine and its kin gets wrong about it, in
+        # closed form: machines with the same deviations would give them away.
+        error = np.empty_like(dual)
+        for family in families:
+            error[family] = np.linalg.solve(inverse[np.ix_(family, family)], dual[family])
         return float(np.sum((error / spread) ** 2)), centre + likeness @ dual, error
 
     _, mean, error = min((fitted(ridge) for ridge in _RIDGES), key=lambda fit: fit[0])
     weight = likeness / likeness.max()
     effective = weight.sum() ** 2 / np.sum(weight**2)
     covariance = (error * weight[:, None]).T @ error / weight.sum()
-    inflation = 1.0 + 2.0 / effective
+    inflation = _MARGIN**2 * (1.0 + 2.0 / effective)
     return Calibrated(mean, np.atleast_2d(covariance * inflation) + np.diag((1e-3 * spread) ** 2))
 
 

@@ -33,7 +33,7 @@ _SIMULATED = ("R_m", "k_t", "J_L", "k_s1", "k_a")
 _FIRST_GROUPS, _GROUPS, _PER_GROUP = 4, 20, 8
 """Groups of machines that share their deviations, and so are stepped together; machines in each."""
 
-_REACH = 2.5
+_REACH = 3.5
 """Machines lie up to so many standard deviations from the answer so far."""
 
 
@@ -187,7 +187,7 @@ def _fine_machines(
     """
     low = np.array([axis.low for axis in axes])
     high = np.array([axis.high for axis in axes])
-    least = np.array([0.4 * axis.scale for axis in axes])
+    least = np.array([0.5 * axis.scale for axis in axes])
     reach = _REACH * np.maximum(np.sqrt(np.diag(found.covariance)), least)
     centre = np.clip(found.mean, low, high)
     bottom, top = np.maximum(centre - reach, low), np.minimum(centre + reach, high)
