@@ -7,7 +7,7 @@ little damping silences them. It simulates nothing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,15 @@ from daq.errors import AnalysisError
 from daq.frf import DB_PER_NEPER, GAIN_STD_COMPONENTS, FrequencyResponse, PointFlag
 from daq.plan import SweepPlan
 
-__all__ = ["CHANNELS", "Observation", "channels_of_cycles", "observe"]
+__all__ = [
+    "CHANNELS",
+    "Observation",
+    "channels_of_cycles",
+    "channels_of_readings",
+    "observe",
+    "readings_of_cycles",
+    "unread",
+]
 
 CHANNELS = ("gain", "phase", "scatter")
 """Real and imaginary part of log(V_o/V_i), and log of the relative scatter of the reading."""
@@ -54,6 +62,26 @@ class Observation:
         ends = [*starts[1:], len(self)]
         return tuple(slice(int(a), int(b)) for a, b in zip(starts, ends, strict=True))
 
+    def thinned(self, stride: int) -> Observation:
+        """Every `stride`-th frequency of each level only."""
+        kept = np.concatenate([np.arange(b.start, b.stop)[::stride] for b in self.blocks])
+        return self._taking(kept)
+
+    def _taking(self, kept: NDArray[np.int64]) -> Observation:
+        plans = []
+        for plan, rows in self.plans:
+            left = np.flatnonzero(np.isin(kept, rows))
+            grid = tuple(np.unique(self.frequency_hz[kept[left]]).tolist())
+            plans.append((replace(plan, frequencies_hz=grid), left))
+        return replace(
+            self,
+            values=self.values[:, kept],
+            source_vpk=self.source_vpk[kept],
+            frequency_hz=self.frequency_hz[kept],
+            noise=self.noise[kept],
+            plans=tuple(plans),
+        )
+
     def __len__(self) -> int:
         return len(self.frequency_hz)
 
@@ -90,6 +118,24 @@ def observe(response: FrequencyResponse) -> Observation:
         noise_v=noise_v,
         noise=noise_v / (level * np.abs(gain)),
         plans=_plans(response, level, frequency),
+    )
+
+
+def unread(plan: SweepPlan, noise_v: float) -> Observation:
+    """The observation that a sweep will be: its rows, nothing read yet.
+
+    `noise` is that of a response of gain one.
+    """
+    count = len(plan.frequencies_hz)
+    level = np.repeat(np.sort(plan.levels_vpk), count)
+    rows = np.arange(len(level))
+    return Observation(
+        values=np.full((3, len(level)), np.nan),
+        source_vpk=level,
+        frequency_hz=np.tile(np.sort(plan.frequencies_hz), len(plan.levels_vpk)),
+        noise_v=noise_v,
+        noise=noise_v / level,
+        plans=((replace(plan, levels_vpk=tuple(sorted(plan.levels_vpk))), rows),),
     )
 
 
@@ -154,11 +200,27 @@ def channels_of_cycles(
         (..., 3, rows). The scatter counts both components, as a reading that
         is not turned into its own direction shows it.
     """
+    return channels_of_readings(*readings_of_cycles(coefficients), noise)
+
+
+def readings_of_cycles(
+    coefficients: NDArray[np.complex128],
+) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
+    """Mean (..., rows) of V_o/V_i over the cycles (..., rows, cycles), and its relative variance.
+
+    The variance is of the mean, over both components, and free of reading noise.
+    """
     cycles = coefficients.shape[-1]
     mean = coefficients.mean(axis=-1)
-    magnitude = np.maximum(np.abs(mean), 1e-30)
+    mean = np.where(np.abs(mean) > 1e-30, mean, 1e-30)
     spread = np.abs(coefficients - mean[..., None]) ** 2
-    variance = spread.sum(axis=-1) / max(cycles - 1, 1) / cycles / magnitude**2
+    return mean, spread.sum(axis=-1) / max(cycles - 1, 1) / cycles / np.abs(mean) ** 2
+
+
+def channels_of_readings(
+    mean: NDArray[np.complex128], variance: NDArray[np.float64], noise: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Channels (..., 3, rows) of readings (..., rows) with reading noise (rows,)."""
     scatter = 0.5 * np.log(variance + 2.0 * noise**2)
-    log_gain = np.log(np.where(np.abs(mean) > 0, mean, 1e-30))
+    log_gain = np.log(mean)
     return np.stack([log_gain.real, log_gain.imag, scatter], axis=-2)

@@ -24,6 +24,7 @@ VERBS = {
     "simulate": ("tui.commands.simulate:simulate", "Simulate a sweep and write the response."),
     "extract": ("tui.commands.extract:extract", "Read ARF, RF and damping out of a response."),
     "estimate": ("tui.commands.estimate:estimate", "Tell the backlash of each gear stage."),
+    "diagnose": ("tui.commands.diagnose:diagnose", "Tell what the simulation gets wrong, and why."),
     "reproduce": ("tui.commands.reproduce:reproduce", "Compute the paper's tables and figures."),
     "measure": ("tui.commands.measure:measure", "Measure a unit on the bench."),
     "history": ("tui.commands.history:history", "List a bench's measurements and their trend."),

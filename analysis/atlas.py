@@ -1,0 +1,144 @@
+"""The atlas: runs of every hypothesis over its whole range, before any measurement is looked at.
+
+Owns the coarse look that a search starts from. It depends on the unit and the
+plan of the sweep alone, not on what was measured, so that it can be kept in a
+folder and read again. It judges nothing.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.causes import Hypothesis, every_single_cause
+from analysis.observation import Observation
+from analysis.population import Group, Population, simulate_groups
+from sim.unit import Unit
+
+__all__ = ["Atlas", "coarse_stride", "make_atlas"]
+
+Atlas = dict[tuple[str, ...], Population]
+"""Populations by the effects of their hypothesis; no effect is the baseline."""
+
+_EDITION = 1
+"""Counted up whenever the engine, the catalogue or the layout below change what an atlas holds."""
+
+_RATIOS = 10
+"""Machines in a group, one per tenth of the ratio: a second five cost a fifth more time."""
+
+_BASELINE_GROUPS, _SIZES = 3, 7
+_COSTLY = {"shaft-hardening": 3}
+"""Groups of effects whose laws take several times the work."""
+
+_LEAST_FREQUENCIES = 20
+
+
+def coarse_stride(observation: Observation) -> int:
+    """Every how many frequencies the atlas holds one."""
+    longest = max(block.stop - block.start for block in observation.blocks)
+    return max(longest // _LEAST_FREQUENCIES, 1)
+
+
+def make_atlas(
+    unit: Unit,
+    coarse: Observation,
+    cache: Path | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Atlas:
+    """Simulate the atlas of a unit for the plan of a thinned observation, or read it from `cache`.
+
+    Raises
+    ------
+    AnalysisError
+        If a motion grew without bound.
+    """
+    file = None if cache is None else cache / f"atlas-{_fingerprint(unit, coarse)}.npz"
+    if file is not None and (known := _read(file)) is not None:
+        return known
+    rng = np.random.default_rng(_EDITION)
+    atlas = simulate_groups(unit, list(_groups(unit, rng)), coarse, rng, progress)
+    if file is not None:
+        _write(file, atlas)
+    return atlas
+
+
+def _groups(unit: Unit, rng: np.random.Generator) -> Iterator[Group]:
+    for _ in range(_BASELINE_GROUPS):
+        yield Group(Hypothesis(unit), _spread(_RATIOS, rng), np.empty(0))
+    for hypothesis in every_single_cause(unit):
+        for sizes in _sizes(hypothesis, rng):
+            yield Group(hypothesis, _spread(_RATIOS, rng), sizes)
+
+
+def _spread(count: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    """Numbers evenly over 0 to 1, shifted together by chance."""
+    return (np.arange(count) + rng.uniform()) / count
+
+
+def _sizes(hypothesis: Hypothesis, rng: np.random.Generator) -> Iterator[NDArray[np.float64]]:
+    d = hypothesis.d
+    if d == 2:
+        count = _COSTLY.get(hypothesis.effects[0], _SIZES)
+        for u in _stratified(count, rng):
+            yield np.array([_denser(u, hypothesis)])
+    elif d == 3:
+        for first in _stratified(4, rng):
+            for second in _stratified(3, rng):
+                yield np.array([first, second])
+    else:
+        # A flexible payload: where it resonates decides most.
+        for first in _stratified(2, rng):
+            for second in _stratified(8, rng):
+                yield np.array([first, second, *rng.uniform(size=d - 3)])
+
+
+def _stratified(count: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    return (np.arange(count) + rng.uniform(size=count)) / count
+
+
+def _denser(u: float, hypothesis: Hypothesis) -> float:
+    """Sizes crowd about the datasheet's value where the effect is that a value differs from it."""
+    if not hypothesis.centred:
+        return u
+    x = 2.0 * u - 1.0
+    return 0.5 + 0.5 * float(np.sign(x) * abs(x) ** 1.5)
+
+
+def _fingerprint(unit: Unit, coarse: Observation) -> str:
+    plans = [asdict(plan) for plan, _ in coarse.plans]
+    text = json.dumps([_EDITION, unit.model_dump(mode="json"), plans], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:24]
+
+
+def _write(file: Path, atlas: Atlas) -> None:
+    """Keep an atlas; a cache that cannot be written costs time later and nothing else."""
+    names = {f"{'+'.join(key)}|{field}": getattr(one, field)
+             for key, one in atlas.items() for field in Population.__slots__}  # fmt: skip
+    part = file.with_suffix(f".{os.getpid()}.part")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with part.open("wb") as stream:
+            np.savez_compressed(stream, **names)
+        part.replace(file)
+    except OSError:
+        part.unlink(missing_ok=True)
+
+
+def _read(file: Path) -> Atlas | None:
+    """A kept atlas, or None where there is none that can be read."""
+    try:
+        with np.load(file, allow_pickle=False) as kept:
+            fields: dict[tuple[str, ...], dict[str, NDArray]] = {}
+            for name in kept.files:
+                key, _, field = name.rpartition("|")
+                fields.setdefault(tuple(filter(None, key.split("+"))), {})[field] = kept[name]
+        return {key: Population(**parts) for key, parts in fields.items()}
+    except (OSError, ValueError, TypeError, EOFError):
+        return None

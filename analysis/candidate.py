@@ -1,0 +1,125 @@
+"""A hypothesis together with the runs made for it: what a search compares.
+
+Owns how runs become a candidate: a surface over their places, cleared of what
+deviations of datasheet values do, and the best fit on it. It decides neither
+where to simulate nor who wins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.causes import Hypothesis
+from analysis.ensemble import TOLERANCES
+from analysis.observation import Observation
+from analysis.population import DEVIATING, Population
+from analysis.surface import Fit, Surface, differences
+from sim.unit import Unit
+
+__all__ = ["Candidate", "Effects", "form_candidates"]
+
+Effects = tuple[str, ...]
+"""Identifiers of a hypothesis's effects, sorted."""
+
+_WIDTH_RATIO, _WIDTH_SIZE = 0.08, 0.06
+"""Distances over which responses change smoothly, in coordinates, near the answer."""
+
+_SIGMAS = np.array([TOLERANCES[symbol] for symbol in DEVIATING])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidate:
+    """A hypothesis with the runs made for it at all rows, and its best fit."""
+
+    hypothesis: Hypothesis
+    population: Population
+    surface: Surface
+    best: Fit
+
+
+def form_candidates(
+    unit: Unit,
+    observation: Observation,
+    fine: Mapping[Effects, Population],
+    starts: Mapping[Effects, NDArray[np.float64]],
+) -> dict[Effects, Candidate]:
+    """Candidates from the runs of several hypotheses, each climbing from its start."""
+    raw = {key: _surface(observation, population) for key, population in fine.items()}
+    slopes = _pooled_slopes(observation, fine, raw)
+    found = {}
+    for key, population in fine.items():
+        surface = _without_deviations(raw[key], population, slopes)
+        best = surface.climb(starts[key])
+        found[key] = Candidate(Hypothesis(unit, key), population, surface, best)
+    return found
+
+
+def _surface(observation: Observation, population: Population) -> Surface:
+    d = population.places.shape[1]
+    width = np.array([_WIDTH_RATIO] + [_WIDTH_SIZE] * (d - 1))
+    none = np.empty((0, 3, len(observation)))
+    return Surface(
+        observation,
+        population.places,
+        differences(observation, population),
+        width,
+        none,
+        np.empty(0),
+    )
+
+
+def _without_deviations(
+    surface: Surface, population: Population, slopes: NDArray[np.float64]
+) -> Surface:
+    shift = np.tensordot(population.deviations, slopes, axes=1)
+    return replace(surface, difference=surface.difference - shift, slopes=slopes, sigmas=_SIGMAS)
+
+
+def _pooled_slopes(
+    observation: Observation,
+    fine: Mapping[Effects, Population],
+    surfaces: Mapping[Effects, Surface],
+) -> NDArray[np.float64]:
+    """How the channels follow deviations (k, 3, rows), from the runs of all hypotheses together.
+
+    Near where each agrees best they all show about the same response, so that they share
+    their slopes.
+    """
+    k, shape = len(DEVIATING), (3, len(observation))
+    normal = np.zeros((k, k, *shape))
+    right = np.zeros((k, *shape))
+    for key, population in fine.items():
+        places = population.places
+        offset = (places - np.median(places, axis=0)) / np.maximum(np.ptp(places, axis=0), 1e-6)
+        basis = np.column_stack([np.ones(len(places)), offset, offset[:, :1] ** 2])
+        values = np.nan_to_num(surfaces[key].difference.reshape(len(places), -1))
+        weight = _robust(values)
+        left, inside = _residual(basis, values), _residual(basis, population.deviations)
+        left = left.reshape(len(places), *shape)
+        trust = weight.reshape(left.shape)
+        normal += np.einsum("ni,nj,ncr->ijcr", inside, inside, trust)
+        right += np.einsum("ni,ncr,ncr->icr", inside, left, trust)
+    # A slope of one is what a gain does; hundreds are not believed without evidence.
+    ridge = np.zeros_like(normal)
+    for i in range(k):
+        ridge[i, i] = 1.0 / 30.0**2
+    solved = np.linalg.solve(
+        np.moveaxis(normal + ridge, (0, 1), (-2, -1)), np.moveaxis(right, 0, -1)[..., None]
+    )
+    return np.asarray(np.moveaxis(solved[..., 0], -1, 0), dtype=float)
+
+
+def _residual(basis: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    return values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
+
+
+def _robust(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Weights (runs, columns) that are 1/variance and let runs far off count less."""
+    centre = np.median(values, axis=0)
+    scale = 1.4826 * np.median(np.abs(values - centre), axis=0) + 0.005
+    z2 = ((values - centre) / scale) ** 2
+    return 5.0 / (4.0 + z2) / scale**2

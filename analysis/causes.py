@@ -1,0 +1,109 @@
+"""Hypotheses about what a unit has that its model lacks, as coordinates for a search.
+
+Owns the map between a hypothesis (a set of effects of the catalogue), its
+coordinates of order one, and machines that can be simulated. It judges nothing
+and simulates nothing.
+
+Coordinates: the contribution ratio first, 0 to 1; then, for each parameter of
+each effect, the logarithm of its value between the ends of its plausible
+range, scaled to 0 to 1; Table 1 parameters lie at a half where they are as the
+datasheet says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.ensemble import Machine
+from sim.catalogue import CATALOGUE, EffectParameter
+from sim.effects import EffectSetting
+from sim.unit import Unit
+
+__all__ = ["Hypothesis", "every_single_cause"]
+
+_LEAST_SHARE = 0.01
+"""Ranges that begin at zero begin here instead, as a share of their end, so that logs exist."""
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A set of effects on a unit; no effect at all is the baseline.
+
+    `effects` are identifiers, sorted. d = 1 + number of parameters.
+    """
+
+    unit: Unit
+    effects: tuple[str, ...] = ()
+
+    @cached_property
+    def parameters(self) -> tuple[tuple[str, EffectParameter], ...]:
+        """(effect identifier, parameter) of every coordinate after the ratio."""
+        return tuple((e, p) for e in self.effects for p in CATALOGUE[e].parameters)
+
+    @cached_property
+    def logs(self) -> NDArray[np.float64]:
+        """(d - 1, 2): logarithms of the ends of every parameter's range."""
+        ends = [p.range(self.unit) for _, p in self.parameters]
+        floored = [(max(low, _LEAST_SHARE * high), high) for low, high in ends]
+        return np.log(np.array(floored).reshape(-1, 2))
+
+    @property
+    def d(self) -> int:
+        """Number of coordinates."""
+        return 1 + len(self.parameters)
+
+    def values(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Physical parameter values at a place (d,), in the order of `parameters`."""
+        low, high = self.logs[:, 0], self.logs[:, 1]
+        return np.exp(low + (high - low) * np.asarray(place)[1:])
+
+    def place(self, ratio: float, values: Sequence[float]) -> NDArray[np.float64]:
+        """The place (d,) of a ratio and physical parameter values."""
+        low, high = self.logs[:, 0], self.logs[:, 1]
+        return np.concatenate([[ratio], (np.log(np.asarray(values)) - low) / (high - low)])
+
+    def settings(self, place: NDArray[np.float64]) -> tuple[EffectSetting, ...]:
+        """The effects with their values at a place (d,)."""
+        found: dict[str, dict[str, float]] = {effect: {} for effect in self.effects}
+        for (effect, parameter), value in zip(self.parameters, self.values(place), strict=True):
+            found[effect][parameter.name] = float(value)
+        return tuple(EffectSetting(effect, values) for effect, values in found.items())
+
+    def machine(
+        self,
+        place: NDArray[np.float64],
+        seed: int,
+        deviations: tuple[tuple[str, float], ...] = (),
+    ) -> Machine:
+        """A machine at a place (d,)."""
+        ratio = float(np.clip(place[0], 0.0, 1.0))
+        return Machine(ratio, seed, None, deviations, self.settings(place))
+
+    def with_effect(self, effect: str) -> Hypothesis:
+        """The hypothesis with one more effect."""
+        return Hypothesis(self.unit, tuple(sorted((*self.effects, effect))))
+
+    @property
+    def centred(self) -> bool:
+        """Whether the one parameter is a datasheet value that lies amid its range."""
+        if len(self.parameters) != 1:
+            return False
+        (_, parameter), (low, high) = self.parameters[0], np.exp(self.logs[0])
+        known = {**self.unit.parameters, "scale": 1.0}.get(parameter.name)
+        return known is not None and 0.5 * known**2 < low * high < 2.0 * known**2
+
+    @property
+    def sites(self) -> tuple[str, ...]:
+        """Where its effects sit: "plant", "chain"."""
+        return tuple(sorted({CATALOGUE[effect].site for effect in self.effects}))
+
+
+def every_single_cause(unit: Unit) -> Iterator[Hypothesis]:
+    """The hypotheses of one effect each, in the order of the catalogue."""
+    for effect in CATALOGUE:
+        yield Hypothesis(unit, (effect,))

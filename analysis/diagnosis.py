@@ -1,0 +1,337 @@
+"""The diagnosis: what a simulation gets wrong against a measurement, and why.
+
+Owns the whole answer as one document: verdict, causes with their sizes and
+error bars, rivals, what was gained on levels that the fit had not seen, where
+the plain model departs, and what to measure next. The parts are computed
+elsewhere; this module puts them together and words them.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from analysis.calibration import calibrate
+from analysis.candidate import Candidate
+from analysis.emulator import Emulator
+from analysis.misfit import Departure, describe_departures, find_departures
+from analysis.next_measurement import NextMeasurement, propose_measurement
+from analysis.observation import Observation, observe
+from analysis.search import search_causes
+from analysis.verdict import Judged, Verdict, judge_candidates
+from daq.frf import FrequencyResponse
+from sim.catalogue import CATALOGUE
+from sim.unit import Unit
+
+__all__ = ["Cause", "Diagnosis", "Size", "diagnose_response"]
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """The fitted value of one parameter of an effect, with one standard deviation."""
+
+    name: str
+    value: float
+    std: float
+    unit_symbol: str
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """One effect of the named set."""
+
+    effect: str
+    sizes: tuple[Size, ...]
+    probability: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Diagnosis:
+    """What is wrong, why, how sure that is, and what it gains.
+
+    `ratio_baseline`, `ratio_extended`: contribution ratio and its standard
+    deviation under the plain and the extended model. `departures`: of the
+    measurement from the plain model; `left`: from the extended one.
+    """
+
+    unit: str
+    verdict: Verdict
+    causes: tuple[Cause, ...]
+    ratio_baseline: tuple[float, float]
+    ratio_extended: tuple[float, float]
+    departures: tuple[Departure, ...]
+    left: tuple[Departure, ...]
+    shape: str
+    next_measurement: NextMeasurement | None
+    observation: Observation
+    warnings: tuple[str, ...]
+    elapsed_s: float
+
+    @property
+    def sites(self) -> tuple[str, ...]:
+        """Where the named causes sit: "plant", "chain"; nowhere if none is named."""
+        return tuple(sorted({CATALOGUE[cause.effect].site for cause in self.causes}))
+
+    @property
+    def held_out_sigma(self) -> tuple[float, float]:
+        """Held-out rms of the plain and of the extended model in the extended one's sigma."""
+        best, base = self.verdict.best.held_out, self.verdict.baseline.held_out
+        return base.rms_against(best.std), best.rms_sigma
+
+    @property
+    def held_out_db(self) -> tuple[float, float]:
+        """Held-out rms of the gain, dB, of the plain and of the extended model."""
+        return self.verdict.baseline.held_out.rms_db, self.verdict.best.held_out.rms_db
+
+    def to_json(self) -> dict[str, Any]:
+        """The document of ``diagnose --json``."""
+        sigma, db = self.held_out_sigma, self.held_out_db
+        proposal = self.next_measurement
+        return {
+            "unit": self.unit,
+            "verdict": self.verdict.word,
+            "causes": [
+                {
+                    "effect": cause.effect,
+                    "parameters": {
+                        s.name: {"value": s.value, "std": s.std, "unit": s.unit_symbol}
+                        for s in cause.sizes
+                    },
+                    "probability": cause.probability,
+                    "site": CATALOGUE[cause.effect].site,
+                    "meaning": CATALOGUE[cause.effect].meaning,
+                }
+                for cause in self.causes
+            ],
+            "rivals": [
+                {"causes": list(one.effects), "probability": one.probability}
+                for one in self.verdict.judged
+                if sorted(one.effects) != sorted(cause.effect for cause in self.causes)
+            ],
+            "site": list(self.sites),
+            "baseline": {"held_out_rms_sigma": sigma[0], "held_out_rms_db": db[0]},
+            "extended": {"held_out_rms_sigma": sigma[1], "held_out_rms_db": db[1]},
+            "gain": {"held_out_rms_ratio": sigma[1] / sigma[0]},
+            "contribution_ratio": {
+                "baseline": _uncertain(self.ratio_baseline),
+                "extended": _uncertain(self.ratio_extended),
+            },
+            "residual": [one.to_json() for one in self.departures],
+            "residual_after": [one.to_json() for one in self.left],
+            "shape": self.shape,
+            "misfit_sigma": {
+                "baseline": self.verdict.baseline.misfit,
+                "extended": self.verdict.best.misfit,
+            },
+            "next_measurement": None if proposal is None else proposal.to_json(),
+            "warnings": list(self.warnings),
+            "elapsed_s": self.elapsed_s,
+        }
+
+    def summary(self) -> list[str]:
+        """Lines of text for a person."""
+        lines = [f"{self.unit}: {self.verdict.word}. {_sentence(self)}"]
+        for cause in self.causes:
+            effect = CATALOGUE[cause.effect]
+            sizes = ", ".join(_worded(size) for size in cause.sizes)
+            lines.append(f"  {cause.effect} ({_WHERE[effect.site]}): {sizes}")
+            lines.append(f"    {effect.meaning} On the bench: {effect.bench_cause}.")
+        base, extended = self.ratio_baseline, self.ratio_extended
+        lines.append(f"  contribution ratio, plain model      {base[0]:.3f} +- {base[1]:.3f}")
+        if self.causes:
+            lines.append(
+                f"  contribution ratio, extended model   {extended[0]:.3f} +- {extended[1]:.3f}"
+            )
+        sigma, db = self.held_out_sigma, self.held_out_db
+        lines.append(
+            f"  on levels not fitted, plain model    {sigma[0]:.2f} sigma, {db[0]:.2f} dB rms"
+        )
+        if self.causes:
+            lines.append(
+                f"  on levels not fitted, extended model {sigma[1]:.2f} sigma, {db[1]:.2f} dB rms"
+            )
+        lines.append(f"  against the plain model: {self.shape}")
+        lines.append("  sets judged, by probability:")
+        for one in self.verdict.judged:
+            name = " + ".join(one.effects) or "nothing hidden"
+            unlike = "" if one.adequate else "  (does not look like its own runs)"
+            lines.append(f"    {one.probability:6.3f}  {name}{unlike}")
+        if self.next_measurement is not None:
+            proposal = self.next_measurement
+            lines.append(
+                f"  to tell {proposal.separates[0]} from {proposal.separates[1]} "
+                f"({proposal.expected_sigma:.1f} sigma expected):"
+            )
+            lines.append(f"    {proposal.command}")
+        lines += [f"  warning: {text}" for text in self.warnings]
+        return lines
+
+
+_WHERE = {"plant": "in the mechanics", "chain": "in the measuring chain"}
+
+
+def diagnose_response(
+    response: FrequencyResponse,
+    unit: Unit,
+    *,
+    without: Collection[str] = (),
+    cache: Path | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Diagnose a measured response.
+
+    Parameters
+    ----------
+    response
+        Measured, one level or more; phase and errors may be missing.
+    unit
+        The unit under test, as its datasheet says.
+    without
+        Effects to leave out of the catalogue.
+    cache
+        Folder that keeps what was simulated for a unit and a plan.
+    seed
+        Of the starts and places of the simulations.
+    progress
+        Told the share done and what is being done, from the calling thread.
+
+    Raises
+    ------
+    AnalysisError
+        If no usable point is left, or a motion grew without bound.
+    """
+    started = time.perf_counter()
+    observation = observe(response)
+
+    def early(share: float, text: str) -> None:
+        if progress is not None:
+            progress(0.9 * share, text)
+
+    candidates = search_causes(
+        unit, observation, without=without, cache=cache, seed=seed, progress=early
+    )
+    rng = np.random.default_rng(seed)
+    verdict = judge_candidates(candidates, observation, rng)
+    named = verdict.best if verdict.word in ("explained", "ambiguous") else None
+    base = _calibrated(verdict.baseline.candidate, observation, rng)
+    best = base if named is None else _calibrated(named.candidate, observation, rng)
+    departures = find_departures(verdict.baseline.candidate, observation)
+    proposal = _proposal(unit, verdict, observation, seed, progress)
+    if progress is not None:
+        progress(1.0, "done")
+    return Diagnosis(
+        unit=unit.name,
+        verdict=verdict,
+        causes=() if named is None else _causes(named, *best),
+        ratio_baseline=_ratio(*base),
+        ratio_extended=_ratio(*best),
+        departures=departures,
+        left=find_departures(verdict.best.candidate, observation),
+        shape=describe_departures(departures, observation),
+        next_measurement=proposal,
+        observation=observation,
+        warnings=_warnings(response, observation),
+        elapsed_s=time.perf_counter() - started,
+    )
+
+
+def _calibrated(
+    candidate: Candidate, observation: Observation, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean (d,) and covariance (d, d) of a candidate's coordinates, from runs left out in turn."""
+    runs, surface = candidate.population, candidate.surface
+    emulator = Emulator(
+        runs.places,
+        runs.deviations,
+        runs.channels(observation),
+        observation.blocks,
+        surface.width,
+        surface.sigmas,
+    )
+    found = calibrate(observation, emulator, rng)
+    return np.clip(found.mean, 0.0, 1.0), found.covariance
+
+
+def _ratio(mean: np.ndarray, covariance: np.ndarray) -> tuple[float, float]:
+    return float(mean[0]), float(np.sqrt(covariance[0, 0]))
+
+
+def _causes(named: Judged, mean: np.ndarray, covariance: np.ndarray) -> tuple[Cause, ...]:
+    hypothesis = named.candidate.hypothesis
+    values = hypothesis.values(mean)
+    # Coordinates are logarithms of the values, stretched over their range.
+    stretch = hypothesis.logs[:, 1] - hypothesis.logs[:, 0]
+    stds = values * stretch * np.sqrt(np.diag(covariance)[1:])
+    sizes: dict[str, list[Size]] = {}
+    for (effect, parameter), value, std in zip(hypothesis.parameters, values, stds, strict=True):
+        size = Size(parameter.name, float(value), float(std), parameter.unit_symbol)
+        sizes.setdefault(effect, []).append(size)
+    return tuple(Cause(e, tuple(found), named.probability) for e, found in sizes.items())
+
+
+def _proposal(
+    unit: Unit,
+    verdict: Verdict,
+    observation: Observation,
+    seed: int,
+    progress: Progress | None,
+) -> NextMeasurement | None:
+    """A sweep that would decide, where something is left to decide."""
+    if verdict.word == "ambiguous":
+        rival = verdict.rivals[0]
+    elif len(observation.blocks) == 1 and len(verdict.judged) > 1:
+        rival = next(one for one in verdict.judged if one is not verdict.best)
+    else:
+        return None
+
+    def late(share: float) -> None:
+        if progress is not None:
+            progress(0.9 + 0.1 * share, "choosing the next measurement")
+
+    return propose_measurement(
+        unit, verdict.best.candidate, rival.candidate, observation, seed=seed, progress=late
+    )
+
+
+def _warnings(response: FrequencyResponse, observation: Observation) -> tuple[str, ...]:
+    found = []
+    if len(observation.blocks) == 1:
+        found.append(
+            "the response holds one source level: what was held out are halves of its band; "
+            "measure at further levels"
+        )
+    if not np.any(np.isfinite(observation.values[1])):
+        found.append("the response holds no phase: faults of the measuring chain hide there")
+    if not np.any(np.isfinite(observation.values[2])):
+        found.append("the response states no errors: what its scatter would tell is lost")
+    return tuple(found)
+
+
+def _sentence(diagnosis: Diagnosis) -> str:
+    word, names = diagnosis.verdict.word, " with ".join(c.effect for c in diagnosis.causes)
+    where = " and ".join(_WHERE[site] for site in diagnosis.sites)
+    if word == "consistent":
+        return "Nothing beyond tolerance is needed to explain this response."
+    if word == "unexplained":
+        return "Something is missing that no cause known here explains."
+    if word == "ambiguous":
+        rivals = " or ".join(" with ".join(one.effects) for one in diagnosis.verdict.rivals)
+        return f"{names} ({where}) explains it, but so may {rivals}."
+    return f"{names} ({where}) explains it."
+
+
+def _uncertain(pair: tuple[float, float]) -> dict[str, float]:
+    return {"value": pair[0], "std": pair[1]}
+
+
+def _worded(size: Size) -> str:
+    symbol = "" if size.unit_symbol == "1" else f" {size.unit_symbol}"
+    return f"{size.name} = {size.value:.4g} +- {size.std:.2g}{symbol}"

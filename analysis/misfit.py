@@ -1,0 +1,122 @@
+"""Where a simulation departs from a measurement: bands, levels, gain or phase.
+
+Owns the table of departures and what they look like as a whole. A band's mean
+departure is held against how single runs of the same model depart in that
+band, chaotic stretches and all; many bands are looked at, so that false
+discoveries are controlled. It names no cause.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from analysis.candidate import Candidate
+from analysis.observation import Observation
+from daq.frf import DB_PER_NEPER
+
+__all__ = ["Departure", "describe_departures", "find_departures"]
+
+_BANDS = 8
+_FALSE_DISCOVERIES = 0.05
+_NEAR = 60
+
+
+@dataclass(frozen=True, slots=True)
+class Departure:
+    """One band of one level in which measured minus simulated is not chance.
+
+    `mean` in dB (gain) or degrees (phase); `sigma`: in standard deviations of
+    what single runs and the reading scatter there.
+    """
+
+    low_hz: float
+    high_hz: float
+    source_vpk: float
+    quantity: Literal["gain", "phase"]
+    mean: float
+    sigma: float
+
+    def to_json(self) -> dict[str, Any]:
+        """One entry of ``residual``."""
+        return {
+            "band_hz": [self.low_hz, self.high_hz],
+            "source_vpk": self.source_vpk,
+            "quantity": self.quantity,
+            "mean": self.mean,
+            "sigma": self.sigma,
+        }
+
+
+def find_departures(candidate: Candidate, observation: Observation) -> tuple[Departure, ...]:
+    """Departures of the measurement from a hypothesis at its best place, strongest first."""
+    residual = candidate.best.residual
+    runs = _scatter_of_runs(candidate)
+    found, chance = [], []
+    for block in observation.blocks:
+        for band in np.array_split(np.arange(block.start, block.stop), _BANDS):
+            for channel, quantity, factor in ((0, "gain", DB_PER_NEPER), (1, "phase", 180 / np.pi)):
+                if len(band) == 0 or not np.all(np.isfinite(residual[channel, band])):
+                    continue
+                mean = float(residual[channel, band].mean())
+                spread = runs[:, channel, band].mean(axis=1).std(ddof=1)
+                noise = np.sqrt(np.sum(observation.noise[band] ** 2)) / len(band)
+                sigma = mean / float(np.hypot(spread, noise))
+                found.append(
+                    Departure(
+                        float(observation.frequency_hz[band[0]]),
+                        float(observation.frequency_hz[band[-1]]),
+                        float(observation.source_vpk[band[0]]),
+                        quantity,  # type: ignore[arg-type]
+                        factor * mean,
+                        sigma,
+                    )
+                )
+                chance.append(2.0 * stats.t.sf(abs(sigma), len(runs) - 1))
+    if not found:
+        return ()
+    kept = stats.false_discovery_control(chance) <= _FALSE_DISCOVERIES
+    real = [one for one, keep in zip(found, kept, strict=True) if keep]
+    return tuple(sorted(real, key=lambda one: -abs(one.sigma)))
+
+
+def _scatter_of_runs(candidate: Candidate) -> NDArray[np.float64]:
+    """(near, 3, rows): runs near the best place less what is expected at their own places."""
+    surface, best = candidate.surface, candidate.best
+    distance = np.sum(((surface.places - best.place) / surface.width) ** 2, axis=1)
+    near = np.argsort(distance, kind="stable")[:_NEAR]
+    return np.stack([surface.difference[i] - surface.expected(surface.places[i])[0] for i in near])
+
+
+def describe_departures(departures: tuple[Departure, ...], observation: Observation) -> str:
+    """One sentence on the shape of what is left, for a person who has to go on from there."""
+    if not departures:
+        return "nothing departs by more than chance"
+    gain = [d for d in departures if d.quantity == "gain"]
+    what = "gain and phase"
+    if not gain:
+        what = "phase alone"
+    elif len(gain) == len(departures):
+        what = "gain alone"
+    worst = departures[0]
+    count = np.array(
+        [sum(d.source_vpk == v for d in departures) for v in np.unique(observation.source_vpk)]
+    )
+    level = ""
+    if len(count) > 1:
+        if count[-1] > 2 * max(count[0], 1):
+            level = ", mostly at high source levels"
+        elif count[0] > 2 * max(count[-1], 1):
+            level = ", mostly at low source levels"
+        else:
+            level = ", at all source levels alike"
+    unit = "dB" if worst.quantity == "gain" else "deg"
+    return (
+        f"{what} depart in {len(departures)} bands{level}; most at {worst.low_hz:g} to "
+        f"{worst.high_hz:g} Hz and {worst.source_vpk:g} V, where the {worst.quantity} is "
+        f"{worst.mean:+.2g} {unit} off ({abs(worst.sigma):.0f} sigma)"
+    )

@@ -1,0 +1,171 @@
+"""Which measurement would tell two causes apart.
+
+Owns a grid of sweeps that the unit's limits allow and the choice among them:
+for each the two candidates are simulated over all places at which they agree
+with what was measured, and the sweep that parts them furthest, in standard
+deviations of reading and motion together, is proposed. A cheaper one that
+does nearly as well is preferred.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.candidate import Candidate
+from analysis.observation import Observation, channels_of_readings, unread
+from analysis.placement import HEAT, groups_along
+from analysis.population import Population, simulate_groups
+from daq.plan import SweepPlan, spaced_frequencies
+from sim.unit import Unit
+
+__all__ = ["NextMeasurement", "propose_measurement"]
+
+_POINTS = 31
+_COARSE = 16
+"""Frequencies of a proposed sweep, and how many of them are simulated to judge it."""
+
+_GROUPS = 2
+_ENOUGH = 0.9
+"""A plan that parts the rivals this share as well as the best but takes less time is taken."""
+
+_FLOOR = 0.01
+"""Difference in log gain or phase, rad, that deviations of a datasheet could make anyway."""
+
+
+@dataclass(frozen=True, slots=True)
+class NextMeasurement:
+    """A sweep, the two sets of causes it parts, and by how many standard deviations."""
+
+    unit: str
+    plan: SweepPlan
+    separates: tuple[str, str]
+    expected_sigma: float
+
+    @property
+    def command(self) -> str:
+        """The options with which ``lashbench measure`` takes this sweep."""
+        f = self.plan.frequencies_hz
+        parts = [f"lashbench measure --unit {self.unit.lower()} --instrument URL"]
+        parts += [f"--level {level:g}" for level in self.plan.levels_vpk]
+        parts += [f"--start {f[0]:g} --stop {f[-1]:g} --points {len(f)}"]
+        if self.plan.direction != "up":
+            parts.append(f"--direction {self.plan.direction}")
+        parts.append(f"--settle-cycles {self.plan.settle_cycles}")
+        parts.append(f"--integrate-cycles {self.plan.integrate_cycles}")
+        if self.plan.dc_offset_v:
+            parts.append(f"--offset {self.plan.dc_offset_v:g}")
+        return " ".join(parts)
+
+    def to_json(self) -> dict[str, Any]:
+        """The entry ``next_measurement``."""
+        f = self.plan.frequencies_hz
+        return {
+            "plan": {
+                "levels_vpk": list(self.plan.levels_vpk),
+                "start_hz": f[0],
+                "stop_hz": f[-1],
+                "points": len(f),
+                "spacing": "lin",
+                "direction": self.plan.direction,
+                "settle_cycles": self.plan.settle_cycles,
+                "integrate_cycles": self.plan.integrate_cycles,
+                "dc_offset_v": self.plan.dc_offset_v,
+                "minutes": self.plan.duration_s / 60.0,
+                "command": self.command,
+            },
+            "separates": list(self.separates),
+            "expected_sigma": self.expected_sigma,
+        }
+
+
+def propose_measurement(
+    unit: Unit,
+    first: Candidate,
+    second: Candidate,
+    observation: Observation,
+    *,
+    seed: int = 0,
+    progress: Callable[[float], None] | None = None,
+) -> NextMeasurement | None:
+    """The plan that best separates two candidates, or None where the limits allow none."""
+    rng = np.random.default_rng(seed)
+    plans = list(_feasible_plans(unit, observation))
+    judged = []
+    for number, plan in enumerate(plans):
+        judged.append(_separation(unit, first, second, plan, observation.noise_v, rng))
+        if progress is not None:
+            progress((number + 1) / len(plans))
+    if not judged:
+        return None
+    most = max(judged)
+    good = [p for p, sigma in zip(plans, judged, strict=True) if sigma >= _ENOUGH * most]
+    plan = min(good, key=lambda p: p.duration_s)
+    return NextMeasurement(
+        unit.name, plan, (_name(first), _name(second)), float(judged[plans.index(plan)])
+    )
+
+
+def _name(candidate: Candidate) -> str:
+    return "+".join(candidate.hypothesis.effects) or "none"
+
+
+def _feasible_plans(unit: Unit, observation: Observation) -> Iterator[SweepPlan]:
+    """Sweeps of one level: those of the measurement and around them, each within the limits."""
+    limits = unit.limits
+    low, high = float(observation.frequency_hz.min()), float(observation.frequency_hz.max())
+    least, most = float(observation.source_vpk.min()), float(observation.source_vpk.max())
+    base = observation.plans[0][0]
+    wide = (max(0.6 * low, limits.start_hz), min(1.5 * high, limits.stop_hz))
+    levels = sorted({round(v, 3) for v in (0.5 * least, least, most, 1.25 * most)
+                     if v <= limits.source_vpk})  # fmt: skip
+    for level in levels:
+        for band in ((low, high), wide):
+            grid = spaced_frequencies(*band, _POINTS)
+            yield replace(base, frequencies_hz=grid, levels_vpk=(level,), dc_offset_v=0.0)
+    middle = levels[len(levels) // 2]
+    grid = spaced_frequencies(low, high, _POINTS)
+    one = replace(base, frequencies_hz=grid, levels_vpk=(middle,), dc_offset_v=0.0)
+    yield replace(one, direction="down" if base.direction == "up" else "up")
+    offset = min(limits.source_offset_v, limits.source_vpk - middle)
+    if offset > 0.0:
+        yield replace(one, dc_offset_v=round(offset, 3))
+
+
+def _separation(
+    unit: Unit,
+    first: Candidate,
+    second: Candidate,
+    plan: SweepPlan,
+    noise_v: float,
+    rng: np.random.Generator,
+) -> float:
+    grid = plan.frequencies_hz
+    thinned = replace(plan, frequencies_hz=grid[:: max(len(grid) // _COARSE, 1)])
+    asked = [g for c in (first, second) for g in groups_along(c, _GROUPS, rng)]
+    made = simulate_groups(unit, asked, unread(thinned, noise_v), rng)
+    (mean_1, var_1), (mean_2, var_2) = (
+        _moments(made[c.hypothesis.effects], plan.levels_vpk[0], noise_v) for c in (first, second)
+    )
+    apart = mean_1 - mean_2
+    apart[1] = np.angle(np.exp(1j * apart[1]))
+    floor = np.array([_FLOOR, _FLOOR, 0.3])[:, None]
+    squares = apart**2 / (var_1 + var_2 + floor**2)
+    share = len(grid) / len(thinned.frequencies_hz)
+    return float(np.sqrt(share * squares.sum() / HEAT))
+
+
+def _moments(
+    population: Population, level_vpk: float, noise_v: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    noise = noise_v / (level_vpk * np.median(np.abs(population.mean), axis=0))
+    channels = channels_of_readings(population.mean, population.variance, noise)
+    turn = np.angle(np.mean(np.exp(1j * channels[:, 1]), axis=0))
+    channels[:, 1] = turn + np.angle(np.exp(1j * (channels[:, 1] - turn)))
+    variance = channels.var(axis=0)
+    variance[:2] += noise**2
+    return channels.mean(axis=0), variance

@@ -1,0 +1,67 @@
+"""Where the next simulations of a hypothesis go.
+
+Owns two ways of placing groups: evenly about a place from the coarse look, and
+over all places that agree about as well as the best. It simulates nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.candidate import Candidate
+from analysis.causes import Hypothesis
+from analysis.population import Group
+
+__all__ = ["HEAT", "groups_about", "groups_along"]
+
+HEAT = 8.0
+"""Neighbouring points of a sweep err together: a likelihood counts about so many for one."""
+
+_RATIOS = 10
+"""Machines in a group; a second five cost a fifth more time than the first."""
+
+_FIRST_RATIO_REACH, _FIRST_SIZE_REACH = 0.14, 0.06
+_RATIO_REACH, _JITTER = 0.1, 0.01
+_BEYOND, _CLOUD = 0.3, 250
+"""How far beyond what was simulated to look, as a share of it, and at how many places."""
+
+
+def groups_about(
+    hypothesis: Hypothesis, best: NDArray[np.float64], groups: int, rng: np.random.Generator
+) -> Iterator[Group]:
+    """Groups about a place (d,), the first of their sizes spread evenly."""
+    for step in rng.permutation(groups):
+        offset = rng.uniform(-1.0, 1.0, hypothesis.d - 1)
+        offset[:1] = 2.0 * (step + rng.uniform()) / groups - 1.0
+        sizes = np.clip(best[1:] + _FIRST_SIZE_REACH * offset, 0.0, 1.0)
+        yield Group(hypothesis, _ratios(best[0], _FIRST_RATIO_REACH, rng), sizes)
+
+
+def groups_along(candidate: Candidate, groups: int, rng: np.random.Generator) -> Iterator[Group]:
+    """Groups over the places that agree about as well as the best, which may form a ridge.
+
+    Each stands for an equal share of the likelihood, taken to the power 1 / `HEAT`; they may
+    lie beyond what was simulated so far.
+    """
+    surface = candidate.surface
+    low, high = surface.places.min(axis=0), surface.places.max(axis=0)
+    margin = _BEYOND * (high - low)
+    bottom, top = np.clip([low - margin, high + margin], 0.0, 1.0)
+    cloud = np.vstack([rng.uniform(bottom, top, (_CLOUD, len(low))), candidate.best.place])
+    likelihood = np.array([surface.fit(place).log_likelihood for place in cloud])
+    weight = np.exp((likelihood - likelihood.max()) / HEAT)
+    order = np.argsort(cloud[:, min(1, cloud.shape[1] - 1)])
+    share = np.cumsum(weight[order]) / weight.sum()
+    picked = np.searchsorted(share, (np.arange(groups) + rng.uniform()) / groups)
+    for place in cloud[order[np.minimum(picked, len(order) - 1)]]:
+        sizes = place[1:] + _JITTER * rng.uniform(-1.0, 1.0, len(place) - 1)
+        ratios = _ratios(place[0], _RATIO_REACH, rng)
+        yield Group(candidate.hypothesis, ratios, np.clip(sizes, 0.0, 1.0))
+
+
+def _ratios(ratio: float, reach: float, rng: np.random.Generator) -> NDArray[np.float64]:
+    bottom, top = np.clip([ratio - reach, ratio + reach], 0.0, 1.0)
+    return bottom + (top - bottom) * (np.arange(_RATIOS) + rng.uniform()) / _RATIOS

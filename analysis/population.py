@@ -1,0 +1,149 @@
+"""Simulated runs of a hypothesis, at many places, in the sweep of an observation.
+
+Owns the making of runs for the search: machines in groups that share their
+linear part (so that they are stepped side by side), each group off its
+datasheet in its own way, and what a bench would have read from each run. It
+judges nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.causes import Hypothesis
+from analysis.ensemble import TOLERANCES, Machine
+from analysis.observation import Observation, channels_of_readings, readings_of_cycles
+from daq.errors import AnalysisError
+from sim.response import simulate_cycles
+from sim.unit import Unit
+
+__all__ = ["DEVIATING", "Group", "Population", "simulate_groups"]
+
+DEVIATING = ("R_m", "k_t", "J_L", "k_s1", "k_a")
+"""Datasheet values whose spread is simulated; that of k_ts scales the gain alone."""
+
+_STEPS_S = (1e-5, 5e-6, 2.5e-6)
+"""The engine shows the same distribution of readings at 10 and at 5 us; it falls back where a
+heavily damped or stiffened shaft needs it."""
+
+_LOT = 12
+"""Groups simulated between two reports of progress."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Group:
+    """Machines of one hypothesis that differ in ratio and start alone.
+
+    `ratios` (k,); `sizes` (d - 1,): the other coordinates of the hypothesis.
+    """
+
+    hypothesis: Hypothesis
+    ratios: NDArray[np.float64]
+    sizes: NDArray[np.float64]
+
+    @property
+    def places(self) -> NDArray[np.float64]:
+        """(k, d)."""
+        return np.column_stack([self.ratios, np.tile(self.sizes, (len(self.ratios), 1))])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Population:
+    """Runs of one hypothesis.
+
+    `places` (n, d); `deviations` (n, k) of the datasheet values `DEVIATING`,
+    relative; `mean`, `variance` (n, rows): the reading of each run, see
+    `analysis.observation.readings_of_cycles`.
+    """
+
+    places: NDArray[np.float64]
+    deviations: NDArray[np.float64]
+    mean: NDArray[np.complex128]
+    variance: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    def channels(self, observation: Observation) -> NDArray[np.float64]:
+        """Channels (n, 3, rows) as the bench of an observation would read them."""
+        return channels_of_readings(self.mean, self.variance, observation.noise)
+
+    def joined(self, other: Population) -> Population:
+        """Both sets of runs."""
+        return Population(
+            np.concatenate([self.places, other.places]),
+            np.concatenate([self.deviations, other.deviations]),
+            np.concatenate([self.mean, other.mean]),
+            np.concatenate([self.variance, other.variance]),
+        )
+
+
+def simulate_groups(
+    unit: Unit,
+    groups: Sequence[Group],
+    observation: Observation,
+    rng: np.random.Generator,
+    progress: Callable[[float], None] | None = None,
+) -> dict[tuple[str, ...], Population]:
+    """Populations by the effects of their hypothesis.
+
+    Raises
+    ------
+    AnalysisError
+        If a motion grew without bound even at the shortest step.
+    """
+    found: dict[tuple[str, ...], Population] = {}
+    for start in range(0, len(groups), _LOT):
+        lot = groups[start : start + _LOT]
+        for group, population in zip(lot, _simulate(unit, lot, observation, rng), strict=True):
+            key = group.hypothesis.effects
+            found[key] = found[key].joined(population) if key in found else population
+        if progress is not None:
+            progress(min((start + _LOT) / len(groups), 1.0))
+    return found
+
+
+def _simulate(
+    unit: Unit, groups: Sequence[Group], observation: Observation, rng: np.random.Generator
+) -> Iterable[Population]:
+    machines: list[Machine] = []
+    deviations: list[NDArray[np.float64]] = []
+    for group in groups:
+        off = np.array([rng.normal(0.0, TOLERANCES[symbol]) for symbol in DEVIATING])
+        named = tuple((s, float(v)) for s, v in zip(DEVIATING, off, strict=True))
+        seeds = rng.integers(2**30, size=len(group.ratios))
+        machines += [
+            group.hypothesis.machine(place, int(seed), named)
+            for place, seed in zip(group.places, seeds, strict=True)
+        ]
+        deviations.append(np.tile(off, (len(group.ratios), 1)))
+    mean, variance = _read(unit, machines, observation)
+    start = 0
+    for group, off in zip(groups, deviations, strict=True):
+        rows = slice(start, start + len(group.ratios))
+        start = rows.stop
+        yield Population(group.places, off, mean[rows], variance[rows])
+
+
+def _read(
+    unit: Unit, machines: Sequence[Machine], observation: Observation
+) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
+    servos = [machine.servo(unit) for machine in machines]
+    mean = np.empty((len(servos), len(observation)), dtype=complex)
+    variance = np.empty((len(servos), len(observation)))
+    for plan, rows in observation.plans:
+        for step in _STEPS_S:
+            try:
+                cycles = simulate_cycles(servos, plan, longest_step_s=step)
+                break
+            except AnalysisError:
+                if step == _STEPS_S[-1]:
+                    raise
+        for i, one in enumerate(cycles):
+            first = one[..., 1].reshape(len(rows), -1)
+            mean[i, rows], variance[i, rows] = readings_of_cycles(first)
+    return mean, variance

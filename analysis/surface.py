@@ -1,0 +1,196 @@
+"""What single runs of a hypothesis would read anywhere between the places simulated.
+
+Owns local regression over a population, relative to one observation: the
+mean of every channel at a place, how single runs scatter about it, how well
+the observation agrees. It runs no simulation and compares no hypotheses.
+
+Values are differences run minus observation, so that the phase need not be
+unwrapped: near the right place the difference is small.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.emulator import GAIN_TOLERANCE
+from analysis.observation import Observation
+from analysis.population import Population
+
+__all__ = ["Fit", "Surface", "differences"]
+
+_WIDENINGS = 1.3 ** np.arange(9)
+_SPARE = 2.0
+_CURVATURE = 0.3
+"""Ridge of the slopes, in units of the kernel's reach: few runs must not make a wild slope."""
+
+_BLUR = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0
+"""Weights over neighbouring frequencies by which a scatter is smoothed: few runs tell little."""
+
+_FLOOR = np.array([0.003, 0.003, 0.15])
+"""What the regression itself gets wrong, by channel, in log units and rad."""
+
+_ITERATIONS = 6
+
+_STRIDES = (0.5, 0.25, 0.12, 0.06)
+"""Reach of the random steps of a climb, as shares of what was simulated."""
+
+_TAIL = 4.0
+"""Degrees of freedom of Student's t, whose variance is _TAIL / (_TAIL - 2) of its scale squared."""
+
+_SCALE = float(np.sqrt((_TAIL - 2.0) / _TAIL))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """How an observation agrees with a hypothesis at one place.
+
+    `residual`, `std` (3, rows): observed minus expected at the best
+    deviations, and the standard deviation of it; NaN where nothing was
+    observed. `density` (3, rows): log density point by point, 0 there.
+    `deviations` (k + 1,): datasheet values, the tachometer's gain last.
+    """
+
+    place: NDArray[np.float64]
+    log_likelihood: float
+    residual: NDArray[np.float64]
+    std: NDArray[np.float64]
+    density: NDArray[np.float64]
+    deviations: NDArray[np.float64]
+
+
+def differences(observation: Observation, population: Population) -> NDArray[np.float64]:
+    """Runs minus observation (n, 3, rows); NaN where nothing was observed."""
+    difference = population.channels(observation) - observation.values
+    difference[:, 1] = np.angle(np.exp(1j * difference[:, 1]))
+    return difference
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surface:
+    """Local regression over the runs of one hypothesis.
+
+    Parameters
+    ----------
+    observation
+        What the runs are compared with.
+    places
+        (n, d).
+    difference
+        (n, 3, rows), see `differences`; deviations taken out where slopes are known.
+    width
+        (d,): distance over which a response changes smoothly.
+    slopes
+        (k, 3, rows): change of the channels per unit of each deviation, or no rows.
+    sigmas
+        (k,): prior standard deviations of the deviations.
+    quadratic
+        Whether the regression bends along each coordinate.
+    """
+
+    observation: Observation
+    places: NDArray[np.float64]
+    difference: NDArray[np.float64]
+    width: NDArray[np.float64]
+    slopes: NDArray[np.float64]
+    sigmas: NDArray[np.float64]
+    quadratic: bool = False
+
+    def scan(self, grid: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Log-likelihood (count,) at places (count, d), deviations left in the scatter."""
+        return np.array([self.log_density(*self.expected(place)).sum() for place in grid])
+
+    def expected(self, place: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
+        """Mean difference (3, rows) of runs at a place, and the scatter of a single run there."""
+        offset, weight, near = self._neighbours(place)
+        columns = [np.ones(len(offset)), *offset.T]
+        if self.quadratic:
+            columns += list((offset**2).T)
+        basis = np.column_stack(columns)
+        flat = np.nan_to_num(self.difference[near].reshape(len(offset), -1))
+        ridge = np.diag([1e-9] + [_CURVATURE] * (basis.shape[1] - 1))
+        weighted = basis * weight[:, None]
+        hat = np.linalg.solve(basis.T @ weighted + ridge, weighted.T)
+        coefficients = hat @ flat
+        used = float(np.einsum("ij,ji->", hat, basis * weight[:, None]))
+        total = float(weight.sum())
+        variance = weight @ (flat - basis @ coefficients) ** 2 / max(total - used, 0.3 * total)
+        shape = self.difference.shape[1:]
+        variance = self._smoothed(variance.reshape(shape)) * (1.0 + float(hat[0] @ hat[0]))
+        mean = coefficients[0].reshape(shape)
+        mean = np.where(np.isfinite(self.observation.values), mean, np.nan)
+        noise = np.stack([self.observation.noise] * 2 + [np.zeros(len(self.observation))])
+        return mean, np.sqrt(variance + noise**2 + _FLOOR[:, None] ** 2)
+
+    def fit(self, place: NDArray[np.float64], rows: NDArray[np.bool_] | None = None) -> Fit:
+        """Agreement at a place, deviations fitted to some rows (all where None)."""
+        mean, std = self.expected(place)
+        gain = np.zeros((1, *mean.shape))
+        gain[0, 0] = 1.0
+        slopes = np.concatenate([self.slopes, gain])
+        sigmas = np.append(self.sigmas, GAIN_TOLERANCE)
+        seen = np.isfinite(mean)
+        if rows is not None:
+            seen &= rows
+        y, s, slope = -mean[seen], _SCALE * std[seen], slopes[:, seen]
+        best = np.zeros(len(sigmas))
+        for _ in range(_ITERATIONS):
+            z2 = ((y - best @ slope) / s) ** 2
+            trust = (_TAIL + 1.0) / (_TAIL + z2) / s**2
+            normal = (slope * trust) @ slope.T + np.diag(1.0 / sigmas**2)
+            best = np.linalg.solve(normal, (slope * trust) @ y)
+        residual = -mean - np.tensordot(best, slopes, axes=1)
+        density = self.log_density(-residual, std)
+        _, log_det = np.linalg.slogdet(normal @ np.diag(sigmas**2))
+        prior = -0.5 * float(np.sum((best / sigmas) ** 2)) - 0.5 * float(log_det)
+        total = float(density[seen].sum()) + prior
+        return Fit(place, total, residual, np.where(np.isfinite(mean), std, np.nan), density, best)
+
+    def climb(
+        self, start: NDArray[np.float64], rows: NDArray[np.bool_] | None = None, tries: int = 12
+    ) -> Fit:
+        """The best fit to some rows, by ever finer random steps inside what was simulated.
+
+        `tries` per coordinate and step size.
+        """
+        low, high = self.places.min(axis=0), self.places.max(axis=0)
+        span = np.maximum(high - low, 1e-9)
+        rng = np.random.default_rng(0)
+        best = self.fit(np.clip(start, low, high), rows)
+        for reach in _STRIDES:
+            for _ in range(tries * len(start)):
+                step = span * reach * rng.uniform(-1.0, 1.0, len(start))
+                found = self.fit(np.clip(best.place + step, low, high), rows)
+                if found.log_likelihood > best.log_likelihood:
+                    best = found
+        return best
+
+    @staticmethod
+    def log_density(mean: NDArray[np.float64], std: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Student's t with a mean and a standard deviation (3, rows); 0 where nothing is known."""
+        scale = _SCALE * std
+        tail = -0.5 * (_TAIL + 1.0) * np.log1p((mean / scale) ** 2 / _TAIL)
+        return np.where(np.isfinite(mean), tail - np.log(scale), 0.0)
+
+    def _neighbours(
+        self, place: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+        """Offsets and weights of runs within reach; the reach grows until they suffice."""
+        needed = (2 if self.quadratic else 1) * len(self.width) + 1 + _SPARE
+        for widening in _WIDENINGS:
+            offset = (self.places - place) / (self.width * widening)
+            weight = np.clip(1.0 - np.sum(offset**2, axis=1) / 4.0, 0.0, None) ** 2
+            if weight.sum() >= needed:
+                break
+        near = weight > 0.0
+        return offset[near], weight[near], near
+
+    def _smoothed(self, variance: NDArray[np.float64]) -> NDArray[np.float64]:
+        smooth = np.empty_like(variance)
+        for block in self.observation.blocks:
+            count = block.stop - block.start
+            padded = np.pad(variance[:, block], ((0, 0), (2, 2)), mode="edge")
+            smooth[:, block] = sum(w * padded[:, i : i + count] for i, w in enumerate(_BLUR))
+        return smooth

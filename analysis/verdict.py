@@ -1,0 +1,125 @@
+"""From candidates to a verdict: consistent, explained, ambiguous or unexplained.
+
+Owns the rules and their thresholds, fixed on simulated sets before any
+practice set was judged by them. It simulates nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from analysis.adequacy import judge_adequacy
+from analysis.candidate import Candidate
+from analysis.holdout import HeldOut, hold_out
+from analysis.observation import Observation
+from analysis.placement import HEAT
+
+__all__ = ["Judged", "Verdict", "judge_candidates"]
+
+Word = Literal["consistent", "explained", "ambiguous", "unexplained"]
+
+_PER_PARAMETER = 8.0
+"""Log-likelihood that every further parameter must bring: it can always fit something."""
+
+_AT_BOUND = 10.0
+"""Cost of a parameter at the end of its plausible range: a sign that the cause is another."""
+
+_EDGE = 0.02
+_FALSE_ALARM = 20.0
+"""By so much must a cause beat the baseline; without a cause the best of all reached less."""
+
+_TIE = 12.0
+"""Within so much of the best, a set is a rival."""
+
+_UNLIKE = 3.0
+"""A fit worse than own runs' by more standard deviations than this is no explanation."""
+
+_JUDGED = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Judged:
+    """A candidate with its score, its probability among those judged and how adequate it is.
+
+    `misfit`: standard deviations by which it is fitted worse than runs of its own.
+    """
+
+    candidate: Candidate
+    held_out: HeldOut
+    score: float
+    misfit: float
+    probability: float
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Identifiers of its effects."""
+        return self.candidate.hypothesis.effects
+
+    @property
+    def adequate(self) -> bool:
+        """Whether the observation looks like one of its own runs."""
+        return self.misfit <= _UNLIKE
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Verdict:
+    """The word, the best set, every set judged (best first), and the baseline among them."""
+
+    word: Word
+    best: Judged
+    judged: tuple[Judged, ...]
+    baseline: Judged
+
+    @property
+    def rivals(self) -> tuple[Judged, ...]:
+        """Sets within the margin of a tie, the best one left out."""
+        return tuple(
+            one
+            for one in self.judged
+            if one is not self.best and one.effects and one.score > self.best.score - _TIE
+        )
+
+
+def judge_candidates(
+    candidates: Sequence[Candidate], observation: Observation, rng: np.random.Generator
+) -> Verdict:
+    """Judge the leading candidates and the baseline.
+
+    The score is the mean of the log-likelihood of all rows and of that of every
+    level predicted from the others: the first uses all that was measured, the
+    second pays for nothing that does not carry over.
+    """
+    chosen = list(candidates[:_JUDGED])
+    chosen += [c for c in candidates[_JUDGED:] if not c.hypothesis.effects]
+    held = [hold_out(candidate, observation) for candidate in chosen]
+    scores = np.array([_score(c, h) for c, h in zip(chosen, held, strict=True)])
+    weight = np.exp((scores - scores.max()) / HEAT)
+    judged = [
+        Judged(candidate, out, float(score), judge_adequacy(candidate, rng).sigma, float(p))
+        for candidate, out, score, p in zip(
+            chosen, held, scores, weight / weight.sum(), strict=True
+        )
+    ]
+    judged.sort(key=lambda one: -one.score)
+    (baseline,) = (one for one in judged if not one.effects)
+    best = judged[0]
+    if not best.effects or best.score < baseline.score + _FALSE_ALARM:
+        word: Word = "consistent" if baseline.adequate else "unexplained"
+        return Verdict(word, baseline, tuple(judged), baseline)
+    verdict = Verdict("explained", best, tuple(judged), baseline)
+    if not best.adequate:
+        return Verdict("unexplained", best, verdict.judged, baseline)
+    if verdict.rivals:
+        return Verdict("ambiguous", best, verdict.judged, baseline)
+    return verdict
+
+
+def _score(candidate: Candidate, held_out: HeldOut) -> float:
+    sizes = candidate.best.place[1:]
+    bound = np.count_nonzero((sizes < _EDGE) | (sizes > 1.0 - _EDGE))
+    cost = _PER_PARAMETER * len(sizes) + _AT_BOUND * bound
+    return 0.5 * (candidate.best.log_likelihood + held_out.score) - cost

@@ -1,0 +1,89 @@
+"""``lashbench diagnose``: what the simulation gets wrong, and why.
+
+Owns the options of the verb and where the atlas is kept. The diagnosis is the
+analysis's.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from daq.errors import InputError
+from tui.options import Json, Plots, UnitName, prepare_directory
+from tui.output import Console, Injected
+
+if TYPE_CHECKING:
+    from sim.unit import Unit
+
+__all__ = ["cache_folder", "diagnose"]
+
+
+def diagnose(
+    file: Path | None = None,
+    /,
+    *,
+    unit: UnitName,
+    paper: bool = False,
+    plots: Plots = None,
+    json: Json = False,
+    console: Injected,
+) -> None:
+    """Show what the simulation gets wrong, name the cause and extend the model with it.
+
+    Simulates every cause of the catalogue through the sweep that was measured,
+    and tells which one, or which two, the response looks like; that nothing is
+    missing, and that nothing known explains it, are answers too.
+
+    Parameters
+    ----------
+    file
+        Response as csv, h5, uff, mat or the analyser's own sdf.
+    paper
+        Diagnose the paper's own measured frequencies and gains in place of a file.
+    """
+    if paper == (file is not None):
+        raise InputError("nothing to diagnose; give either a response or --paper" if not paper
+                         else f"{file}: give either a response or --paper, not both")  # fmt: skip
+    from sim.unit import load_unit
+
+    subject = load_unit(unit)
+    if plots is not None:
+        prepare_directory(plots)
+    if file is None:
+        _diagnose_paper(subject, plots, json, console)
+        return
+    from daq.formats import read_response
+
+    response = read_response(file)
+    from analysis.diagnosis import diagnose_response
+
+    result = diagnose_response(response, subject, cache=cache_folder(), progress=console.progress)
+    if plots is not None:
+        from analysis.diagnosis_figures import draw_diagnosis
+
+        for path in draw_diagnosis(result, plots):
+            console.note(f"wrote {path}")
+    if json:
+        console.document(result.to_json())
+    else:
+        console.data("\n".join(result.summary()))
+
+
+def cache_folder() -> Path:
+    """Where what can be computed again is kept, by the XDG convention."""
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "lashbench"
+
+
+def _diagnose_paper(unit: Unit, plots: Path | None, json: bool, console: Console) -> None:
+    from analysis.paper_diagnosis import diagnose_paper
+
+    if plots is not None:
+        raise InputError("--plots goes with a response; the paper's rows make no curves")
+    result = diagnose_paper(unit, progress=console.progress)
+    if json:
+        console.document(result.to_json())
+    else:
+        console.data("\n".join(result.summary()))
