@@ -108,6 +108,10 @@ class Limits(_Section):
     source_offset_v: NonNegative
     start_hz: Positive
     stop_hz: Positive
+    b1_deg: NonNegative | None = None
+    """Most backlash of stage 1 that is acceptable, degrees."""
+    b2_deg: NonNegative | None = None
+    """Most backlash of stage 2 that is acceptable, degrees."""
 
 
 class Unit(_Section):

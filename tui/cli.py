@@ -31,6 +31,7 @@ VERBS = {
     "export": ("tui.commands.export:export", "Write a stored measurement to a file."),
     "serve": ("tui.commands.serve:serve", "Serve a simulated 35670A on a wire."),
     "demo": ("tui.commands.demo:demo", "Do the whole job without hardware."),
+    "bench": ("tui.commands.bench:bench", "Open the bench screen; so does no verb at all."),
 }
 """Every verb: the function that does it, and its line in the help."""
 
@@ -67,6 +68,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     debug, words = _switch("--debug", words)
     quiet, words = _switch("--quiet", words)
     console = Console(quiet)
+    if not words and sys.stdin.isatty() and sys.stdout.isatty():
+        words = ["bench"]
     try:
         return _run(words, console)
     except BrokenPipeError:

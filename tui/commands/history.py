@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from daq.errors import ConfigurationError, InputError, LashbenchError
+from tui.history_rows import estimated_groups, measurement_row, trend_lines, trend_rows
 from tui.options import Json
 from tui.output import Console, Injected
 
@@ -23,13 +24,9 @@ if TYPE_CHECKING:
 
 __all__ = ["history"]
 
-_SECONDS_PER_DAY = 86400.0
-_QUANTITIES = ("contribution_ratio", "b1_deg", "b2_deg")
 _BUDGET_S = 45.0
 """Time after which `--estimate some` begins no further estimate."""
 _BAR = 41
-_SCATTER = 4.0
-"""Mean squared distance in standard errors from which values are said to differ."""
 
 
 def history(
@@ -63,14 +60,16 @@ def history(
     lacking = [m for m in measurements if m.state == "complete" and m.id not in known]
     if estimate != "none" and lacking:
         known |= _estimates(db, lacking, estimate == "all", console)
-    rows = [_row(measurement, known.get(measurement.id, {})) for measurement in measurements]
-    trends = _trends(rows)
+    rows = [
+        measurement_row(measurement, known.get(measurement.id, {})) for measurement in measurements
+    ]
+    trends = trend_rows(rows)
     if json:
         console.document({"measurements": rows, "trends": trends})
     elif not rows:
         console.data("no measurements; make one with: lashbench measure")
     else:
-        console.data("\n".join([_table(rows), *_pictures(rows), *_lines(trends)]))
+        console.data("\n".join([_table(rows), *_pictures(rows), *trend_lines(trends)]))
 
 
 def _unit_name(unit: str | None, store: Store) -> str | None:
@@ -143,80 +142,6 @@ def _estimate(db: Path, measurement: Measurement, console: Console) -> dict[str,
     return content
 
 
-def _row(measurement: Measurement, estimate: dict[str, Any]) -> dict[str, Any]:
-    header = measurement.header
-    row: dict[str, Any] = {
-        "id": measurement.id,
-        "unit": header.unit,
-        "serial": header.serial,
-        "started": measurement.started,
-        "state": measurement.state,
-        "points": measurement.points,
-    }
-    row |= {name: estimate.get(name) for name in _QUANTITIES}
-    simulated = measurement.instrument is not None and measurement.instrument.simulated
-    return row | {
-        "flagged": measurement.flagged,
-        "planned": header.plan.points,
-        "levels_vpk": list(header.plan.levels_vpk),
-        "source_state": measurement.source_state.value,
-        "simulated": simulated,
-        "operator": header.operator,
-        "notes": header.notes,
-    }
-
-
-def _groups(rows: Sequence[dict[str, Any]]) -> dict[tuple[str, str], list[dict[str, Any]]]:
-    """Estimated measurements by unit and serial number."""
-    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
-    for row in rows:
-        if row["contribution_ratio"] is not None:
-            groups.setdefault((row["unit"], row["serial"]), []).append(row)
-    return groups
-
-
-def _trends(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    from analysis.trend import fit_trend
-
-    trends = []
-    for (unit, serial), group in _groups(rows).items():
-        for name in _QUANTITIES:
-            sure = [row for row in group if row[name] and row[name]["std"]]
-            trend = fit_trend(
-                _moments_s(sure),
-                [row[name]["value"] for row in sure],
-                [row[name]["std"] for row in sure],
-            )
-            if trend is None:
-                continue
-            slope = {"value": trend.slope_per_day, "std": trend.slope_std}
-            trends.append(
-                {
-                    "unit": unit,
-                    "serial": serial,
-                    "quantity": name,
-                    "measurements": len(sure),
-                    "mean": {"value": trend.mean, "std": trend.mean_std},
-                    "per_day": None if trend.slope_per_day is None else slope,
-                    "chi2": trend.chi2,
-                    "degrees": trend.degrees,
-                }
-            )
-    return trends
-
-
-def _moments_s(rows: Sequence[dict[str, Any]]) -> list[float]:
-    """When each was begun; measurements of one day count as made at the same moment.
-
-    Minutes apart, a slope would say nothing but how wide the bars are.
-    """
-    from datetime import datetime
-
-    moments_s = [datetime.fromisoformat(row["started"]).timestamp() for row in rows]
-    apart_s = max(moments_s, default=0.0) - min(moments_s, default=0.0)
-    return moments_s if apart_s >= _SECONDS_PER_DAY else [0.0] * len(rows)
-
-
 def _table(rows: Sequence[dict[str, Any]]) -> str:
     def shown(row: dict[str, Any], name: str, digits: int) -> str:
         number = row[name]
@@ -252,7 +177,7 @@ def _aligned(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 def _pictures(rows: Sequence[dict[str, Any]]) -> list[str]:
     """The contribution ratio of each unit as dots with error bars from 0 to 1."""
     lines = []
-    for (unit, serial), group in _groups(rows).items():
+    for (unit, serial), group in estimated_groups(rows).items():
         name = f"{unit} {serial}".strip()
         lines += [
             "",
@@ -275,22 +200,3 @@ def _bar(value: float, std: float) -> str:
         cells[cell] = "-"
     cells[place(value)] = "o"
     return "".join(cells)
-
-
-def _lines(trends: Sequence[dict[str, Any]]) -> list[str]:
-    lines = []
-    for trend in trends:
-        if trend["measurements"] < 2:
-            continue
-        name = f"{trend['unit']} {trend['serial']}".strip()
-        line = (
-            f"{name}: {trend['quantity']} {trend['mean']['value']:.4g} "
-            f"+- {trend['mean']['std']:.2g}"
-        )
-        slope = trend["per_day"]
-        if slope is not None:
-            line += f", {30 * slope['value']:+.3g} +- {30 * slope['std']:.2g} in 30 days"
-        if trend["chi2"] > _SCATTER * max(trend["degrees"], 1):
-            line += "; they differ by more than their errors"
-        lines.append(line)
-    return ["", *lines] if lines else []

@@ -1,0 +1,186 @@
+"""Driving the bench application without a terminal, and reading its screens as plain text."""
+
+import asyncio
+import io
+import time
+from contextlib import asynccontextmanager
+
+from rich.console import Console
+
+from tui.app.analyses import Analyses
+from tui.app.application import BenchApp
+from tui.app.messages import InstrumentsListed
+
+SIZES = [(80, 24), (120, 40), (200, 60)]
+
+ESTIMATE = {
+    "unit": "ADSS",
+    "contribution_ratio": {"value": 0.31, "std": 0.05, "interval95": [0.22, 0.41]},
+    "b1_deg": {"value": 0.2148, "std": 0.0347},
+    "b2_deg": {"value": 0.0455, "std": 0.0033},
+    "b_t_deg": {"value": 0.066, "std": 0.0},
+    "error_index": {
+        "ratio": [0.0, 0.25, 0.5, 0.75, 1.0],
+        "hz": [12.0, 3.0, 5.0, 9.0, 14.0],
+        "std_hz": [1.0, 1.0, 1.0, None, 1.0],
+        "minimum_ratio": 0.25,
+    },
+    "warnings": [],
+}
+"""What a quick estimate says, in the form of ``estimate --json``."""
+
+DIAGNOSIS = {
+    "verdict": "ambiguous",
+    "causes": [
+        {
+            "effect": "load-inertia",
+            "parameters": {"J_L": {"value": 0.0031, "std": 0.0001, "unit": "kg.m^2"}},
+            "probability": 0.55,
+        }
+    ],
+    "rivals": [{"causes": ["shaft-stiffness"], "probability": 0.41}],
+    "baseline": {"held_out_rms_sigma": 4.2, "held_out_rms_db": 1.9},
+    "extended": {"held_out_rms_sigma": 1.1, "held_out_rms_db": 0.4},
+    "gain": {"held_out_rms_ratio": 0.26},
+    "contribution_ratio": {
+        "baseline": {"value": 0.42, "std": 0.05},
+        "extended": {"value": 0.31, "std": 0.04},
+    },
+    "residual": [],
+    "next_measurement": {
+        "plan": {"levels_vpk": [2.0], "frequencies_hz": [120.0, 130.0, 140.0],
+                 "settle_cycles": 4, "integrate_cycles": 4},
+        "separates": ["load-inertia", "shaft-stiffness"],
+        "expected_sigma": 5.0,
+    },
+    "elapsed_s": 1.0,
+}  # fmt: skip
+"""What a quick diagnosis says, in the form of ``diagnose --json``."""
+
+
+class Diagnosed:
+    """A diagnosis as the analysis gives it."""
+
+    def to_json(self):
+        return DIAGNOSIS
+
+    def summary(self):
+        return ["ambiguous"]
+
+
+def quick_analyses(**instead) -> Analyses:
+    """Analyses that know their answer."""
+
+    def estimate(response, unit, progress):
+        progress(0.5, "looking it up")
+        return ESTIMATE
+
+    def diagnose(response, unit, progress):
+        progress(0.5, "looking it up")
+        return Diagnosed()
+
+    def report(task, diagnosis, path):
+        path.write_text(f"<html>measurement {task.measurement}</html>")
+
+    known = {"estimate": estimate, "diagnose": diagnose, "report": report}
+    return Analyses(**(known | instead))
+
+
+def nothing_found(post):
+    post(InstrumentsListed([], []))
+
+
+def text_of(app) -> str:
+    """The screen as it is seen, one line per row."""
+    width, height = app.size
+    console = Console(
+        width=width,
+        height=height,
+        file=io.StringIO(),
+        force_terminal=True,
+        record=True,
+        legacy_windows=False,
+    )
+    # A private name of the framework; it is used here and nowhere else.
+    console.print(app.screen._compositor.render_update(full=True))
+    return "\n".join(line.rstrip() for line in console.export_text().splitlines())
+
+
+class Operator:
+    """Presses keys and waits until something stands on the screen."""
+
+    def __init__(self, app, pilot):
+        self.app, self.pilot = app, pilot
+
+    @property
+    def screen(self) -> str:
+        return text_of(self.app)
+
+    async def press(self, *keys):
+        await self.pilot.press(*keys)
+
+    async def sees(self, *words, within_s=20.0) -> str:
+        """The screen, once all words stand on it."""
+        end = time.monotonic() + within_s
+        while not all(word in self.screen for word in words):
+            assert time.monotonic() < end, f"{words} not on the screen:\n{self.screen}"
+            await self.pilot.pause(0.03)
+        return self.screen
+
+    async def types(self, selector, text):
+        field = self.app.screen.query_one(selector)
+        field.focus()
+        field.value = text
+        await self.pilot.pause()
+
+    async def goes_to(self, step):
+        """Step by step, as the keys for it work while a field has the focus."""
+        while step != self.app.screen.STEP:
+            await self.press("ctrl+n" if step > self.app.screen.STEP else "escape")
+        await self.sees(f"[{step} ")
+
+    async def connects(self, url):
+        await self.goes_to(2)
+        await self.types("#url", url)
+        await self.press("enter")
+        return await self.sees("CONNECTED to")
+
+    async def plans(self, levels="2.5", start="115", stop="160", points="16", cycles=("6", "6")):
+        """Set the plan in step 3."""
+        await self.goes_to(3)
+        await self.press("p")
+        await self.sees("The sweep")
+        values = {"levels": levels, "start": start, "stop": stop, "points": points}
+        values |= {"settle": cycles[0], "integrate": cycles[1]}
+        for name, value in values.items():
+            self.app.screen.query_one(f"#plan-{name}").value = value
+        await self.press("enter")
+        await self.sees("[3 Check]", f"from {start} to {stop} Hz")
+
+    async def checks(self):
+        """Run the checks; a wire that might be hardware asks first."""
+        await self.press("c")
+        if "Drive the unit?" in self.screen:
+            await self.press("y")
+        return await self.sees("all passed")
+
+
+@asynccontextmanager
+async def operated(db, size=(80, 24), **options):
+    """An application in a terminal of some size."""
+    settings = {"analyses": quick_analyses(), "find": nothing_found} | options
+    app = BenchApp(db, **settings)
+    async with app.run_test(size=size, notifications=True) as pilot:
+        await pilot.pause()
+        operator = Operator(app, pilot)
+        try:
+            yield operator
+        finally:
+            # A test that failed must not leave a session behind.
+            app.keeper.stop_now()
+            await app.workers.wait_for_complete()
+
+
+def run(test):
+    """Run a coroutine function that takes nothing."""
+    asyncio.run(test())

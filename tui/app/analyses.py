@@ -1,0 +1,183 @@
+"""The analyses that the screens ask for, run beside them on a worker of their own.
+
+Owns which analysis is called with what, and that it can be given up. It
+computes nothing itself and draws nothing.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from textual.message import Message
+
+from daq.errors import AnalysisError, LashbenchError
+from tui.app.messages import AnalysisDone, AnalysisFailed, AnalysisProgressed, Job
+
+if TYPE_CHECKING:
+    from daq.frf import FrequencyResponse
+    from sim.unit import Unit
+
+__all__ = ["Analyses", "Task", "diagnose", "read_result", "write_report"]
+
+Post = Callable[[Message], object]
+Progress = Callable[[float, str], None]
+_LOG = logging.getLogger("lashbench.analysis")
+
+
+def _estimate(response: FrequencyResponse, unit: Unit, progress: Progress) -> Mapping[str, Any]:
+    from analysis.estimate import estimate_response
+
+    return estimate_response(response, unit, progress=progress).to_json()
+
+
+def _diagnose(response: FrequencyResponse, unit: Unit, progress: Progress) -> Any:
+    try:
+        from analysis.diagnosis import diagnose_response
+    except ImportError as error:
+        raise AnalysisError("this installation has no diagnosis; update lashbench") from error
+    return diagnose_response(response, unit, progress=progress)
+
+
+def _report(task: Task, diagnosis: Any, path: Path) -> None:
+    raise AnalysisError("this installation writes no reports; update lashbench")
+
+
+@dataclass(frozen=True, slots=True)
+class Analyses:
+    """What is called; tests put something quicker in its place.
+
+    Parameters
+    ----------
+    estimate
+        Gives the document of ``estimate --json``.
+    diagnose
+        Gives something with ``to_json()`` and ``summary()``.
+    report
+        Writes a file about a task's measurement, with its diagnosis or None.
+    """
+
+    estimate: Callable[[FrequencyResponse, Unit, Progress], Mapping[str, Any]] = _estimate
+    diagnose: Callable[[FrequencyResponse, Unit, Progress], Any] = _diagnose
+    report: Callable[[Task, Any, Path], None] = _report
+
+
+class _GivenUp(Exception):
+    """Ends an analysis that nobody waits for any more."""
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """An analysis of one measurement.
+
+    Parameters
+    ----------
+    post
+        Where its messages go.
+    db, measurement, unit
+        What it is about.
+    given_up
+        Set when nobody waits for it any more.
+    """
+
+    post: Post
+    db: Path
+    measurement: int
+    unit: Unit
+    given_up: threading.Event
+
+    def response(self) -> FrequencyResponse:
+        """The measurement's points in force."""
+        from daq.store import Store
+
+        with Store(self.db, read_only=True) as store:
+            return store.response(self.measurement)
+
+    def progress(self, job: Job) -> Progress:
+        """Tells how far a job is, and ends it where nobody waits."""
+
+        def tell(fraction: float, text: str = "") -> None:
+            if self.given_up.is_set():
+                raise _GivenUp
+            self.post(AnalysisProgressed(job, fraction, text))
+
+        return tell
+
+    def run(self, job: Job, work: Callable[[], Any]) -> None:
+        """Do a job and tell what came of it."""
+        try:
+            result = work()
+        except _GivenUp:
+            return
+        except Exception as error:
+            if not isinstance(error, LashbenchError):
+                _LOG.error("%s of measurement %d", job, self.measurement, exc_info=error)
+            self.post(AnalysisFailed(job, self.measurement, error))
+            return
+        self.post(AnalysisDone(job, self.measurement, result))
+
+
+def read_result(task: Task, analyses: Analyses) -> None:
+    """Features first, since they are quick; then the estimate, from the history if it is there."""
+
+    def features() -> tuple[FrequencyResponse, Any]:
+        from analysis.resonance import extract
+
+        response = task.response()
+        return response, extract(response)
+
+    def estimate() -> Mapping[str, Any]:
+        known = _known_estimate(task)
+        if known is not None:
+            return known
+        made = analyses.estimate(task.response(), task.unit, task.progress("result"))
+        _keep_estimate(task, made)
+        return made
+
+    task.run("result", features)
+    task.run("result", estimate)
+
+
+def diagnose(task: Task, analyses: Analyses) -> None:
+    """What the model lacks, and why."""
+    progress = task.progress("diagnosis")
+    task.run("diagnosis", lambda: analyses.diagnose(task.response(), task.unit, progress))
+
+
+def write_report(task: Task, analyses: Analyses, diagnosis: Any, path: Path) -> None:
+    """The report as a file."""
+
+    def work() -> Path:
+        analyses.report(task, diagnosis, path)
+        return path
+
+    task.run("report", work)
+
+
+def _known_estimate(task: Task) -> Mapping[str, Any] | None:
+    """The last estimate, unless it failed or points were taken since."""
+    from daq.store import Store
+
+    with Store(task.db, read_only=True) as store:
+        known = store.latest_estimates().get(task.measurement)
+        ended = store.measurement(task.measurement).ended
+    if known is None or "contribution_ratio" not in known.document:
+        return None
+    return known.document if ended is not None and known.made > ended else None
+
+
+def _keep_estimate(task: Task, document: Mapping[str, Any]) -> None:
+    from importlib.metadata import version
+
+    from daq.store import Store
+
+    try:
+        with Store(task.db) as store:
+            store.add_estimate(task.measurement, f"lashbench {version('lashbench')}", document)
+    except LashbenchError as error:
+        # It is shown all the same; the next look makes it once more.
+        _LOG.warning("an estimate was not kept: %s", error)

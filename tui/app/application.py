@@ -1,0 +1,373 @@
+"""The bench application: which screen is on top, which keys hold everywhere, who gets what.
+
+Owns the way through the steps and the one key that stops the source. It
+measures and computes nothing: sessions run under `session_keeper`, analyses
+under `analyses`, and a step's screen draws what the desk holds.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import signal
+import threading
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
+
+from textual.app import App, SystemCommand
+from textual.binding import Binding, BindingType
+from textual.screen import Screen
+
+from daq.errors import LashbenchError
+from daq.session_events import Finished, PointStored, RunIn
+from tui.app import bench_owner, messages
+from tui.app.analyses import Analyses
+from tui.app.analysis_keeper import AnalysisKeeper
+from tui.app.desk import Desk
+from tui.app.dialogs import Dialog, ErrorDialog, HelpDialog, QuestionDialog
+from tui.app.screens import SCREENS
+from tui.app.screens.instrument_screen import InstrumentScreen
+from tui.app.session_keeper import SessionKeeper
+from tui.app.step_screen import STEPS, StepScreen
+from tui.app.style import STYLE
+
+if TYPE_CHECKING:
+    from daq.store_records import Measurement
+
+__all__ = ["BenchApp"]
+
+_REDRAW_S = 0.1
+"""Points are drawn at most this often, however fast they come."""
+_LOG = logging.getLogger("lashbench.screen")
+
+
+class BenchApp(App[int]):
+    """The bench screen.
+
+    Parameters
+    ----------
+    db
+        File of the bench's history.
+    analyses
+        What is called for results; the real ones if left out.
+    find
+        Lists instruments; the real search if left out.
+    log
+        Where the log goes, for messages that point to it.
+    """
+
+    TITLE = "lashbench"
+    CSS = STYLE
+    SCREENS = dict(SCREENS)
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding(
+            "ctrl+x", "stop_source", "STOP", id="stop", priority=True,
+            tooltip="End whatever drives, at once; the measurement can be resumed",
+        ),
+        Binding("f1", "help", "Help", id="help", tooltip="What this step is for, and its keys"),
+        Binding("ctrl+y", "copy", "Copy", id="copy", show=False, tooltip="Copy what is shown"),
+        *(Binding(str(n), f"go({n})", name, show=False) for n, name in enumerate(STEPS, start=1)),
+    ]  # fmt: skip
+
+    def __init__(
+        self,
+        db: Path = Path("lashbench.db"),
+        analyses: Analyses | None = None,
+        find: Callable[[bench_owner.Post], None] = bench_owner.find_instruments,
+        log: Path | None = None,
+    ) -> None:
+        super().__init__()
+        self.desk = Desk(db)
+        self.keeper = SessionKeeper(self)
+        self.analyses = AnalysisKeeper(self, analyses or Analyses())
+        self._find = find
+        self._log_file = log
+        self._stale = False
+
+    # ------------------------------------------------------------ the way through
+
+    def on_mount(self) -> None:
+        """Steps ready, first one on top, nothing connected."""
+        self.push_screen(STEPS[0])
+        self.set_interval(_REDRAW_S, self._redraw)
+        self._listen_to_signals()
+
+    def action_go(self, step: int) -> None:
+        """Go to a step by number."""
+        self.go(step)
+
+    def go(self, step: int) -> None:
+        """Put a step on top, if what it needs is there; else say what is missing."""
+        if not 1 <= step <= len(STEPS) or isinstance(self.screen, Dialog):
+            return
+        missing = self._missing(step)
+        if missing:
+            self.notify(missing, severity="warning")
+        elif self.screen is not self.get_screen(STEPS[step - 1]):
+            self.switch_screen(STEPS[step - 1])
+
+    def _missing(self, step: int) -> str:
+        desk = self.desk
+        if step > 1 and step != 7 and desk.unit is None:
+            return "choose a unit first"
+        if step == 3 and desk.identity is None:
+            return "connect an instrument first: step 2"
+        if step == 4 and desk.run.phase == "none":
+            return "the checks come first: step 3"
+        if step in (5, 6) and desk.measurement is None:
+            return "no measurement yet: sweep first, or open one in step 7"
+        return ""
+
+    def banner_text(self) -> str:
+        """Line that stands on every screen: simulated or not, source, unit, measurement."""
+        desk, run = self.desk, self.desk.run
+        parts = ["SIMULATED"] if desk.simulated else []
+        parts.append(run.source_text)
+        if desk.unit is not None:
+            parts.append(f"{desk.unit.name} {desk.serial}".strip())
+        if run.measurement is not None:
+            word = run.finished.state if run.finished is not None else run.phase
+            parts.append(f"#{run.measurement} {word} {run.done}/{run.total}")
+        return " " + " | ".join(parts)
+
+    # ------------------------------------------------------------ keys everywhere
+
+    def action_stop_source(self) -> None:
+        """The one key that stops the source."""
+        self.notify(self.keeper.stop_now(), severity="warning")
+        self.redraw_now()
+
+    def action_help(self) -> None:
+        """Explain the step on top."""
+        screen = self.screen
+        if isinstance(screen, StepScreen):
+            title = f"Step {screen.STEP}: {STEPS[screen.STEP - 1]}"
+            self.push_screen(HelpDialog(title, f"{screen.HELP.strip()}\n\n{_KEYS}"))
+
+    def action_copy(self) -> None:
+        """Copy the step's result; it is written to a file too, for terminals that take none."""
+        screen = self.screen
+        text = screen.copy_text() if isinstance(screen, StepScreen) else ""
+        if not text:
+            self.notify("there is nothing to copy here yet")
+            return
+        self.copy_to_clipboard(text)
+        kept = ""
+        if self._log_file is not None:
+            with suppress(OSError):
+                path = self._log_file.with_name("copied.txt")
+                path.write_text(text + "\n", encoding="utf-8")
+                kept = f"; also in {path}"
+        self.notify(f"copied{kept}")
+
+    async def action_quit(self) -> None:
+        """Leave; a session in hand is ended first, safe, if that is meant."""
+        if not self.keeper.busy:
+            self._leave()
+            return
+        text = "A session is under way. It will be ended, the source off; it can be resumed."
+        dialog = QuestionDialog("Quit?", text, "End it and quit", no="Stay")
+        self.push_screen(dialog, lambda yes: self._end_and_leave() if yes else None)
+
+    def _end_and_leave(self) -> None:
+        self.keeper.interrupt_then(self._leave)
+
+    def _leave(self) -> None:
+        self.analyses.give_up()
+        self.exit(0)
+
+    def get_system_commands(self, screen: Screen) -> Iterable[SystemCommand]:
+        """The palette: steps, keys of the step, and what Textual offers."""
+        yield SystemCommand("Source: stop", "End whatever drives", self.action_stop_source)
+        yield SystemCommand("Copy: what is shown", "To the clipboard", self.action_copy)
+        for number, name in enumerate(STEPS, start=1):
+            yield SystemCommand(f"Go to: {name}", f"Step {number}", partial(self.go, number))
+        for binding in screen.active_bindings.values():
+            if binding.node is screen and binding.binding.description:
+                action = partial(screen.run_action, binding.binding.action)
+                described = binding.binding.tooltip or f"key {binding.binding.key}"
+                yield SystemCommand(f"Step: {binding.binding.description}", described, action)
+        for command in super().get_system_commands(screen):
+            if command.title != "Screenshot":
+                yield command
+
+    # ------------------------------------------------------------ what people must know
+
+    def show_error(self, title: str, error: Exception | str) -> None:
+        """A dialog with an error whose text can be copied; no traceback."""
+        text = str(error)
+        if isinstance(error, Exception) and not isinstance(error, LashbenchError):
+            _LOG.error(title, exc_info=error)
+            text = (
+                f"{type(error).__name__}: {error}\nThis is a fault of lashbench. {self.log_words}"
+            )
+        self.push_screen(ErrorDialog(title, text))
+
+    @property
+    def log_words(self) -> str:
+        """Where whoever wants to know more should look."""
+        return f"The log has it all: {self._log_file}" if self._log_file else "Please report it."
+
+    def _fatal_error(self) -> None:
+        # Textual would print the whole trace; the log has it, a line is for people.
+        error = self._exception
+        _LOG.critical("the screen ended by a fault", exc_info=error)
+        self.keeper.stop_now()
+        self.analyses.give_up()
+        line = f"error: internal: {type(error).__name__}: {error}. {self.log_words}"
+        self._exit_renderables.append(line)
+        self._close_messages_no_wait()
+
+    def _listen_to_signals(self) -> None:
+        if threading.current_thread() is not threading.main_thread():
+            return
+        loop = asyncio.get_running_loop()
+        for name in ("SIGTERM", "SIGHUP"):
+            with suppress(AttributeError, NotImplementedError, RuntimeError, ValueError):
+                loop.add_signal_handler(getattr(signal, name), self._end_and_leave)
+
+    # ------------------------------------------------------------ sessions
+
+    def on_session_told(self, message: messages.SessionTold) -> None:
+        """Remember what a session told; points are drawn by the clock, the rest at once."""
+        event = message.event
+        self.desk.run.take(event)
+        if isinstance(event, Finished):
+            self.keeper.settle(event)
+        if isinstance(event, PointStored | RunIn):
+            self._stale = True
+        else:
+            self.redraw_now()
+
+    def on_session_ended(self, message: messages.SessionEnded) -> None:
+        """The instrument is free again; faults and a source not proven off need a decision."""
+        run = self.desk.run
+        run.end(message.error)
+        self.redraw_now()
+        finished = run.finished
+        if finished is not None and finished.source_state.value != "confirmed-off":
+            self.show_error(
+                "SWITCH THE SOURCE OFF BY HAND",
+                f"{run.source_text}. The session ended ({finished.reason}) and the source could "
+                "not be proven off.",
+            )
+        elif message.error is not None:
+            self._show_fault(message.error)
+        elif finished is not None:
+            self.notify(f"{finished.state}: {finished.points} points, source confirmed off")
+        self.keeper.released()
+
+    def _show_fault(self, error: Exception) -> None:
+        finished = self.desk.run.finished
+        if finished is None:
+            self.show_error("The session did not begin", error)
+            return
+        more = f"{finished.points} points are kept, the source is confirmed off."
+        if finished.points and finished.state == "interrupted":
+            more += " Go on with R in step 4, now or later."
+        if isinstance(error, LashbenchError):
+            self.show_error("The session was interrupted", f"{error}\n\n{more}")
+        else:
+            self.show_error("The session was interrupted", error)
+
+    def on_instrument_found(self, message: messages.InstrumentFound) -> None:
+        """Someone answered."""
+        self.desk.identity, self.desk.link_fault = message.identity, ""
+        self.desk.run.source = message.source
+        self.keeper.released()
+        self.redraw_now()
+
+    def on_instrument_failed(self, message: messages.InstrumentFailed) -> None:
+        """Nobody did; the step says what to try."""
+        self.desk.identity = None
+        self.keeper.released()
+        self.desk.link_fault = str(message.error)
+        self.redraw_now()
+
+    def on_source_stopped(self, message: messages.SourceStopped) -> None:
+        """The recipe ran outside of a session."""
+        self.desk.run.source, self.desk.run.source_vpk = message.state, None
+        self.keeper.released()
+        self.redraw_now()
+        if message.state.value != "confirmed-off":
+            self.show_error("SWITCH THE SOURCE OFF BY HAND", message.text)
+        else:
+            self.notify("source confirmed off")
+
+    # ------------------------------------------------------------ analyses
+
+    def on_analysis_progressed(self, message: messages.AnalysisProgressed) -> None:
+        """Drawn by the clock."""
+        self.analyses.progressed(message)
+        self._stale = True
+
+    def on_analysis_done(self, message: messages.AnalysisDone) -> None:
+        """Drawn at once."""
+        self.analyses.done(message)
+        self.redraw_now()
+
+    def on_analysis_failed(self, message: messages.AnalysisFailed) -> None:
+        """Drawn at once."""
+        self.analyses.failed(message)
+        self.redraw_now()
+
+    # ------------------------------------------------------------ history and search
+
+    def find_instruments(self) -> None:
+        """List instruments beside the screen."""
+        work = partial(self._find, self.post_message)
+        self.run_worker(work, thread=True, group="search", exit_on_error=False)
+
+    def on_instruments_listed(self, message: messages.InstrumentsListed) -> None:
+        """Show what a search found."""
+        screen = self.get_screen("instrument")
+        if isinstance(screen, InstrumentScreen) and screen.is_mounted:
+            screen.listed(message)
+
+    def measurements(self) -> list[Measurement]:
+        """All measurements of the history, oldest first; none where there is no history yet."""
+        from daq.store import Store
+
+        if not self.desk.db.exists():
+            return []
+        try:
+            with Store(self.desk.db, read_only=True) as store:
+                return store.measurements()
+        except LashbenchError as error:
+            self.show_error("The history cannot be read", error)
+            return []
+
+    def open_measurement(self, measurement: Measurement) -> None:
+        """Look at a stored measurement: its result is the next screen."""
+        if self.keeper.busy:
+            self.notify("a session is under way; stop it first", severity="warning")
+            return
+        try:
+            self.desk.choose_unit_of(measurement)
+        except LashbenchError as error:
+            self.show_error("The measurement cannot be opened", error)
+            return
+        self.analyses.view(measurement.id)
+        self.go(5)
+
+    # ------------------------------------------------------------ drawing
+
+    def redraw_now(self) -> None:
+        """Draw the step on top."""
+        self._stale = False
+        screens = [screen for screen in self.screen_stack if isinstance(screen, StepScreen)]
+        for screen in screens[-1:]:
+            if screen.is_mounted and screen.query("#banner"):
+                screen.show()
+
+    def _redraw(self) -> None:
+        if self._stale:
+            self.redraw_now()
+
+
+_KEYS = """Everywhere: Ctrl+X stops the source at once (a software stop, no emergency stop).
+Ctrl+N next step, Esc back, 1 to 7 go to a step, Ctrl+P all commands, Ctrl+Y copies what is
+shown, Ctrl+Q quits. Tab moves between fields, Enter chooses."""

@@ -1,0 +1,128 @@
+"""The dialog in which the sweep is chosen: levels, band, points, cycles.
+
+Owns the reading of its fields. Whether the plan is allowed is for the limits
+to say, when the application asks for the request.
+"""
+
+from __future__ import annotations
+
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Horizontal, Vertical
+from textual.screen import ModalScreen
+from textual.widgets import Input, Label, Static
+
+from daq.plan import SweepPlan
+from tui.measure_options import PlanOptions
+from tui.options import real_number
+
+__all__ = ["PlanDialog"]
+
+_FIELDS = (
+    ("levels", "source levels", "V peak, with spaces between"),
+    ("start", "start", "Hz"),
+    ("stop", "stop", "Hz"),
+    ("points", "points a level", ""),
+    ("spacing", "spacing", "lin or log"),
+    ("direction", "direction", "up or down"),
+    ("settle", "settle cycles", ""),
+    ("integrate", "integrate cycles", ""),
+    ("adaptive", "refine", "yes or no: go on around ARF and RF"),
+)
+
+
+class PlanDialog(ModalScreen[PlanOptions | None]):
+    """Asks for a plan; gives None where the old one is to stay."""
+
+    BINDINGS = [
+        Binding("escape", "leave", "Keep the old plan", priority=True),
+        Binding("enter", "take", "Take it", priority=True),
+    ]
+
+    DEFAULT_CSS = """
+    PlanDialog { align: center middle; }
+    PlanDialog > #dialog {
+        width: 70; max-width: 96%; height: auto;
+        border: round $accent; background: $surface; padding: 0 1;
+    }
+    PlanDialog Label { width: 18; }
+    PlanDialog Input { width: 22; }
+    PlanDialog .unit { width: 1fr; padding: 0 1; color: $text-muted; }
+    PlanDialog #fault { color: $text-error; height: auto; }
+    """
+
+    def __init__(self, plan: SweepPlan | None, options: PlanOptions) -> None:
+        super().__init__()
+        self._values = _texts(plan, options)
+
+    def compose(self) -> ComposeResult:
+        """A line per field."""
+        with Vertical(id="dialog"):
+            yield Static("The sweep", classes="heading")
+            for name, label, unit in _FIELDS:
+                with Horizontal(classes="field"):
+                    yield Label(label)
+                    yield Input(self._values[name], id=f"plan-{name}", compact=True)
+                    yield Label(unit, classes="unit")
+            yield Static("", id="fault", markup=False)
+            yield Static("Enter takes it, Esc keeps the old plan, Tab goes on", id="keys")
+
+    def action_leave(self) -> None:
+        """Close without a change."""
+        self.dismiss(None)
+
+    def action_take(self) -> None:
+        """Read the fields; stay where one is wrong."""
+        try:
+            options = self._options()
+        except ValueError as error:
+            self.query_one("#fault", Static).update(str(error))
+            return
+        self.dismiss(options)
+
+    def _options(self) -> PlanOptions:
+        return PlanOptions(
+            levels_vpk=tuple(real_number(word) for word in self._text("levels").split()),
+            start_hz=real_number(self._text("start")),
+            stop_hz=real_number(self._text("stop")),
+            points=self._count("points"),
+            spacing=self._word("spacing", ("lin", "log")),
+            direction=self._word("direction", ("up", "down")),
+            settle_cycles=self._count("settle"),
+            integrate_cycles=self._count("integrate"),
+            adaptive=self._word("adaptive", ("no", "yes")) == "yes",
+        )
+
+    def _text(self, name: str) -> str:
+        return self.query_one(f"#plan-{name}", Input).value.replace(",", " ").strip()
+
+    def _count(self, name: str) -> int:
+        text = self._text(name)
+        if not (text.isascii() and text.isdigit()):
+            raise ValueError(f"{name}: {text!r} is not a whole number")
+        return int(text)
+
+    def _word(self, name: str, allowed: tuple[str, ...]) -> str:
+        text = self._text(name).lower()
+        if text not in allowed:
+            raise ValueError(f"{name}: {text!r} is not {' or '.join(allowed)}")
+        return text
+
+
+def _texts(plan: SweepPlan | None, options: PlanOptions) -> dict[str, str]:
+    if plan is None:
+        return {name: "" for name, _, _ in _FIELDS} | {
+            "spacing": "lin", "direction": "up", "settle": "20", "integrate": "30", "adaptive": "no"
+        }  # fmt: skip
+    steps = {round(b - a, 6) for a, b in zip(plan.frequencies_hz, plan.frequencies_hz[1:])}  # noqa: B905
+    return {
+        "levels": " ".join(f"{level:g}" for level in plan.levels_vpk),
+        "start": f"{min(plan.frequencies_hz):g}",
+        "stop": f"{max(plan.frequencies_hz):g}",
+        "points": str(len(plan.frequencies_hz)),
+        "spacing": options.spacing or ("lin" if len(steps) <= 1 else "log"),
+        "direction": plan.direction,
+        "settle": str(plan.settle_cycles),
+        "integrate": str(plan.integrate_cycles),
+        "adaptive": "yes" if options.adaptive else "no",
+    }

@@ -1,0 +1,166 @@
+"""Step 3: the checks before a sweep, line by line, and the plan that they are about.
+
+Owns the start of a session up to its hold: the same session goes on in step 4,
+so nothing can drive the source for long before its checks have passed.
+"""
+
+from __future__ import annotations
+
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Vertical, VerticalScroll
+from textual.widgets import Static
+
+from daq.errors import LashbenchError
+from tui.app.dialogs import QuestionDialog
+from tui.app.plan_dialog import PlanDialog
+from tui.app.step_screen import StepScreen
+from tui.app.words import plan_words
+from tui.measure_options import PlanOptions
+
+__all__ = ["CheckScreen"]
+
+_MARKS = {"pass": "[ ok ]", "note": "[note]", "fail": "[FAIL]"}
+
+
+class CheckScreen(StepScreen):
+    """Limits, identity, source off, a gentle trial point."""
+
+    STEP = 3
+    HELP = """
+C runs the checks: the plan within all limits, the right instrument, the source proven off, and
+a trial point, which drives the unit gently at the plan's lowest level for a few cycles. When all
+have passed the session holds with the source off, and the sweep is started in step 4.
+
+P changes the plan: levels, band, points, cycles. The checks are then run again.
+"""
+    BINDINGS = [
+        Binding("c", "check", "Check", id="check.run", tooltip="Run the checks"),
+        Binding("p", "plan", "Plan", id="check.plan", tooltip="Change the plan"),
+    ]
+    DEFAULT_CSS = """
+    CheckScreen #lines { height: 1fr; }
+    """
+
+    def body(self) -> ComposeResult:
+        """Plan above, checks below."""
+        with Vertical(classes="pane"):
+            yield Static("Plan", classes="heading")
+            yield Static("", id="plan", markup=False)
+            yield Static("")
+            yield Static("Checks", classes="heading")
+            with VerticalScroll(id="lines"):
+                yield Static("", id="checks", markup=False)
+
+    def show_body(self) -> None:
+        """The plan, and every check told so far."""
+        self.query_one("#plan", Static).update(self._plan_text())
+        self.query_one("#checks", Static).update("\n".join(self._lines()))
+
+    def hint(self) -> str:
+        """Check, or go on."""
+        run = self.desk.run
+        if run.phase == "checking":
+            return "Checking.  Ctrl+X stops"
+        if run.phase == "ready":
+            return "All checks passed, the source is off.  Ctrl+N: on to the sweep"
+        if run.live:
+            return "The sweep is under way.  Ctrl+N: watch it"
+        if any(line.verdict == "fail" for line in run.checks) or run.fault is not None:
+            return "Mend what failed, then C: check again.  P: change the plan"
+        return "C: run the checks (ends with a gentle trial point).  P: change the plan"
+
+    def copy_text(self) -> str:
+        """Plan and checks."""
+        return "\n".join([self._plan_text(), "", *self._lines()])
+
+    def action_check(self) -> None:
+        """Run the checks; on hardware only after a word, since the trial point drives."""
+        run = self.desk.run
+        if run.phase in ("checking", "sweeping", "paused", "ending"):
+            self.notify("a session is under way; Ctrl+X stops it", severity="warning")
+            return
+        if run.phase == "ready":
+            self.bench.keeper.finish_then(self._ask)
+        else:
+            self._ask()
+
+    def _ask(self) -> None:
+        from tui.bench import drives_hardware
+
+        desk = self.desk
+        try:
+            request_plan = desk.plan()
+            real = drives_hardware(desk.url)
+        except LashbenchError as error:
+            self.bench.show_error("The plan is refused", error)
+            return
+        if not real or (desk.identity is not None and desk.identity.simulated):
+            self._check()
+            return
+        text = (
+            f"The checks end with a trial point: {desk.url} is driven with "
+            f"{min(request_plan.levels_vpk):g} V peak at {request_plan.visited_hz[0]:g} Hz."
+        )
+        dialog = QuestionDialog("Drive the unit?", text, "Drive", no="Leave it")
+        self.app.push_screen(dialog, lambda yes: self._check() if yes else None)
+
+    def _check(self) -> None:
+        self.bench.keeper.start(hold=True)
+        self.show()
+
+    def action_plan(self) -> None:
+        """Change the plan; a session that holds on the old one is ended."""
+        desk = self.desk
+        if desk.run.phase in ("checking", "sweeping", "paused", "ending"):
+            self.notify("a session is under way; its plan stays", severity="warning")
+            return
+        try:
+            plan = desk.plan()
+        except LashbenchError:
+            plan = None
+        self.app.push_screen(PlanDialog(plan, desk.options), self._take_plan)
+
+    def _take_plan(self, options: PlanOptions | None) -> None:
+        if options is None:
+            return
+        desk = self.desk
+        before = desk.options, desk.given_plan, desk.resume
+        desk.options, desk.given_plan, desk.resume = options, None, None
+        try:
+            desk.request()
+        except LashbenchError as error:
+            desk.options, desk.given_plan, desk.resume = before
+            self.bench.show_error("The plan is refused; the old one stays", error)
+        else:
+            if desk.run.phase == "ready":
+                self.bench.keeper.finish_then(self.show)
+        self.show()
+
+    def _plan_text(self) -> str:
+        desk = self.desk
+        try:
+            lines = plan_words(desk.plan(), desk.url)
+        except LashbenchError as error:
+            return f"REFUSED: {error}"
+        if desk.resume is not None:
+            lines.append(f"going on with measurement {desk.resume}: only missing points are taken")
+        if desk.options.adaptive:
+            lines.append("then refined around anti-resonance and resonance")
+        return "\n".join(lines)
+
+    def _lines(self) -> list[str]:
+        run = self.desk.run
+        if run.phase == "none":
+            return ["not checked yet; nothing has driven the source"]
+        lines = [f"{_MARKS[line.verdict]} {line.name}: {line.text}" for line in run.checks]
+        lines += [f"[note] {text}" for text in run.warnings]
+        if run.phase == "checking":
+            lines.append("[....] checking")
+        elif run.phase == "ready":
+            lines.append("[ ok ] all passed; the session holds with the source off")
+        if run.fault is not None:
+            lines.append(f"[FAIL] {run.fault}")
+        elif run.finished is not None and run.finished.state != "complete":
+            lines.append(f"[{run.finished.state}] {run.finished.reason}")
+        return lines

@@ -1,0 +1,193 @@
+"""Step 6: what the model lacks, which cause is likeliest, and what to measure next.
+
+Owns the wording of a diagnosis' document. The diagnosis itself runs beside the
+screen and nothing of it is made here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import VerticalScroll
+from textual.widgets import ProgressBar, Static
+
+from daq.errors import LashbenchError
+from tui.app.desk import plan_of_document
+from tui.app.step_screen import StepScreen
+from tui.app.words import plan_words
+
+__all__ = ["DiagnosisScreen", "diagnosis_lines"]
+
+_VERDICTS = {
+    "consistent": "The model explains the measurement: no further cause is needed.",
+    "explained": "A cause was found that explains what the model misses.",
+    "ambiguous": "Several causes explain it equally well; one more measurement can tell.",
+    "unexplained": "Nothing in the catalogue explains what the model misses.",
+}
+
+
+class DiagnosisScreen(StepScreen):
+    """Residual before and after, causes, rivals, the next measurement."""
+
+    STEP = 6
+    HELP = """
+D compares the measurement with the model and asks which physical cause explains what is left,
+which takes a minute or two of both processors; the screen stays free meanwhile.
+
+Every cause is given with its probability. The residual is the distance of measurement and model
+on source levels that were held out, in standard errors and dB, before and after the cause was
+added. N starts the measurement that would tell rivals apart: checks first, as always, then the
+sweep itself.
+"""
+    BINDINGS = [
+        Binding("d", "diagnose", "Diagnose", id="diagnosis.run"),
+        Binding("n", "measure_next", "Measure this next", id="diagnosis.next"),
+    ]
+
+    def body(self) -> ComposeResult:
+        """Progress and words."""
+        yield ProgressBar(total=100, show_eta=False, id="share")
+        with VerticalScroll(classes="pane", id="scroll"):
+            yield Static("", id="text", markup=False)
+
+    def on_mount(self) -> None:
+        """The words have the focus, to be scrolled."""
+        super().on_mount()
+        self.query_one("#scroll").focus()
+
+    def show_body(self) -> None:
+        """Progress or verdict."""
+        running = self.bench.analyses.progress.get("diagnosis")
+        bar = self.query_one("#share", ProgressBar)
+        bar.display = running is not None
+        if running is not None:
+            bar.update(progress=100 * running[0])
+        self.query_one("#text", Static).update("\n".join(self._lines()))
+
+    def hint(self) -> str:
+        """Diagnose, measure next, or go on."""
+        if "diagnosis" in self.bench.analyses.progress:
+            return "Diagnosing beside the screen; look around.  Ctrl+N: on to report and history"
+        if self._next_plan() is not None:
+            return "N: measure this next, one key.  Ctrl+N: on to report and history"
+        if self.desk.results.diagnosis is None:
+            return "D: diagnose.  Ctrl+N: on to report and history"
+        return "Ctrl+Y: copy.  Ctrl+N: on to report and history"
+
+    def copy_text(self) -> str:
+        """All lines."""
+        return "\n".join(self._lines())
+
+    def action_diagnose(self) -> None:
+        """Begin, unless it runs."""
+        self.bench.analyses.begin("diagnosis")
+        self.show()
+
+    def action_measure_next(self) -> None:
+        """Start the proposed sweep; its checks run first."""
+        plan = self._next_plan()
+        desk = self.desk
+        if plan is None:
+            self.notify("no measurement is proposed")
+            return
+        if desk.identity is None:
+            self.notify("connect an instrument first: step 2", severity="warning")
+            return
+        try:
+            desk.given_plan, desk.resume = plan_of_document(plan), None
+        except LashbenchError as error:
+            self.bench.show_error("The proposed measurement cannot be made", error)
+            return
+        if self.bench.keeper.start(hold=False):
+            self.bench.go(4)
+
+    def _next_plan(self) -> Mapping[str, Any] | None:
+        diagnosis = self.desk.results.diagnosis
+        if diagnosis is None:
+            return None
+        proposed = diagnosis.to_json().get("next_measurement")
+        return None if proposed is None else proposed["plan"]
+
+    def _lines(self) -> list[str]:
+        desk, results = self.desk, self.desk.results
+        head = f"measurement {desk.measurement}" + (", SIMULATED" if desk.simulated else "")
+        if "diagnosis" in self.bench.analyses.progress:
+            fraction, text = self.bench.analyses.progress["diagnosis"]
+            return [f"{head}: {100 * fraction:.0f} %  {text}"]
+        if "diagnosis" in results.faults:
+            return [f"{head}: NO DIAGNOSIS", results.faults["diagnosis"], "", "D: try once more"]
+        if results.diagnosis is None:
+            return [f"{head}: not diagnosed yet", "", "D compares it with the model: which"
+                    " physical cause explains what the model misses?"]  # fmt: skip
+        lines = [head, *diagnosis_lines(results.diagnosis.to_json())]
+        plan = self._next_plan()
+        if plan is not None:
+            try:
+                lines += plan_words(plan_of_document(plan), desk.url)
+            except LashbenchError as error:
+                lines.append(f"it cannot be made: {error}")
+        return lines
+
+
+def diagnosis_lines(document: Mapping[str, Any]) -> list[str]:
+    """A diagnosis for people: verdict, residual, causes with a sentence each, rivals, what next."""
+    before, after = document["baseline"], document["extended"]
+    lines = [
+        f"VERDICT: {document['verdict'].upper()}. {_VERDICTS.get(document['verdict'], '')}",
+        "",
+        f"residual before  {_residual(before)}",
+        f"residual after   {_residual(after)}",
+    ]
+    gain = (document.get("gain") or {}).get("held_out_rms_ratio")
+    if gain is not None:
+        lines.append(f"gain             {gain:.2f} of the residual is left (1.00: nothing gained)")
+    lines += ["", "Causes" if document["causes"] else "Causes: none named"]
+    for rank, cause in enumerate(document["causes"], start=1):
+        lines.append(f" {rank}. {cause['effect']}  probability {cause['probability']:.2f}")
+        lines.append(f"    {_explained(cause['effect'])}{_parameters(cause['parameters'])}")
+    if document.get("rivals"):
+        lines += ["", "Rivals"]
+        for rival in document["rivals"]:
+            names = " + ".join(rival["causes"]) or "no cause"
+            lines.append(f" - {names}  probability {rival['probability']:.2f}")
+    ratio = document.get("contribution_ratio")
+    if ratio:
+        lines += ["", f"contribution ratio before {_value(ratio['baseline'])}, "
+                  f"after {_value(ratio['extended'])}"]  # fmt: skip
+    proposed = document.get("next_measurement")
+    if proposed:
+        apart = " from ".join(proposed["separates"])
+        sigma = _number(proposed.get("expected_sigma"))
+        lines += ["", f"MEASURE THIS NEXT (key N): tells {apart}, {sigma} sigma expected"]
+    return lines
+
+
+def _explained(effect: str) -> str:
+    from sim.catalogue import CATALOGUE
+
+    known = CATALOGUE.get(effect)
+    return "" if known is None else f"{known.meaning.rstrip('.')}."
+
+
+def _parameters(parameters: Mapping[str, Any]) -> str:
+    parts = [
+        f"{name} = {_value(number)} {number.get('unit', '')}".rstrip()
+        for name, number in parameters.items()
+    ]
+    return f" {', '.join(parts)}" if parts else ""
+
+
+def _residual(part: Mapping[str, Any]) -> str:
+    sigma, decibel = part.get("held_out_rms_sigma"), part.get("held_out_rms_db")
+    return f"{_number(sigma)} standard errors, {_number(decibel)} dB (held-out levels)"
+
+
+def _value(number: Mapping[str, Any]) -> str:
+    return f"{number['value']:.4g} +- {_number(number.get('std'))}"
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2g}"

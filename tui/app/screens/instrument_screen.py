@@ -1,0 +1,150 @@
+"""Step 2: which instrument, whether it answers, and what to do where it does not.
+
+Owns the choice of the address. Connecting here asks who is there and drives
+nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Horizontal, Vertical
+from textual.content import Content
+from textual.widgets import Input, Label, OptionList, Static
+from textual.widgets.option_list import Option
+
+from tui.app.desk import SIMULATED_URL
+from tui.app.messages import InstrumentsListed
+from tui.app.step_screen import StepScreen
+
+__all__ = ["InstrumentScreen"]
+
+_SIMULATED = (
+    (SIMULATED_URL, "simulated bench, as fast as it computes"),
+    (f"{SIMULATED_URL}&speed=realtime", "simulated bench, by the clock"),
+)
+_REMEDIES = (
+    "What to try:",
+    "- power, cable and address of the analyser; its front panel shows the GPIB address",
+    "- `lashbench serve` gives an address of a simulated one: TCPIP::127.0.0.1::PORT::SOCKET",
+    "- a serial adapter may need the right to use the port: group dialout",
+    "- the simulated bench needs nothing: choose it above",
+)
+
+
+class InstrumentScreen(StepScreen):
+    """Simulated, found, or typed."""
+
+    STEP = 2
+    HELP = """
+Choose where the analyser is and press Enter: a simulated bench, a port or resource that was
+found on this machine, or an address that you type, such as TCPIP::192.0.2.7::5025::SOCKET,
+GPIB0::11::INSTR, prologix:/dev/ttyUSB0?addr=11 or prologix-tcp:HOST:PORT?addr=11.
+
+Connecting asks who is there and what the source does. It drives nothing.
+"""
+    BINDINGS = [
+        Binding("ctrl+t", "connect", "Connect", id="instrument.connect"),
+        Binding("ctrl+f", "find", "Search again", id="instrument.find", show=False),
+    ]
+    DEFAULT_CSS = """
+    InstrumentScreen #found { height: 8; border: none; }
+    InstrumentScreen.-tall #found { height: 14; }
+    InstrumentScreen #answer { height: 1fr; overflow-y: auto; }
+    """
+
+    def body(self) -> ComposeResult:
+        """List, field, answer."""
+        with Vertical(classes="pane"):
+            yield Static("Instrument", classes="heading")
+            yield OptionList(*self._options([]), id="found", compact=True)
+            with Horizontal(classes="field"):
+                yield Label("address")
+                yield Input(self.desk.url, id="url", compact=True)
+            yield Static("searching this machine for instruments", id="search", markup=False)
+            yield Static("", id="answer", markup=False)
+
+    def on_mount(self) -> None:
+        """Search beside the screen."""
+        super().on_mount()
+        self.query_one("#found").focus()
+        self.action_find()
+
+    def arrive(self) -> None:
+        """The address may have come with a session that is to be resumed."""
+        field = self.query_one("#url", Input)
+        if field.value != self.desk.url:
+            field.value = self.desk.url
+            field.focus()
+
+    def listed(self, message: InstrumentsListed) -> None:
+        """Show what was found."""
+        options = self.query_one("#found", OptionList)
+        kept = options.highlighted
+        options.clear_options()
+        options.add_options(self._options(message.found))
+        options.highlighted = kept
+        count = len(message.found)
+        words = [f"{count} found on this machine" if count else "none found on this machine"]
+        self.query_one("#search", Static).update("; ".join([*words, *message.notes]))
+
+    def show_body(self) -> None:
+        """Who answered, or why nobody did."""
+        desk = self.desk
+        lines: list[str] = []
+        if self.bench.keeper.busy and not desk.run.live:
+            lines = [f"connecting to {desk.url} ..."]
+        elif desk.identity is not None:
+            who = desk.identity
+            lines = [
+                f"CONNECTED to {desk.url}" + (", SIMULATED" if who.simulated else ""),
+                f"{who.maker} {who.model}, serial {who.serial}, revision {who.revision or '-'}",
+                f"options: {', '.join(who.options) or 'none'}",
+                desk.run.source_text,
+            ]
+        elif desk.link_fault:
+            lines = ["NOT CONNECTED", desk.link_fault, "", *_REMEDIES]
+        self.query_one("#answer", Static).update("\n".join(lines))
+
+    def hint(self) -> str:
+        """Connect, then check."""
+        if self.desk.identity is not None:
+            return "Connected.  Ctrl+N: on to the checks"
+        return "Arrows and Enter: connect one of these; or Tab, type an address, Enter"
+
+    def copy_text(self) -> str:
+        """What the instrument said, or the fault."""
+        return str(self.query_one("#answer", Static).content)
+
+    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+        """Connect what was chosen."""
+        if event.option.id is not None:
+            self.query_one("#url", Input).value = event.option.id
+            self.action_connect()
+
+    def on_input_submitted(self) -> None:
+        """Connect what was typed."""
+        self.action_connect()
+
+    def action_connect(self) -> None:
+        """Ask who is there."""
+        desk, bench = self.desk, self.bench
+        if bench.keeper.busy:
+            self.notify("the instrument is in use; stop it first", severity="warning")
+            return
+        desk.url = self.query_one("#url", Input).value.strip()
+        desk.identity, desk.link_fault = None, ""
+        bench.keeper.look()
+        self.show()
+
+    def action_find(self) -> None:
+        """Search once more."""
+        self.bench.find_instruments()
+
+    @staticmethod
+    def _options(found: Sequence[tuple[str, str]]) -> list[Option]:
+        # An address that two searches found is listed once.
+        places = dict([*_SIMULATED, *found])
+        return [Option(Content(f"{words}:  {url}"), id=url) for url, words in places.items()]

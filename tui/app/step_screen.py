@@ -1,0 +1,124 @@
+"""The frame that every step's screen stands in: trail, banner, body, hint, keys.
+
+Owns what all steps have in common. A step fills the body, names what to press
+next, and redraws itself from the desk when the application tells it to.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar, cast
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Container
+from textual.screen import Screen
+from textual.widgets import Footer, Static
+
+from daq.analyser import SourceState
+
+if TYPE_CHECKING:
+    from tui.app.application import BenchApp
+    from tui.app.desk import Desk
+
+__all__ = ["STEPS", "StepScreen"]
+
+STEPS = ("unit", "instrument", "check", "sweep", "result", "diagnosis", "history")
+"""The steps in order; `_TITLES` are their names for people."""
+_TITLES = ("Unit", "Instrument", "Check", "Sweep", "Result", "Diagnosis", "Report")
+_WIDE = 100
+_TALL = 34
+
+
+class StepScreen(Screen[None]):
+    """A step; final classes say what is in it.
+
+    `STEP` is its number from 1, `HELP` what F1 says about it.
+    """
+
+    STEP: ClassVar[int] = 0
+    HELP: ClassVar[str] = ""
+    HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (_WIDE, "-wide")]
+    VERTICAL_BREAKPOINTS = [(0, "-short"), (_TALL, "-tall")]
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("ctrl+n", "next", "Next", id="step.next", tooltip="Go on to the next step"),
+        Binding("escape", "back", "Back", id="step.back", tooltip="Go back one step", show=False),
+    ]
+
+    @property
+    def bench(self) -> BenchApp:
+        """The application."""
+        from tui.app.application import BenchApp
+
+        return cast(BenchApp, self.app)
+
+    @property
+    def desk(self) -> Desk:
+        """What was chosen so far."""
+        return self.bench.desk
+
+    def compose(self) -> ComposeResult:
+        """The frame, with the step's own widgets in it."""
+        yield Static(id="step-bar")
+        yield Static(id="banner", markup=False)
+        with Container(id="body"):
+            yield from self.body()
+        yield Static(id="hint", markup=False)
+        yield Footer(compact=True)
+
+    def body(self) -> ComposeResult:
+        """The step's own widgets."""
+        yield from ()
+
+    def on_mount(self) -> None:
+        """First drawing."""
+        self.arrive()
+        self.show()
+
+    def on_screen_resume(self) -> None:
+        """Back on top."""
+        if self.is_mounted and self.query("#banner"):
+            self.arrive()
+            self.show()
+
+    def arrive(self) -> None:
+        """Called whenever the step comes on top."""
+
+    def show(self) -> None:
+        """Draw everything anew from the desk."""
+        self._show_frame()
+        self.show_body()
+
+    def show_body(self) -> None:
+        """Draw the step's own widgets from the desk."""
+
+    def hint(self) -> str:
+        """What to press next, in words."""
+        return ""
+
+    def copy_text(self) -> str:
+        """The step's result as text, for the clipboard."""
+        return ""
+
+    def action_next(self) -> None:
+        """Go on to the next step."""
+        self.bench.go(self.STEP + 1)
+
+    def action_back(self) -> None:
+        """Go back one step."""
+        self.bench.go(self.STEP - 1)
+
+    def _show_frame(self) -> None:
+        trail = "  ".join(
+            f"[reverse b][{number} {title}][/]"
+            if number == self.STEP
+            else f"[@click=app.go({number})]{number} {title}[/]"
+            for number, title in enumerate(_TITLES, start=1)
+        ).replace(f"[{self.STEP} ", f"\\[{self.STEP} ")
+        self.query_one("#step-bar", Static).update(trail)
+        banner = self.query_one("#banner", Static)
+        banner.update(self.bench.banner_text())
+        source = self.desk.run.source
+        alarm = source in (SourceState.UNCONFIRMED, SourceState.UNKNOWN)
+        banner.set_class(source is SourceState.ON, "-driving")
+        banner.set_class(alarm, "-alarm")
+        self.query_one("#hint", Static).update(f"> {self.hint()}" if self.hint() else "")

@@ -1,0 +1,146 @@
+"""What a Bode plot draws: traces with errors and marks, made from points or responses.
+
+Owns the record of a trace and how points become one. It draws nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.frf import FrequencyResponse, PointFlag
+
+if TYPE_CHECKING:
+    from daq.store_records import StoredPoint
+
+__all__ = ["FLAG_MARKS", "LEVEL_MARKS", "Trace", "legend", "traces_of_points", "traces_of_response"]
+
+LEVEL_MARKS = "ox+*sd"
+"""Marker of each source level in ascending order; the shape tells the level, not the colour."""
+
+LEVEL_STYLES = ("bright_blue", "orange1", "cyan", "magenta", "yellow", "bright_white")
+
+FLAG_MARKS: tuple[tuple[PointFlag, str, str], ...] = (
+    (PointFlag.SPOILT, "?", "spoilt"),
+    (PointFlag.OVERLOAD, "!", "overload"),
+    (PointFlag.NOT_PERIODIC, "~", "not periodic"),
+    (PointFlag.HALF_RANGE_MISSED, "-", "coarse"),
+)
+"""Marker of a point that carries a flag; the first that holds is shown."""
+
+_WORTH_A_BAR_DB = 0.02
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trace:
+    """One curve; arrays of shape (points,) in ascending frequency.
+
+    Parameters
+    ----------
+    name
+        For the legend.
+    frequency_hz, gain_db, gain_std_db, phase_deg
+        Phase wrapped to (-180, 180]; NaN where unknown.
+    flags
+        `PointFlag` bits.
+    mark, style
+        Character of a clean point, and its colour.
+    reference
+        Drawn behind the others as a line without marks.
+    """
+
+    name: str
+    frequency_hz: NDArray[np.float64]
+    gain_db: NDArray[np.float64]
+    gain_std_db: NDArray[np.float64]
+    phase_deg: NDArray[np.float64]
+    flags: NDArray[np.int64]
+    mark: str
+    style: str
+    reference: bool = False
+
+    @property
+    def marks(self) -> list[str]:
+        """The character of each point."""
+        return [flag_mark(int(flags)) or self.mark for flags in self.flags]
+
+    @property
+    def runs(self) -> list[slice]:
+        """Stretches of usable neighbours: a line must not bridge a spoilt point."""
+        usable = ((self.flags & PointFlag.SPOILT) == 0) & np.isfinite(self.gain_db)
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], usable.astype(int), [0]))))
+        return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+    @property
+    def bars_db(self) -> NDArray[np.float64]:
+        """Half lengths of the error bars, dB; 0 where unknown or too small to see."""
+        std = np.where(np.isfinite(self.gain_std_db), self.gain_std_db, 0.0)
+        return np.where(std > _WORTH_A_BAR_DB, std, 0.0)
+
+
+def flag_mark(flags: int) -> str:
+    """The character that flags call for; empty for a clean point."""
+    return next((mark for flag, mark, _ in FLAG_MARKS if flags & flag), "")
+
+
+def traces_of_response(response: FrequencyResponse, reference: str = "") -> list[Trace]:
+    """A trace per source level; as references under a name, if one is given."""
+    traces = []
+    for index, level in enumerate(response.levels_vpk.tolist()):
+        part = response.at_level(level)
+        traces.append(
+            Trace(
+                f"{reference} {level:g} V".strip(),
+                part.frequency_hz,
+                part.gain_db,
+                part.gain_std_db,
+                part.phase_deg,
+                part.flags,
+                LEVEL_MARKS[index % len(LEVEL_MARKS)],
+                "grey62" if reference else LEVEL_STYLES[index % len(LEVEL_STYLES)],
+                bool(reference),
+            )
+        )
+    return traces
+
+
+def traces_of_points(points: Iterable[StoredPoint], levels_vpk: Sequence[float]) -> list[Trace]:
+    """A trace per source level of a plan, of the points that are there so far."""
+    rows: dict[float, list[StoredPoint]] = {level: [] for level in sorted(levels_vpk)}
+    for point in points:
+        rows.setdefault(point.source_vpk, []).append(point)
+    traces = []
+    for index, (level, stored) in enumerate(rows.items()):
+        if stored:
+            traces.append(_trace(index, level, sorted(stored, key=lambda p: p.point.frequency_hz)))
+    return traces
+
+
+def _trace(index: int, level: float, stored: Sequence[StoredPoint]) -> Trace:
+    points = [entry.point for entry in stored]
+    gain = np.array([point.gain for point in points], dtype=complex)
+    with np.errstate(divide="ignore"):
+        gain_db = 20.0 * np.log10(np.abs(gain))
+    return Trace(
+        f"{level:g} V",
+        np.array([point.frequency_hz for point in points]),
+        gain_db,
+        np.array([np.nan if p.gain_std_db is None else p.gain_std_db for p in points]),
+        np.degrees(np.angle(gain)),
+        np.array([int(point.flags) for point in points], dtype=np.int64),
+        LEVEL_MARKS[index % len(LEVEL_MARKS)],
+        LEVEL_STYLES[index % len(LEVEL_STYLES)],
+    )
+
+
+def legend(traces: Sequence[Trace]) -> str:
+    """What the marks mean, in words; flags only where there are such points."""
+    parts = [f"{trace.mark} {trace.name}" for trace in traces if not trace.reference]
+    parts += [f"line {trace.name}" for trace in traces if trace.reference]
+    seen = {mark for trace in traces if not trace.reference for mark in trace.marks}
+    parts += [f"{mark} {words}" for _, mark, words in FLAG_MARKS if mark in seen]
+    return "  ".join(parts)

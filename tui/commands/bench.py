@@ -1,0 +1,46 @@
+"""``lashbench`` without a verb, or ``lashbench bench``: the bench screen.
+
+Owns the options of the screen and what is said when it cannot be opened.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from daq.errors import InputError
+from tui.output import Injected
+
+__all__ = ["bench"]
+
+
+def bench(*, db: Path = Path("lashbench.db"), console: Injected) -> int:
+    """Open the bench screen: from a unit to a report, guided, by keyboard or mouse.
+
+    Parameters
+    ----------
+    db
+        File of the bench's history; made by the first session.
+    """
+    require_terminal("bench")
+    from tui.app.application import BenchApp
+    from tui.app.log_file import logging_to_file
+
+    with logging_to_file() as log:
+        if log is None:
+            console.note("the log file cannot be written; going on without")
+        app = BenchApp(db, log=log)
+        code = app.run()
+    return code if code is not None else app.return_code or 0
+
+
+def require_terminal(verb: str) -> None:
+    """Insist on a terminal.
+
+    Raises
+    ------
+    InputError
+        If input or output is none.
+    """
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        raise InputError(f"{verb} needs a terminal; scripts use measure, see lashbench --help")
