@@ -10,7 +10,9 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import zipfile
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 
@@ -33,7 +35,7 @@ _EDITION = 1
 _RATIOS = 10
 """Machines in a group, one per tenth of the ratio: a second five cost a fifth more time."""
 
-_BASELINE_GROUPS, _SIZES = 3, 7
+_BASELINE_GROUPS, _SIZES = 3, 6
 _COSTLY = {"shaft-hardening": 3}
 """Groups of effects whose laws take several times the work."""
 
@@ -122,23 +124,21 @@ def _write(file: Path, atlas: Atlas) -> None:
     names = {f"{'+'.join(key)}|{field}": getattr(one, field)
              for key, one in atlas.items() for field in Population.__slots__}  # fmt: skip
     part = file.with_suffix(f".{os.getpid()}.part")
-    try:
+    with suppress(OSError):
         file.parent.mkdir(parents=True, exist_ok=True)
         with part.open("wb") as stream:
             np.savez_compressed(stream, **names)
         part.replace(file)
-    except OSError:
-        part.unlink(missing_ok=True)
 
 
 def _read(file: Path) -> Atlas | None:
     """A kept atlas, or None where there is none that can be read."""
     try:
-        with np.load(file, allow_pickle=False) as kept:
+        with file.open("rb") as stream, np.load(stream, allow_pickle=False) as kept:
             fields: dict[tuple[str, ...], dict[str, NDArray]] = {}
             for name in kept.files:
                 key, _, field = name.rpartition("|")
                 fields.setdefault(tuple(filter(None, key.split("+"))), {})[field] = kept[name]
         return {key: Population(**parts) for key, parts in fields.items()}
-    except (OSError, ValueError, TypeError, EOFError):
+    except (OSError, ValueError, TypeError, EOFError, KeyError, zipfile.BadZipFile):
         return None

@@ -26,6 +26,9 @@ from sim.unit import Unit
 
 __all__ = ["Hypothesis", "every_single_cause"]
 
+_TOLERANCE = 0.015
+"""Three standard deviations of a datasheet value."""
+
 _LEAST_SHARE = 0.01
 """Ranges that begin at zero begin here instead, as a share of their end, so that logs exist."""
 
@@ -96,6 +99,15 @@ class Hypothesis:
         (_, parameter), (low, high) = self.parameters[0], np.exp(self.logs[0])
         known = {**self.unit.parameters, "scale": 1.0}.get(parameter.name)
         return known is not None and 0.5 * known**2 < low * high < 2.0 * known**2
+
+    def within_tolerance(self, place: NDArray[np.float64]) -> list[bool]:
+        """Whether each parameter is a datasheet value (or a factor on some) hardly off it."""
+        known = {**self.unit.parameters, "scale": 1.0}
+        values = zip(self.parameters, self.values(place), strict=True)
+        return [
+            p.name in known and abs(value / known[p.name] - 1.0) < _TOLERANCE
+            for (_, p), value in values
+        ]
 
     @property
     def sites(self) -> tuple[str, ...]:

@@ -8,11 +8,12 @@ judges nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import hadamard
 
 from analysis.causes import Hypothesis
 from analysis.ensemble import TOLERANCES, Machine
@@ -97,9 +98,11 @@ def simulate_groups(
         If a motion grew without bound even at the shortest step.
     """
     found: dict[tuple[str, ...], Population] = {}
+    signs = list(_signs(groups, rng))
     for start in range(0, len(groups), _LOT):
-        lot = groups[start : start + _LOT]
-        for group, population in zip(lot, _simulate(unit, lot, observation, rng), strict=True):
+        lot, ways = groups[start : start + _LOT], signs[start : start + _LOT]
+        made = _simulate(unit, lot, ways, observation, rng)
+        for group, population in zip(lot, made, strict=True):
             key = group.hypothesis.effects
             found[key] = found[key].joined(population) if key in found else population
         if progress is not None:
@@ -108,12 +111,16 @@ def simulate_groups(
 
 
 def _simulate(
-    unit: Unit, groups: Sequence[Group], observation: Observation, rng: np.random.Generator
+    unit: Unit,
+    groups: Sequence[Group],
+    ways: Sequence[NDArray[np.float64]],
+    observation: Observation,
+    rng: np.random.Generator,
 ) -> Iterable[Population]:
     machines: list[Machine] = []
     deviations: list[NDArray[np.float64]] = []
-    for group in groups:
-        off = np.array([rng.normal(0.0, TOLERANCES[symbol]) for symbol in DEVIATING])
+    for group, signs in zip(groups, ways, strict=True):
+        off = signs * np.array([TOLERANCES[symbol] for symbol in DEVIATING])
         named = tuple((s, float(v)) for s, v in zip(DEVIATING, off, strict=True))
         seeds = rng.integers(2**30, size=len(group.ratios))
         machines += [
@@ -127,6 +134,22 @@ def _simulate(
         rows = slice(start, start + len(group.ratios))
         start = rows.stop
         yield Population(group.places, off, mean[rows], variance[rows])
+
+
+def _signs(groups: Sequence[Group], rng: np.random.Generator) -> Iterator[NDArray[np.float64]]:
+    """Signs (k,) of one standard deviation of each datasheet value, for every group.
+
+    Two neighbouring groups of a hypothesis deviate in opposite ways, and pairs in ways at right
+    angles to each other: few groups then tell what deviations do, and their mean is that of a
+    unit as the datasheet says. Signs drawn one by one would leave both to chance.
+    """
+    patterns = hadamard(8)[:, 1 : len(DEVIATING) + 1].astype(float)
+    turns: dict[tuple[str, ...], list[NDArray[np.float64]]] = {}
+    for group in groups:
+        turn = turns.setdefault(group.hypothesis.effects, [])
+        if not turn:
+            turn += [sign * row for row in rng.permutation(patterns) for sign in (1.0, -1.0)]
+        yield turn.pop(0)
 
 
 def _read(

@@ -28,8 +28,8 @@ _WIDTHS = {1: (0.06,), 2: (0.1, 0.13), 3: (0.12, 0.15, 0.2), 4: (0.15, 0.25, 0.0
 _COUNTS = {1: (31,), 2: (21, 25), 3: (13, 9, 5), 4: (11, 4, 15, 2)}
 """Places looked at along each coordinate."""
 
-_PAIR_RATIOS = np.linspace(-0.25, 0.25, 7)
-_PAIR_SIZES = np.linspace(-0.12, 0.12, 5)
+_PAIR_RATIOS = np.linspace(-0.2, 0.2, 5)
+_PAIR_SIZES = np.linspace(-0.1, 0.1, 3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,10 +7,11 @@ It compares hypotheses to decide where to look next, and passes no verdict.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.adequacy import judge_adequacy
 from analysis.atlas import Atlas, coarse_stride, make_atlas
@@ -27,11 +28,18 @@ __all__ = ["search_causes"]
 Progress = Callable[[float, str], None]
 
 _FIRST, _FIRST_GROUPS = 9, 2
-_ROUNDS = ((5, 3), (3, 4), (2, 5))
-"""How many hypotheses are looked at closely, and in how many groups each, round after round."""
+_SECOND, _SECOND_GROUPS = 5, 4
+_PARENTS, _PAIRS, _PAIR_GROUPS = 8, 5, 4
+_THIRD, _THIRD_GROUPS = 4, 4
+"""How many hypotheses are looked at in each round, and in how many groups of runs each."""
 
-_PARENTS, _PAIRS, _PAIR_GROUPS = 4, 5, 3
-_DOUBT = 1.5
+_LAST_GROUPS, _RIVAL_GROUPS = 8, 4
+"""Further groups of the leading candidate and of the baseline, and of the closest rival."""
+
+_FAR, _TOO_FAR = 60.0, 200.0
+"""Log-likelihood behind the leader from which the last and the third round leave one out."""
+
+_DOUBT = 2.0
 """Misfit of the best single cause, in standard deviations, from which pairs are tried."""
 
 
@@ -59,93 +67,118 @@ def search_causes(
     AnalysisError
         If a motion grew without bound.
     """
-    hunt = _Hunt(unit, observation, without, cache, seed, progress)
-    hunt.look_at_singles()
-    hunt.look_closer(*_ROUNDS[0], until=0.7)
-    if hunt.doubtful():
-        hunt.look_at_pairs()
-    hunt.look_closer(*_ROUNDS[1], until=0.9)
-    hunt.look_closer(*_ROUNDS[2], until=1.0)
-    return sorted(hunt.found.values(), key=lambda c: -c.best.log_likelihood)
+    coarse = observation.thinned(coarse_stride(observation))
+    report = _part(progress, 0.0, 0.4, "simulating every cause")
+    atlas = make_atlas(unit, coarse, cache, report)
+    atlas = {k: v for k, v in atlas.items() if not set(k) & set(without)}
+    rng = np.random.default_rng(seed)
+    rough = _Hunt(unit, coarse, rng, _part(progress, 0.4, 0.6, "narrowing down"))
+    rough.start(_singles(coarse, atlas), _FIRST_GROUPS)
+    rough.look_closer(_with_baseline(rough.leading(_SECOND)), _SECOND_GROUPS)
+    if judge_adequacy(rough.best, rng).sigma > _DOUBT:
+        rough.start(_pairs(coarse, atlas, rough), _PAIR_GROUPS)
+    fine = _Hunt(unit, observation, rng, _part(progress, 0.6, 1.0, "looking closer"))
+    third = _with_baseline(rough.leading(_THIRD, _TOO_FAR))
+    fine.take_over([rough.found[key] for key in third], _THIRD_GROUPS)
+    leader, *near = fine.leading(len(third), _FAR)
+    fine.look_closer([leader, *(key for key in near if not key)], _LAST_GROUPS)
+    fine.look_closer([key for key in near if key][:1], _RIVAL_GROUPS)
+    return sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
+
+
+_Starts = Mapping[Effects, NDArray[np.float64]]
+
+
+def _singles(coarse: Observation, atlas: Atlas) -> _Starts:
+    """Best places of the single causes that the atlas favours, and of the baseline."""
+    places = screen_singles(coarse, atlas)
+    ranked = sorted(places, key=lambda key: -places[key].log_likelihood)
+    return {key: places[key].place for key in _with_baseline(ranked[:_FIRST])}
+
+
+def _pairs(coarse: Observation, atlas: Atlas, rough: _Hunt) -> _Starts:
+    """Best places of the pairs that the atlas favours, a leading single cause in each."""
+    parents: _Starts = {
+        key: rough.found[key].best.place for key in rough.leading(_PARENTS) if len(key) == 1
+    }
+    places = screen_pairs(coarse, atlas, parents)
+    ranked = sorted(places, key=lambda key: -places[key].log_likelihood)
+    return {key: places[key].place for key in ranked[:_PAIRS]}
+
+
+def _with_baseline(keys: Sequence[Effects]) -> list[Effects]:
+    return list(dict.fromkeys([*keys, ()]))
+
+
+def _part(
+    progress: Progress | None, low: float, high: float, text: str
+) -> Callable[[float], None] | None:
+    if progress is None:
+        return None
+    return lambda share: progress(low + (high - low) * share, text)
 
 
 class _Hunt:
-    """One search under way: the runs made so far and the candidates formed of them."""
+    """Candidates on the rows of one observation, and the runs made for them so far."""
 
     def __init__(
         self,
         unit: Unit,
         observation: Observation,
-        without: Collection[str],
-        cache: Path | None,
-        seed: int,
-        progress: Progress | None,
+        rng: np.random.Generator,
+        progress: Callable[[float], None] | None,
     ) -> None:
-        self._unit, self._observation = unit, observation
-        self._rng = np.random.default_rng(seed)
-        self._progress, self._done = progress, 0.0
-        self._coarse = observation.thinned(coarse_stride(observation))
-        atlas = make_atlas(unit, self._coarse, cache, self._part(0.4, "simulating every cause"))
-        self._atlas: Atlas = {k: v for k, v in atlas.items() if not set(k) & set(without)}
+        self._unit, self._observation, self._rng = unit, observation, rng
+        self._progress, self._left = progress, 1.0
         self._runs: dict[Effects, Population] = {}
         self.found: dict[Effects, Candidate] = {}
 
-    def look_at_singles(self) -> None:
-        """Simulate the single causes that the atlas favours about their best places."""
-        places = screen_singles(self._coarse, self._atlas)
-        chosen = _leading({k: p.log_likelihood for k, p in places.items()}, _FIRST)
-        self._start({k: places[k].place for k in chosen}, _FIRST_GROUPS, 0.55)
+    @property
+    def best(self) -> Candidate:
+        """The most likely candidate."""
+        return max(self.found.values(), key=lambda c: c.best.log_likelihood)
 
-    def look_at_pairs(self) -> None:
-        """Simulate the pairs that the atlas favours, with the best single causes in them."""
-        singles: dict[Effects, Candidate] = {k: c for k, c in self.found.items() if len(k) == 1}
-        leading = _leading({k: c.best.log_likelihood for k, c in singles.items()}, _PARENTS)
-        parents = {k: singles[k].best.place for k in leading if k}
-        places = screen_pairs(self._coarse, self._atlas, parents)
-        chosen = _leading({k: p.log_likelihood for k, p in places.items()}, _PAIRS)
-        self._start({k: places[k].place for k in chosen if k}, _PAIR_GROUPS, 0.8)
+    def leading(self, most: int, behind: float = np.inf) -> list[Effects]:
+        """The most likely hypotheses, none too far behind the first."""
+        likelihood = {key: c.best.log_likelihood for key, c in self.found.items()}
+        ranked = sorted(likelihood, key=lambda key: -likelihood[key])
+        return [k for k in ranked[:most] if likelihood[k] >= likelihood[ranked[0]] - behind]
 
-    def look_closer(self, count: int, groups: int, until: float) -> None:
-        """Simulate more of the leading candidates, along the places that agree."""
-        chosen = _leading({k: c.best.log_likelihood for k, c in self.found.items()}, count)
-        asked = [g for k in chosen for g in groups_along(self.found[k], groups, self._rng)]
-        self._simulate(asked, until)
-        self._form({k: self.found[k].best.place for k in chosen})
-
-    def doubtful(self) -> bool:
-        """Whether no candidate so far looks like the observation."""
-        best = max(self.found.values(), key=lambda c: c.best.log_likelihood)
-        return judge_adequacy(best, self._rng).sigma > _DOUBT
-
-    def _start(self, places: Mapping[Effects, np.ndarray], groups: int, until: float) -> None:
-        asked = [
-            group
-            for key, place in places.items()
-            for group in groups_about(Hypothesis(self._unit, key), place, groups, self._rng)
-        ]
-        self._simulate(asked, until)
+    def start(self, places: _Starts, groups: int) -> None:
+        """Simulate hypotheses about places."""
+        self._simulate(
+            [
+                group
+                for key, place in places.items()
+                for group in groups_about(Hypothesis(self._unit, key), place, groups, self._rng)
+            ]
+        )
         self._form(places)
 
-    def _simulate(self, groups: Iterable[Group], until: float) -> None:
-        report = self._part(until, "looking closer")
-        made = simulate_groups(self._unit, list(groups), self._observation, self._rng, report)
+    def take_over(self, candidates: Sequence[Candidate], groups: int) -> None:
+        """Simulate candidates that were formed on other rows."""
+        self._simulate([g for c in candidates for g in groups_along(c, groups, self._rng)])
+        self._form({c.hypothesis.effects: c.best.place for c in candidates})
+
+    def look_closer(self, chosen: Sequence[Effects], groups: int) -> None:
+        """Simulate more of some candidates, along the places that agree."""
+        self.take_over([self.found[key] for key in chosen], groups)
+
+    def _simulate(self, groups: Sequence[Group]) -> None:
+        made = simulate_groups(self._unit, groups, self._observation, self._rng, self._report())
         for key, population in made.items():
             known = self._runs.get(key)
             self._runs[key] = population if known is None else known.joined(population)
 
-    def _form(self, starts: Mapping[Effects, np.ndarray]) -> None:
+    def _form(self, starts: _Starts) -> None:
         runs = {key: self._runs[key] for key in starts}
         self.found |= form_candidates(self._unit, self._observation, runs, starts)
 
-    def _part(self, until: float, text: str) -> Callable[[float], None] | None:
-        begin, self._done = self._done, until
-        progress = self._progress
-        if progress is None:
+    def _report(self) -> Callable[[float], None] | None:
+        """Half of what is left of the bar, as nobody knows how many rounds are to come."""
+        if self._progress is None:
             return None
-        return lambda share: progress(begin + (until - begin) * share, text)
-
-
-def _leading(scores: Mapping[Effects, float], most: int) -> list[Effects]:
-    """The most likely hypotheses, and always the baseline where it is among them."""
-    ranked = sorted(scores, key=lambda key: -scores[key])
-    return list(dict.fromkeys([*ranked[:most], *(key for key in ranked if not key)]))
+        progress, begin = self._progress, 1.0 - self._left
+        self._left *= 0.5
+        half = self._left
+        return lambda share: progress(begin + half * share)

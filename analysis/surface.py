@@ -11,6 +11,7 @@ unwrapped: near the right place the difference is small.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +69,7 @@ def differences(observation: Observation, population: Population) -> NDArray[np.
     return difference
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Surface:
     """Local regression over the runs of one hypothesis.
 
@@ -109,7 +110,7 @@ class Surface:
         if self.quadratic:
             columns += list((offset**2).T)
         basis = np.column_stack(columns)
-        flat = np.nan_to_num(self.difference[near].reshape(len(offset), -1))
+        flat = self._flat[near]
         ridge = np.diag([1e-9] + [_CURVATURE] * (basis.shape[1] - 1))
         weighted = basis * weight[:, None]
         hat = np.linalg.solve(basis.T @ weighted + ridge, weighted.T)
@@ -118,11 +119,8 @@ class Surface:
         total = float(weight.sum())
         variance = weight @ (flat - basis @ coefficients) ** 2 / max(total - used, 0.3 * total)
         shape = self.difference.shape[1:]
-        variance = self._smoothed(variance.reshape(shape)) * (1.0 + float(hat[0] @ hat[0]))
-        mean = coefficients[0].reshape(shape)
-        mean = np.where(np.isfinite(self.observation.values), mean, np.nan)
-        noise = np.stack([self.observation.noise] * 2 + [np.zeros(len(self.observation))])
-        return mean, np.sqrt(variance + noise**2 + _FLOOR[:, None] ** 2)
+        variance = variance.reshape(shape) @ self._blur * (1.0 + float(hat[0] @ hat[0]))
+        return coefficients[0].reshape(shape) + self._unread, np.sqrt(variance + self._least)
 
     def fit(self, place: NDArray[np.float64], rows: NDArray[np.bool_] | None = None) -> Fit:
         """Agreement at a place, deviations fitted to some rows (all where None)."""
@@ -187,10 +185,29 @@ class Surface:
         near = weight > 0.0
         return offset[near], weight[near], near
 
-    def _smoothed(self, variance: NDArray[np.float64]) -> NDArray[np.float64]:
-        smooth = np.empty_like(variance)
+    @cached_property
+    def _blur(self) -> NDArray[np.float64]:
+        """(rows, rows): smooths a scatter over neighbouring frequencies of its level."""
+        blur = np.zeros((len(self.observation),) * 2)
         for block in self.observation.blocks:
-            count = block.stop - block.start
-            padded = np.pad(variance[:, block], ((0, 0), (2, 2)), mode="edge")
-            smooth[:, block] = sum(w * padded[:, i : i + count] for i, w in enumerate(_BLUR))
-        return smooth
+            rows = np.arange(block.start, block.stop)
+            for shift, weight in enumerate(_BLUR, -(len(_BLUR) // 2)):
+                source = np.clip(rows + shift, block.start, block.stop - 1)
+                np.add.at(blur, (source, rows), weight)
+        return blur
+
+    @cached_property
+    def _unread(self) -> NDArray[np.float64]:
+        """(3, rows): NaN where nothing was observed, else 0."""
+        return np.where(np.isfinite(self.observation.values), 0.0, np.nan)
+
+    @cached_property
+    def _least(self) -> NDArray[np.float64]:
+        """(3, rows): variance of reading and regression, apart from the runs' own."""
+        noise = self.observation.noise
+        return np.stack([noise**2, noise**2, 0.0 * noise]) + _FLOOR[:, None] ** 2
+
+    @cached_property
+    def _flat(self) -> NDArray[np.float64]:
+        """(n, 3 rows): the differences, 0 where nothing was observed."""
+        return np.nan_to_num(self.difference.reshape(len(self.places), -1))

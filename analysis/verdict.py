@@ -25,12 +25,18 @@ Word = Literal["consistent", "explained", "ambiguous", "unexplained"]
 _PER_PARAMETER = 8.0
 """Log-likelihood that every further parameter must bring: it can always fit something."""
 
+_PER_CAUSE = 10.0
+"""The same for every further cause: there are twenty-odd of them to choose from."""
+
 _AT_BOUND = 10.0
 """Cost of a parameter at the end of its plausible range: a sign that the cause is another."""
 
 _EDGE = 0.02
-_FALSE_ALARM = 20.0
-"""By so much must a cause beat the baseline; without a cause the best of all reached less."""
+_WITHIN_TOLERANCE = 40.0
+"""Cost of a datasheet value so little off that its tolerance covers it: that is no cause."""
+
+_FALSE_ALARM = 15.0
+"""By so much must a cause beat the baseline beyond its costs."""
 
 _TIE = 12.0
 """Within so much of the best, a set is a rival."""
@@ -121,5 +127,8 @@ def judge_candidates(
 def _score(candidate: Candidate, held_out: HeldOut) -> float:
     sizes = candidate.best.place[1:]
     bound = np.count_nonzero((sizes < _EDGE) | (sizes > 1.0 - _EDGE))
-    cost = _PER_PARAMETER * len(sizes) + _AT_BOUND * bound
+    causes = len(candidate.hypothesis.effects)
+    cost = _PER_CAUSE * causes + _PER_PARAMETER * len(sizes) + _AT_BOUND * bound
+    if any(candidate.hypothesis.within_tolerance(candidate.best.place)):
+        cost += _WITHIN_TOLERANCE
     return 0.5 * (candidate.best.log_likelihood + held_out.score) - cost

@@ -1,0 +1,55 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from analysis.causes import Hypothesis, every_single_cause
+from sim.catalogue import CATALOGUE
+from sim.unit import load_unit
+
+UNITS = {name: load_unit(name) for name in ("adss", "edss")}
+
+
+@given(
+    name=st.sampled_from(sorted(UNITS)),
+    effects=st.sets(st.sampled_from(sorted(CATALOGUE)), max_size=3),
+    ratio=st.floats(0.0, 1.0),
+    u=st.floats(0.0, 1.0),
+)
+def test_places_and_physical_values_are_each_others_inverse(name, effects, ratio, u):
+    hypothesis = Hypothesis(UNITS[name], tuple(sorted(effects)))
+    place = np.array([ratio, *[u] * (hypothesis.d - 1)])
+    values = hypothesis.values(place)
+    assert np.all(values > 0.0)
+    np.testing.assert_allclose(hypothesis.place(ratio, values), place, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", sorted(UNITS))
+@pytest.mark.parametrize("corner", [0.0, 1.0])
+def test_every_cause_makes_a_machine_at_both_ends_of_its_range(name, corner):
+    for hypothesis in every_single_cause(UNITS[name]):
+        place = np.array([0.3, *[corner] * (hypothesis.d - 1)])
+        machine = hypothesis.machine(place, seed=1)
+        (setting,) = machine.effects
+        assert setting.id == hypothesis.effects[0]
+        assert machine.servo(UNITS[name]).system.A.shape[0] >= 13
+
+
+def test_every_cause_of_the_catalogue_is_looked_at():
+    assert [h.effects for h in every_single_cause(UNITS["adss"])] == [(e,) for e in CATALOGUE]
+
+
+def test_datasheet_values_lie_amid_their_range_and_additions_do_not():
+    centred = {h.effects[0] for h in every_single_cause(UNITS["edss"]) if h.centred}
+    assert centred == {
+        "load-inertia", "shaft-stiffness", "total-backlash", "amplifier-gain",
+        "motor-resistance", "motor-constant", "tachometer-gain", "filter-corner",
+    }  # fmt: skip
+
+
+def test_a_set_is_the_same_in_whatever_order_it_was_put_together():
+    one = Hypothesis(UNITS["adss"]).with_effect("shaft-damping").with_effect("cable-stiffness")
+    other = Hypothesis(UNITS["adss"]).with_effect("cable-stiffness").with_effect("shaft-damping")
+    assert one.effects == other.effects == ("cable-stiffness", "shaft-damping")
+    assert one.sites == ("plant",)
+    assert one.with_effect("tachometer-gain").sites == ("chain", "plant")

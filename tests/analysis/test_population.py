@@ -1,0 +1,99 @@
+import numpy as np
+import pytest
+
+from analysis.atlas import coarse_stride, make_atlas
+from analysis.causes import Hypothesis
+from analysis.ensemble import TOLERANCES
+from analysis.observation import unread
+from analysis.population import DEVIATING, Group, simulate_groups
+from daq.errors import AnalysisError
+from daq.plan import SweepPlan
+from sim.unit import load_unit
+
+ADSS = load_unit("adss")
+SHORT = SweepPlan((120.0, 140.0), (2.0,), settle_cycles=1, integrate_cycles=2)
+RATIOS = np.linspace(0.2, 0.8, 3)
+
+
+def runs(groups, seed=0):
+    return simulate_groups(ADSS, groups, unread(SHORT, 1e-4), np.random.default_rng(seed))
+
+
+def test_runs_are_kept_by_hypothesis_with_their_places():
+    inertia = Hypothesis(ADSS, ("load-inertia",))
+    groups = [Group(Hypothesis(ADSS), RATIOS, np.empty(0)), Group(inertia, RATIOS, np.array([0.6]))]
+    found = runs(groups)
+    assert found[()].places.shape == (3, 1)
+    np.testing.assert_array_equal(found[("load-inertia",)].places[:, 1], 0.6)
+    assert found[()].mean.shape == found[()].variance.shape == (3, 2)
+    # Another load must show.
+    assert np.abs(found[()].mean - found[("load-inertia",)].mean).min() > 1e-5
+
+
+def test_neighbouring_groups_deviate_in_opposite_ways_by_one_tolerance():
+    found = runs([Group(Hypothesis(ADSS), RATIOS, np.empty(0))] * 14)
+    off = found[()].deviations[:: len(RATIOS)]
+    np.testing.assert_allclose(off[::2], -off[1::2])
+    np.testing.assert_allclose(np.abs(off), np.tile([TOLERANCES[s] for s in DEVIATING], (14, 1)))
+    # Seven pairs tell five slopes apart.
+    assert np.linalg.cond(off) < 3.0
+
+
+def test_the_same_seed_gives_the_same_runs():
+    groups = [Group(Hypothesis(ADSS), RATIOS, np.empty(0))]
+    np.testing.assert_array_equal(runs(groups)[()].mean, runs(groups)[()].mean)
+
+
+def test_an_atlas_is_kept_and_read_again_and_a_damaged_one_is_made_anew(tmp_path, monkeypatch):
+    import analysis.atlas as module
+
+    monkeypatch.setattr(module, "_RATIOS", 1)
+    monkeypatch.setattr(module, "_SIZES", 1)
+    coarse = unread(SHORT, 1e-4)
+    first = make_atlas(ADSS, coarse, tmp_path)
+    (file,) = tmp_path.iterdir()
+    monkeypatch.setattr(module, "simulate_groups", None)
+    again = make_atlas(ADSS, coarse, tmp_path)
+    assert list(again) == list(first) and len(first) == 23
+    for key in first:
+        np.testing.assert_array_equal(again[key].mean, first[key].mean)
+    other = unread(SweepPlan((120.0, 141.0), (2.0,), settle_cycles=1, integrate_cycles=2), 1e-4)
+    with pytest.raises(TypeError):
+        make_atlas(ADSS, other, tmp_path)  # another plan is not read from this file
+    file.write_bytes(file.read_bytes()[:100])
+    with pytest.raises(TypeError):
+        make_atlas(ADSS, coarse, tmp_path)  # nor is a damaged file believed
+
+
+def test_a_folder_that_cannot_be_written_costs_nothing_but_time(tmp_path, monkeypatch):
+    import analysis.atlas as module
+
+    monkeypatch.setattr(module, "_RATIOS", 1)
+    monkeypatch.setattr(module, "_SIZES", 1)
+    (tmp_path / "file").write_text("")
+    assert make_atlas(ADSS, unread(SHORT, 1e-4), tmp_path / "file" / "below")
+
+
+def test_a_step_too_long_is_halved_before_giving_up(monkeypatch):
+    import analysis.population as module
+
+    steps = []
+
+    def fussy(servos, plan, longest_step_s):
+        steps.append(longest_step_s)
+        raise AnalysisError("grew without bound")
+
+    monkeypatch.setattr(module, "simulate_cycles", fussy)
+    with pytest.raises(AnalysisError):
+        runs([Group(Hypothesis(ADSS), RATIOS, np.empty(0))])
+    assert steps == [1e-5, 5e-6, 2.5e-6]
+
+
+def test_the_coarse_look_keeps_about_twenty_frequencies_a_level():
+    for points, stride in ((61, 3), (20, 1), (7, 1), (401, 20)):
+        plan = SweepPlan(tuple(np.linspace(100, 180, points)), (1.5, 2.5))
+        assert coarse_stride(unread(plan, 1e-4)) == stride
+    thinned = unread(SweepPlan(tuple(np.linspace(100, 180, 61)), (1.5, 2.5)), 1e-4).thinned(3)
+    assert len(thinned) == 42
+    assert thinned.plans[0][0].frequencies_hz[1] == pytest.approx(104.0)
+    np.testing.assert_array_equal(thinned.plans[0][1], np.arange(42))

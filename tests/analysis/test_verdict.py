@@ -1,0 +1,99 @@
+"""The rules of judgement, in a world whose answers are known."""
+
+import numpy as np
+import pytest
+
+from analysis.adequacy import judge_adequacy
+from analysis.holdout import hold_out
+from analysis.misfit import describe_departures, find_departures
+from analysis.verdict import judge_candidates
+from synthetic import BASE, LEVELS, ROWS, candidate, observation, read, shape
+
+TRUE, WRONG = ("load-inertia",), ("shaft-stiffness",)
+SETS = ((), TRUE, WRONG, ("cable-stiffness",), ("amplifier-gain",))
+
+
+def seen(effects, seed, size=0.5):
+    return observation(read(effects, np.array([0.5, size]), np.random.default_rng(seed)))
+
+
+def judge(observed, sets=SETS, seed=0):
+    found = [candidate(observed, effects, seed + i) for i, effects in enumerate(sets)]
+    found.sort(key=lambda c: -c.best.log_likelihood)
+    return judge_candidates(found, observed, np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_cause_that_is_there_is_named(seed):
+    verdict = judge(seen(TRUE, seed), seed=10 * seed)
+    assert (verdict.word, verdict.best.effects) == ("explained", TRUE)
+    assert verdict.best.probability > 0.95
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_nothing_is_named_where_nothing_is_hidden(seed):
+    verdict = judge(seen((), seed, size=0.0), seed=10 * seed)
+    assert verdict.word == "consistent"
+    assert verdict.best is verdict.baseline
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_cause_that_nobody_knows_is_not_blamed_on_another(seed):
+    values = read((), np.array([0.5]), np.random.default_rng(seed)) + 0.3 * shape(77)
+    verdict = judge(observation(values), seed=10 * seed)
+    assert verdict.word == "unexplained"
+
+
+def test_two_causes_that_look_the_same_are_both_named(monkeypatch):
+    import synthetic
+
+    plain = synthetic.effect_slope
+    same = {WRONG: plain(TRUE) + 0.002}
+    monkeypatch.setattr(synthetic, "effect_slope", lambda e: same.get(e, plain(e)))
+    observed = seen(TRUE, 1)
+    verdict = judge(observed, ((), TRUE, WRONG))
+    assert verdict.word == "ambiguous"
+    assert {verdict.best.effects, *(r.effects for r in verdict.rivals)} == {TRUE, WRONG}
+
+
+def test_each_level_is_predicted_by_a_fit_that_has_not_seen_it():
+    observed = seen(TRUE, 2)
+    spoilt = observed.values.copy()
+    high = observed.source_vpk == LEVELS[1]
+    spoilt[:, high] += 0.5
+    honest = hold_out(candidate(observed, TRUE), observed)
+    other = hold_out(candidate(observation(spoilt), TRUE), observation(spoilt))
+    # What is predicted of the spoilt level comes from the other, which is as it was.
+    moved = other.residual[:2][:, high] - honest.residual[:2][:, high]
+    assert np.median(np.abs(moved)) == pytest.approx(0.5, abs=0.1)
+    assert 0.7 < honest.rms_sigma < 1.3 < 3.0 < other.rms_sigma
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_an_observation_like_own_runs_is_adequate_and_another_is_not(seed):
+    fitting = seen(TRUE, seed)
+    rng = np.random.default_rng(seed)
+    # Twelve draws of about a standard normal: above 3.5 once in 400 of such tests.
+    assert judge_adequacy(candidate(fitting, TRUE, seed), rng).sigma < 3.5
+    odd = observation(fitting.values + 0.3 * shape(77))
+    assert judge_adequacy(candidate(odd, TRUE, seed), rng).sigma > 4.0
+
+
+def test_departures_are_found_where_they_are_and_nowhere_else():
+    values = read((), np.array([0.5]), np.random.default_rng(4))
+    quiet = observation(values)
+    assert len(find_departures(candidate(quiet), quiet)) <= 2
+    values = values.copy()
+    band = (np.arange(ROWS) >= ROWS - 6) & (np.arange(ROWS) < ROWS - 3)
+    values[0, band] += 0.2
+    loud = observation(values)
+    found = find_departures(candidate(loud), loud)
+    assert (found[0].quantity, found[0].source_vpk) == ("gain", LEVELS[1])
+    assert loud.frequency_hz[band][0] == found[0].low_hz
+    assert found[0].mean == pytest.approx(0.2 * 8.686, rel=0.25)
+    assert f"{found[0].low_hz:g} to {found[0].high_hz:g} Hz" in describe_departures(found, loud)
+    assert describe_departures((), loud) == "nothing departs by more than chance"
+
+
+def test_the_world_of_these_tests_is_not_flat():
+    assert np.ptp(BASE[0]) > 0.5

@@ -1,0 +1,104 @@
+"""Responses that hide something, drawn at random: what a bench would read of them.
+
+Owns the drawing of units off their datasheet, of effects and of their sizes,
+and the reading noise. Truths are known to the caller alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.causes import Hypothesis
+from analysis.ensemble import TOLERANCES
+from daq.frf import DB_PER_NEPER, FrequencyResponse
+from daq.plan import SweepPlan, spaced_frequencies
+from sim.catalogue import CATALOGUE
+from sim.effects import EffectSetting
+from sim.response import simulate
+from sim.unit import Unit, load_unit
+
+BANDS_HZ = {"adss": (100.0, 180.0), "edss": (30.0, 110.0)}
+LEVELS_VPK = (1.5, 2.5, 4.0)
+NOISE_V = 5e-4
+
+SHARES = (0.06, 0.4)
+"""By how much a datasheet value is off, up or down."""
+
+SIZES = (0.4, 0.75)
+"""Where other effects lie between the ends of their range, by logarithm."""
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """A unit's response and what is hidden in it."""
+
+    unit: Unit
+    ratio: float
+    effects: tuple[EffectSetting, ...]
+    response: FrequencyResponse
+
+
+def off_datasheet(unit: Unit, rng: np.random.Generator) -> Unit:
+    """A unit off its datasheet within tolerance."""
+    known = unit.parameters
+    changed = {s: known[s] * (1.0 + rng.normal(0.0, share)) for s, share in TOLERANCES.items()}
+    return unit.with_parameters(**changed)
+
+
+def drawn_effect(unit: Unit, effect: str, rng: np.random.Generator) -> EffectSetting:
+    """An effect at a size that a bench would meet."""
+    hypothesis = Hypothesis(unit, (effect,))
+    known = {**unit.parameters, "scale": 1.0}
+    values = {}
+    for index, (_, parameter) in enumerate(hypothesis.parameters):
+        low, high = hypothesis.logs[index]
+        if hypothesis.centred:
+            off = rng.uniform(*SHARES) * rng.choice([-1.0, 1.0])
+            values[parameter.name] = known[parameter.name] * (1.0 + off)
+        elif parameter.name == "f_p":
+            # A payload that resonates in or near the band that is measured.
+            values[parameter.name] = float(rng.uniform(0.8, 1.2)) * rng.uniform(*_band(unit))
+        else:
+            values[parameter.name] = float(np.exp(low + (high - low) * rng.uniform(*SIZES)))
+    return EffectSetting(effect, values)
+
+
+def hide(name: str, effects: tuple[str, ...], rng: np.random.Generator) -> Hidden:
+    """A response of a unit by name that hides effects by identifier."""
+    unit = load_unit(name)
+    settings = tuple(drawn_effect(unit, effect, rng) for effect in effects)
+    ratio = float(rng.uniform(0.05, 0.95))
+    plan = SweepPlan(spaced_frequencies(*_band(unit), 61), LEVELS_VPK)
+    response = simulate(
+        off_datasheet(unit, rng), ratio, plan, effects=settings, seed=int(rng.integers(2**31))
+    )
+    return Hidden(unit, ratio, settings, reading(response, rng))
+
+
+def reading(response: FrequencyResponse, rng: np.random.Generator) -> FrequencyResponse:
+    """What a bench reads of a response: noise added, and counted in the stated error."""
+    noise = NOISE_V / response.source_vpk
+    added = rng.standard_normal((2, len(response))) * noise
+    gain = response.gain + added[0] + 1j * added[1]
+    along = response.gain_std_db / DB_PER_NEPER
+    across = np.radians(response.phase_std_deg)
+    total = np.sqrt(along**2 + across**2 + 2.0 * (noise / np.abs(gain)) ** 2)
+    return FrequencyResponse.from_arrays(
+        response.frequency_hz,
+        response.source_vpk,
+        gain,
+        unit=response.unit,
+        gain_std_db=DB_PER_NEPER * total,
+        direction=response.direction,
+        settle_cycles=response.settle_cycles,
+        integrate_cycles=response.integrate_cycles,
+    )
+
+
+def _band(unit: Unit) -> tuple[float, float]:
+    return BANDS_HZ[unit.name.lower()]
+
+
+EVERY_EFFECT = tuple(CATALOGUE)

@@ -1,0 +1,86 @@
+"""A little world with known answers, in which candidates can be made without simulating.
+
+A run of a hypothesis reads channel = base + slope . place + deviations + scatter. What a hypothesis
+cannot bend towards (its `blind` coordinates) is what tells it from another.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from analysis.candidate import Candidate
+from analysis.causes import Hypothesis
+from analysis.observation import Observation
+from analysis.population import DEVIATING, Population
+from analysis.surface import Surface
+from daq.plan import SweepPlan
+from sim.unit import load_unit
+
+ADSS = load_unit("adss")
+FREQUENCIES = tuple(np.linspace(100.0, 180.0, 24))
+LEVELS = (1.5, 4.0)
+ROWS = len(FREQUENCIES) * len(LEVELS)
+SIGMAS = np.full(len(DEVIATING), 0.005)
+SCATTER = np.array([0.02, 0.02, 0.2])[:, None]
+
+
+def shape(seed: int) -> np.ndarray:
+    """A smooth curve over the rows for each channel (3, rows)."""
+    rng = np.random.default_rng(seed)
+    x = np.tile(np.linspace(0.0, 1.0, len(FREQUENCIES)), len(LEVELS))
+    level = np.repeat([0.7, 1.3], len(FREQUENCIES))
+    waves = [np.sin(2 * np.pi * (k * x + rng.uniform())) * rng.normal() for k in (0.5, 1.0, 1.5)]
+    return np.stack([sum(waves) * rng.uniform(0.5, 1.0) * level for _ in range(3)])
+
+
+BASE, RATIO_SLOPE = shape(1), shape(2)
+DEVIATION_SLOPES = np.stack([shape(10 + i) for i in range(len(DEVIATING))])
+
+
+def effect_slope(effects: tuple[str, ...]) -> np.ndarray:
+    """How the channels follow the size of a set of effects."""
+    return sum((shape(100 + sum(map(ord, e))) for e in effects), np.zeros((3, ROWS)))
+
+
+def read(effects, place, rng, deviations=None, scatter=1.0):
+    """One run (3, rows)."""
+    deviations = np.zeros(len(DEVIATING)) if deviations is None else deviations
+    size = place[1] if len(place) > 1 else 0.0
+    value = BASE + RATIO_SLOPE * (place[0] - 0.5) + effect_slope(effects) * size
+    value = value + np.tensordot(deviations, DEVIATION_SLOPES, axes=1)
+    return value + scatter * SCATTER * rng.standard_normal((3, ROWS))
+
+
+def observation(values) -> Observation:
+    """An observation of these channels."""
+    plan = SweepPlan(FREQUENCIES, LEVELS)
+    return Observation(
+        values=values,
+        source_vpk=np.repeat(LEVELS, len(FREQUENCIES)),
+        frequency_hz=np.tile(FREQUENCIES, len(LEVELS)),
+        noise_v=1e-5,
+        noise=np.full(ROWS, 1e-5),
+        plans=((plan, np.arange(ROWS)),),
+    )
+
+
+def candidate(seen: Observation, effects: tuple[str, ...] = (), seed: int = 0, groups: int = 10):
+    """A candidate with runs all over, its deviations known."""
+    rng = np.random.default_rng(seed)
+    hypothesis = Hypothesis(ADSS, effects)
+    places, deviations, runs = [], [], []
+    for _ in range(groups):
+        off = rng.normal(0.0, SIGMAS)
+        sizes = rng.uniform(0.0, 1.0, hypothesis.d - 1)
+        for ratio in rng.uniform(0.0, 1.0, 10):
+            place = np.array([ratio, *sizes])
+            places.append(place)
+            deviations.append(off)
+            runs.append(read(effects, place, rng, off))
+    places, deviations, runs = np.array(places), np.array(deviations), np.array(runs)
+    difference = runs - seen.values - np.tensordot(deviations, DEVIATION_SLOPES, axes=1)
+    width = np.array([0.4] + [0.4] * (hypothesis.d - 1))
+    surface = Surface(seen, places, difference, width, DEVIATION_SLOPES, SIGMAS)
+    nothing = np.zeros((len(places), ROWS))
+    population = Population(places, deviations, nothing + 1.0 + 0j, nothing)
+    return Candidate(hypothesis, population, surface, surface.climb(places.mean(axis=0)))
