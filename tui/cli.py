@@ -16,6 +16,7 @@ from importlib.metadata import version
 from cyclopts import App, CycloptsError, Parameter
 
 from daq.errors import LashbenchError
+from tui.commands.bench import is_terminal
 from tui.output import Console
 
 __all__ = ["VERBS", "build_app", "main"]
@@ -68,7 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     debug, words = _switch("--debug", words)
     quiet, words = _switch("--quiet", words)
     console = Console(quiet)
-    if not words and sys.stdin.isatty() and sys.stdout.isatty():
+    if not words and is_terminal():
         words = ["bench"]
     try:
         return _run(words, console)

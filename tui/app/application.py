@@ -62,6 +62,7 @@ class BenchApp(App[int]):
     TITLE = "lashbench"
     CSS = STYLE
     SCREENS = dict(SCREENS)
+    NOTIFICATION_TIMEOUT = 3.0
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding(
             "ctrl+x", "stop_source", "STOP", id="stop", priority=True,

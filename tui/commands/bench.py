@@ -11,7 +11,7 @@ from pathlib import Path
 from daq.errors import InputError
 from tui.output import Injected
 
-__all__ = ["bench"]
+__all__ = ["bench", "is_terminal", "require_terminal"]
 
 
 def bench(*, db: Path = Path("lashbench.db"), console: Injected) -> int:
@@ -40,7 +40,12 @@ def require_terminal(verb: str) -> None:
     Raises
     ------
     InputError
-        If input or output is none.
+        If there is none to draw on or to press keys at.
     """
-    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+    if not is_terminal():
         raise InputError(f"{verb} needs a terminal; scripts use measure, see lashbench --help")
+
+
+def is_terminal() -> bool:
+    """Whether somebody can see and press keys; the screen is drawn on stderr."""
+    return sys.stdin.isatty() and sys.stdout.isatty() and sys.stderr.isatty()

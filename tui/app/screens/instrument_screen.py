@@ -27,10 +27,10 @@ _SIMULATED = (
 )
 _REMEDIES = (
     "What to try:",
-    "- power, cable and address of the analyser; its front panel shows the GPIB address",
-    "- `lashbench serve` gives an address of a simulated one: TCPIP::127.0.0.1::PORT::SOCKET",
-    "- a serial adapter may need the right to use the port: group dialout",
     "- the simulated bench needs nothing: choose it above",
+    "- power, cable and address of the analyser; its front panel shows the address",
+    "- a serial adapter needs the right to use its port: group dialout",
+    "- a simulated one on a wire: lashbench serve --unit adss --ratio 0.3 --tcp 0",
 )
 
 
@@ -50,8 +50,8 @@ Connecting asks who is there and what the source does. It drives nothing.
         Binding("ctrl+f", "find", "Search again", id="instrument.find", show=False),
     ]
     DEFAULT_CSS = """
-    InstrumentScreen #found { height: 8; border: none; }
-    InstrumentScreen.-tall #found { height: 14; }
+    InstrumentScreen #found { height: auto; max-height: 6; border: none; }
+    InstrumentScreen.-tall #found { max-height: 14; }
     InstrumentScreen #answer { height: 1fr; overflow-y: auto; }
     """
 

@@ -6,7 +6,8 @@ and what is there of it is shown.
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from textual.app import ComposeResult
@@ -19,6 +20,9 @@ from tui.app.step_screen import StepScreen
 from tui.app.widgets.bode import BodePlot
 from tui.app.widgets.panel import Panel
 from tui.app.widgets.traces import traces_of_response
+
+if TYPE_CHECKING:
+    from analysis.features import LevelFeatures
 
 __all__ = ["ResultScreen"]
 
@@ -51,7 +55,7 @@ least index marks the likeliest ratio. E estimates once more. Ctrl+Y copies ever
     ResultScreen.-index #index, ResultScreen.-index #index-words { display: block; }
     ResultScreen.-index BodePlot { display: none; }
     ResultScreen #words { height: auto; max-height: 60%; }
-    ResultScreen.-short #words { max-height: 12; }
+    ResultScreen.-short #words { max-height: 9; }
     """
 
     def body(self) -> ComposeResult:
@@ -121,7 +125,7 @@ least index marks the likeliest ratio. E estimates once more. Ctrl+Y copies ever
 
     def _lines(self) -> list[str]:
         from analysis.advice import limit_lines, stage_to_adjust
-        from analysis.resonance import summary
+        from analysis.features import summary
 
         desk, results = self.desk, self.desk.results
         lines: list[str] = []
@@ -136,8 +140,27 @@ least index marks the likeliest ratio. E estimates once more. Ctrl+Y copies ever
             lines.append(f"NO ESTIMATE: {results.faults['result']}")
         head = f"measurement {desk.measurement}" + (", SIMULATED" if desk.simulated else "")
         if results.features:
-            lines += [head, *summary(results.features)]
+            wide = self.has_class("-wide")
+            lines += [head, *(summary(results.features) if wide else _brief(results.features))]
         return lines or [f"reading {head}"]
+
+
+def _brief(features: Sequence[LevelFeatures]) -> list[str]:
+    """A line per level, for narrow screens, and what a reader should know below."""
+    from analysis.features import with_error
+
+    lines = []
+    for level in features:
+        parts = [
+            f"{name} {with_error(found.frequency_hz, found.std_hz)} Hz {found.gain_db:.1f} dB"
+            if found is not None
+            else f"no {name}"
+            for name, found in (("ARF", level.arf), ("RF", level.rf))
+        ]
+        apart = with_error(level.difference_hz, level.difference_std_hz)
+        lines.append(f"{level.source_vpk:g} V: {', '.join(parts)}, apart {apart} Hz")
+    lines += [f"{level.source_vpk:g} V {flag}" for level in features for flag in level.flags]
+    return lines
 
 
 def ratio_words(document: Any) -> str:
