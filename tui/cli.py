@@ -33,6 +33,7 @@ VERBS = {
     "serve": ("tui.commands.serve:serve", "Serve a simulated 35670A on a wire."),
     "demo": ("tui.commands.demo:demo", "Do the whole job without hardware."),
     "bench": ("tui.commands.bench:bench", "Open the bench screen; so does no verb at all."),
+    "replay": ("tui.commands.replay:replay", "Show a recorded session as it ran."),
 }
 """Every verb: the function that does it, and its line in the help."""
 
