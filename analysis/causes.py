@@ -83,7 +83,7 @@ class Hypothesis:
         seed: int,
         deviations: tuple[tuple[str, float], ...] = (),
     ) -> Machine:
-        """A machine at a place (d,)."""
+        """A machine at a place (d,); its gears start near the middle of their play."""
         ratio = float(np.clip(place[0], 0.0, 1.0))
         return Machine(ratio, seed, None, deviations, self.settings(place))
 

@@ -16,13 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from analysis.calibration import calibrate
-from analysis.candidate import Candidate
-from analysis.emulator import Emulator
+from analysis.calibration import Calibrated
 from analysis.misfit import Departure, describe_departures, find_departures
 from analysis.next_measurement import NextMeasurement, propose_measurement
 from analysis.observation import Observation, observe
 from analysis.search import search_causes
+from analysis.sizing import size_candidate
 from analysis.verdict import Judged, Verdict, judge_candidates
 from daq.frf import FrequencyResponse
 from sim.catalogue import CATALOGUE
@@ -221,8 +220,8 @@ def diagnose_response(
     rng = np.random.default_rng(seed)
     verdict = judge_candidates(candidates, observation, rng)
     named = verdict.best if verdict.word in ("explained", "ambiguous") else None
-    base = _calibrated(verdict.baseline.candidate, observation, rng)
-    best = base if named is None else _calibrated(named.candidate, observation, rng)
+    base = size_candidate(verdict.baseline.candidate, observation, rng)
+    best = base if named is None else size_candidate(named.candidate, observation, rng)
     departures = find_departures(verdict.baseline.candidate, observation)
     proposal = _proposal(unit, verdict, observation, seed, progress)
     if progress is not None:
@@ -230,9 +229,9 @@ def diagnose_response(
     return Diagnosis(
         unit=unit.name,
         verdict=verdict,
-        causes=() if named is None else _causes(named, *best),
-        ratio_baseline=_ratio(*base),
-        ratio_extended=_ratio(*best),
+        causes=() if named is None else _causes(named, best),
+        ratio_baseline=_ratio(base),
+        ratio_extended=_ratio(best),
         departures=departures,
         left=find_departures(verdict.best.candidate, observation),
         shape=describe_departures(departures, observation),
@@ -243,38 +242,21 @@ def diagnose_response(
     )
 
 
-def _calibrated(
-    candidate: Candidate, observation: Observation, rng: np.random.Generator
-) -> tuple[np.ndarray, np.ndarray]:
-    """Mean (d,) and covariance (d, d) of a candidate's coordinates, from runs left out in turn."""
-    runs, surface = candidate.population, candidate.surface
-    emulator = Emulator(
-        runs.places,
-        runs.deviations,
-        runs.channels(observation),
-        observation.blocks,
-        surface.width,
-        surface.sigmas,
-    )
-    found = calibrate(observation, emulator, rng)
-    return np.clip(found.mean, 0.0, 1.0), found.covariance
+def _ratio(found: Calibrated) -> tuple[float, float]:
+    return float(found.mean[0]), float(np.sqrt(found.covariance[0, 0]))
 
 
-def _ratio(mean: np.ndarray, covariance: np.ndarray) -> tuple[float, float]:
-    return float(mean[0]), float(np.sqrt(covariance[0, 0]))
-
-
-def _causes(named: Judged, mean: np.ndarray, covariance: np.ndarray) -> tuple[Cause, ...]:
+def _causes(named: Judged, found: Calibrated) -> tuple[Cause, ...]:
     hypothesis = named.candidate.hypothesis
-    values = hypothesis.values(mean)
+    values = hypothesis.values(found.mean)
     # Coordinates are logarithms of the values, stretched over their range.
     stretch = hypothesis.logs[:, 1] - hypothesis.logs[:, 0]
-    stds = values * stretch * np.sqrt(np.diag(covariance)[1:])
+    stds = values * stretch * np.sqrt(np.diag(found.covariance)[1:])
     sizes: dict[str, list[Size]] = {}
     for (effect, parameter), value, std in zip(hypothesis.parameters, values, stds, strict=True):
         size = Size(parameter.name, float(value), float(std), parameter.unit_symbol)
         sizes.setdefault(effect, []).append(size)
-    return tuple(Cause(e, tuple(found), named.probability) for e, found in sizes.items())
+    return tuple(Cause(e, tuple(of), named.probability) for e, of in sizes.items())
 
 
 def _proposal(

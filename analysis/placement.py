@@ -11,13 +11,14 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.calibration import Calibrated
 from analysis.candidate import Candidate
 from analysis.causes import Hypothesis
 from analysis.population import Group
 
-__all__ = ["HEAT", "groups_about", "groups_along"]
+__all__ = ["HEAT", "groups_about", "groups_along", "groups_around"]
 
-HEAT = 8.0
+HEAT = 12.0
 """Neighbouring points of a sweep err together: a likelihood counts about so many for one."""
 
 _RATIOS = 10
@@ -25,6 +26,9 @@ _RATIOS = 10
 
 _FIRST_RATIO_REACH, _FIRST_SIZE_REACH = 0.14, 0.06
 _RATIO_REACH, _JITTER = 0.1, 0.01
+_WIDE, _LEAST_STD = 2.0, 0.015
+"""Reach about a learned answer in its standard deviations, and the least of those."""
+
 _BEYOND, _CLOUD = 0.3, 250
 """How far beyond what was simulated to look, as a share of it, and at how many places."""
 
@@ -60,6 +64,24 @@ def groups_along(candidate: Candidate, groups: int, rng: np.random.Generator) ->
         sizes = place[1:] + _JITTER * rng.uniform(-1.0, 1.0, len(place) - 1)
         ratios = _ratios(place[0], _RATIO_REACH, rng)
         yield Group(candidate.hypothesis, ratios, np.clip(sizes, 0.0, 1.0))
+
+
+def groups_around(
+    hypothesis: Hypothesis, found: Calibrated, groups: int, rng: np.random.Generator
+) -> Iterator[Group]:
+    """Groups evenly about an answer that was learned from runs, a few of its errors wide.
+
+    A regression leans towards where its runs are; these lie alike on all sides.
+    """
+    std = np.maximum(np.sqrt(np.diag(found.covariance)), _LEAST_STD)
+    for step in rng.permutation(groups):
+        offset = _WIDE * rng.uniform(-1.0, 1.0, hypothesis.d - 1)
+        offset[:1] = _WIDE * (2.0 * (step + rng.uniform()) / groups - 1.0)
+        sizes = found.mean[1:] + offset * std[1:]
+        # Where size and ratio trade off, the ratio that goes with this size.
+        lean = float(np.sum(found.covariance[1:, 0] * offset / std[1:]))
+        ratios = _ratios(found.mean[0] + lean, max(_WIDE * std[0], _RATIO_REACH), rng)
+        yield Group(hypothesis, ratios, np.clip(sizes, 0.0, 1.0))
 
 
 def _ratios(ratio: float, reach: float, rng: np.random.Generator) -> NDArray[np.float64]:

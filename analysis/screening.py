@@ -106,9 +106,8 @@ def _joined(
 def _surface(coarse: Observation, population: Population) -> Surface:
     width = np.array(_WIDTHS[population.places.shape[1]])
     none = np.empty((0, 3, len(coarse)))
-    return Surface(
-        coarse, population.places, differences(coarse, population), width, none, np.empty(0)
-    )
+    difference = differences(coarse, population)
+    return Surface(coarse, population.places, difference, width, none, np.empty(0), tailed=False)
 
 
 def _grid(d: int, ratios: int | None = None) -> NDArray[np.float64]:

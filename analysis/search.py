@@ -18,9 +18,10 @@ from analysis.atlas import Atlas, coarse_stride, make_atlas
 from analysis.candidate import Candidate, Effects, form_candidates
 from analysis.causes import Hypothesis
 from analysis.observation import Observation
-from analysis.placement import groups_about, groups_along
+from analysis.placement import groups_about, groups_along, groups_around
 from analysis.population import Group, Population, simulate_groups
 from analysis.screening import screen_pairs, screen_singles
+from analysis.sizing import size_candidate
 from sim.unit import Unit
 
 __all__ = ["search_causes"]
@@ -81,7 +82,7 @@ def search_causes(
     third = _with_baseline(rough.leading(_THIRD, _TOO_FAR))
     fine.take_over([rough.found[key] for key in third], _THIRD_GROUPS)
     leader, *near = fine.leading(len(third), _FAR)
-    fine.look_closer([leader, *(key for key in near if not key)], _LAST_GROUPS)
+    fine.settle([leader, *(key for key in near if not key)], _LAST_GROUPS)
     fine.look_closer([key for key in near if key][:1], _RIVAL_GROUPS)
     return sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
 
@@ -159,6 +160,20 @@ class _Hunt:
         """Simulate candidates that were formed on other rows."""
         self._simulate([g for c in candidates for g in groups_along(c, groups, self._rng)])
         self._form({c.hypothesis.effects: c.best.place for c in candidates})
+
+    def settle(self, chosen: Sequence[Effects], groups: int) -> None:
+        """Simulate more of some candidates, about what their runs tell of their parameters."""
+        found = [self.found[key] for key in chosen]
+        self._simulate(
+            [
+                group
+                for c in found
+                for group in groups_around(
+                    c.hypothesis, size_candidate(c, self._observation, self._rng), groups, self._rng
+                )
+            ]
+        )
+        self._form({key: self.found[key].best.place for key in chosen})
 
     def look_closer(self, chosen: Sequence[Effects], groups: int) -> None:
         """Simulate more of some candidates, along the places that agree."""

@@ -41,6 +41,8 @@ _STRIDES = (0.5, 0.25, 0.12, 0.06)
 _TAIL = 4.0
 """Degrees of freedom of Student's t, whose variance is _TAIL / (_TAIL - 2) of its scale squared."""
 
+_TAIL_ITERATIONS = 5
+
 _SCALE = float(np.sqrt((_TAIL - 2.0) / _TAIL))
 
 
@@ -89,6 +91,8 @@ class Surface:
         (k,): prior standard deviations of the deviations.
     quadratic
         Whether the regression bends along each coordinate.
+    tailed
+        Whether scatter is fitted as Student's t (slower) or as a mean square.
     """
 
     observation: Observation
@@ -98,6 +102,7 @@ class Surface:
     slopes: NDArray[np.float64]
     sigmas: NDArray[np.float64]
     quadratic: bool = False
+    tailed: bool = True
 
     def scan(self, grid: NDArray[np.float64]) -> NDArray[np.float64]:
         """Log-likelihood (count,) at places (count, d), deviations left in the scatter."""
@@ -117,7 +122,13 @@ class Surface:
         coefficients = hat @ flat
         used = float(np.einsum("ij,ji->", hat, basis * weight[:, None]))
         total = float(weight.sum())
-        variance = weight @ (flat - basis @ coefficients) ** 2 / max(total - used, 0.3 * total)
+        squares = (flat - basis @ coefficients) ** 2
+        variance = weight @ squares / total
+        for _ in range(_TAIL_ITERATIONS if self.tailed else 0):
+            # The scale of Student's t, which a few runs far out do not blow up.
+            trust = (_TAIL + 1.0) / (_TAIL + squares / (_SCALE**2 * variance + 1e-12))
+            variance = weight @ (trust * squares) / (_SCALE**2 * total)
+        variance *= total / max(total - used, 0.3 * total)
         shape = self.difference.shape[1:]
         variance = variance.reshape(shape) @ self._blur * (1.0 + float(hat[0] @ hat[0]))
         return coefficients[0].reshape(shape) + self._unread, np.sqrt(variance + self._least)

@@ -22,6 +22,9 @@ __all__ = ["Judged", "Verdict", "judge_candidates"]
 
 Word = Literal["consistent", "explained", "ambiguous", "unexplained"]
 
+_HELD_OUT = 0.25
+"""Weight of what is predicted of levels not fitted beside what fits; alone it is too rough."""
+
 _PER_PARAMETER = 8.0
 """Log-likelihood that every further parameter must bring: it can always fit something."""
 
@@ -35,13 +38,13 @@ _EDGE = 0.02
 _WITHIN_TOLERANCE = 40.0
 """Cost of a datasheet value so little off that its tolerance covers it: that is no cause."""
 
-_FALSE_ALARM = 15.0
+_FALSE_ALARM = 20.0
 """By so much must a cause beat the baseline beyond its costs."""
 
 _TIE = 12.0
 """Within so much of the best, a set is a rival."""
 
-_UNLIKE = 3.0
+_UNLIKE = 3.5
 """A fit worse than own runs' by more standard deviations than this is no explanation."""
 
 _JUDGED = 6
@@ -95,9 +98,9 @@ def judge_candidates(
 ) -> Verdict:
     """Judge the leading candidates and the baseline.
 
-    The score is the mean of the log-likelihood of all rows and of that of every
-    level predicted from the others: the first uses all that was measured, the
-    second pays for nothing that does not carry over.
+    The score weighs the log-likelihood of all rows with that of every level
+    predicted from the others: the first uses all that was measured, the second
+    pays for nothing that does not carry over.
     """
     chosen = list(candidates[:_JUDGED])
     chosen += [c for c in candidates[_JUDGED:] if not c.hypothesis.effects]
@@ -131,4 +134,5 @@ def _score(candidate: Candidate, held_out: HeldOut) -> float:
     cost = _PER_CAUSE * causes + _PER_PARAMETER * len(sizes) + _AT_BOUND * bound
     if any(candidate.hypothesis.within_tolerance(candidate.best.place)):
         cost += _WITHIN_TOLERANCE
-    return 0.5 * (candidate.best.log_likelihood + held_out.score) - cost
+    agreed = (1.0 - _HELD_OUT) * candidate.best.log_likelihood + _HELD_OUT * held_out.score
+    return agreed - cost

@@ -1,0 +1,35 @@
+"""How large the parameters of a candidate are, and how sure that is.
+
+Owns the step from a candidate's runs to its coordinates with honest errors; the
+method is that of the estimate (`analysis.calibration`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.calibration import Calibrated, calibrate
+from analysis.candidate import Candidate
+from analysis.emulator import Emulator
+from analysis.observation import Observation
+
+__all__ = ["size_candidate"]
+
+
+def size_candidate(
+    candidate: Candidate, observation: Observation, rng: np.random.Generator
+) -> Calibrated:
+    """Mean (d,) and covariance (d, d) of the coordinates, from runs left out in turn."""
+    runs, surface = candidate.population, candidate.surface
+    emulator = Emulator(
+        runs.places,
+        runs.deviations,
+        runs.channels(observation),
+        observation.blocks,
+        surface.width,
+        surface.sigmas,
+    )
+    found = calibrate(observation, emulator, rng)
+    return replace(found, mean=np.clip(found.mean, 0.0, 1.0))

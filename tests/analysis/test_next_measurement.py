@@ -1,0 +1,69 @@
+import numpy as np
+import pytest
+
+import analysis.next_measurement as module
+from analysis.next_measurement import NextMeasurement, propose_measurement
+from daq.plan import SweepPlan
+from synthetic import ADSS, LEVELS, candidate, observation, read
+
+SEEN = observation(read(("load-inertia",), np.array([0.5, 0.5]), np.random.default_rng(0)))
+FIRST, SECOND = (candidate(SEEN, (e,)) for e in ("load-inertia", "shaft-stiffness"))
+
+
+def proposed(monkeypatch, judge):
+    tried = []
+
+    def separation(unit, first, second, plan, noise_v, rng):
+        tried.append(plan)
+        return judge(plan)
+
+    monkeypatch.setattr(module, "_separation", separation)
+    return propose_measurement(ADSS, FIRST, SECOND, SEEN), tried
+
+
+def test_every_plan_lies_within_the_limits_and_the_choice_is_wide(monkeypatch):
+    _, tried = proposed(monkeypatch, lambda plan: 1.0)
+    for plan in tried:
+        assert plan.levels_vpk[0] + abs(plan.dc_offset_v) <= ADSS.limits.source_vpk
+        assert plan.frequencies_hz[0] >= ADSS.limits.start_hz
+        assert plan.frequencies_hz[-1] <= ADSS.limits.stop_hz
+    assert {plan.direction for plan in tried} == {"up", "down"}
+    assert any(plan.dc_offset_v for plan in tried)
+    assert min(plan.levels_vpk[0] for plan in tried) < LEVELS[0]
+    assert max(plan.levels_vpk[0] for plan in tried) > LEVELS[-1]
+
+
+def test_the_plan_that_parts_them_furthest_is_taken(monkeypatch):
+    found, _ = proposed(monkeypatch, lambda plan: 5.0 if plan.dc_offset_v else 1.0)
+    assert found.plan.dc_offset_v > 0.0
+    assert found.expected_sigma == 5.0
+    assert found.separates == ("load-inertia", "shaft-stiffness")
+
+
+def test_a_cheaper_plan_that_does_nearly_as_well_is_preferred(monkeypatch):
+    found, tried = proposed(monkeypatch, lambda plan: 4.0 - 1e-3 * plan.duration_s)
+    assert found.plan.duration_s == min(plan.duration_s for plan in tried)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.5])
+def test_measure_takes_the_plan_as_it_is_printed(offset):
+    from tui.cli import build_app
+
+    plan = SweepPlan(tuple(np.linspace(80.0, 200.0, 31)), (0.75,), "down", dc_offset_v=offset)
+    words = NextMeasurement("ADSS", plan, ("a", "b"), 3.0).command.split()
+    assert words.pop(0) == "lashbench"
+    words[words.index("URL")] = "sim:"
+    _, bound, _ = build_app().parse_args(words, exit_on_error=False, print_error=False)
+    given = bound.arguments
+    assert (given["level"], given["start"], given["stop"], given["points"]) == ([0.75], 80, 200, 31)
+    assert given["direction"] == "down"
+    assert given.get("offset", 0.0) == offset
+
+
+def test_two_models_that_differ_are_parted_by_a_real_simulation():
+    far = module._separation(
+        ADSS, FIRST, SECOND,
+        SweepPlan(tuple(np.linspace(110.0, 150.0, 4)), (2.0,), settle_cycles=3, integrate_cycles=4),
+        5e-4, np.random.default_rng(0),
+    )  # fmt: skip
+    assert np.isfinite(far) and far > 0.0
