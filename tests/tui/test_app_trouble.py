@@ -1,4 +1,4 @@
-"""The bench screen when things go wrong: stops, aborts, broken wires, killed programs, overloads."""
+"""The bench screen when things go wrong: stops, broken wires, killed programs, overloads."""
 
 import asyncio
 import subprocess

@@ -159,10 +159,12 @@ class Desk:
         if self.unit is None:
             raise InputError("no unit is chosen; choose one in step 1")
         fresh = self.resume is None
+        # A plan that came whole is no recipe's, so a recipe's limits are not its limits.
+        recipe = self.recipe if fresh and self.given_plan is None else None
         options = self._options() if fresh else PlanOptions()
         request = session_request(
             options, self.unit_name, self.unit, self.url, self.db,
-            recipe=self.recipe if fresh else None, bench="default",
+            recipe=recipe, bench="default",
             resume=self.resume, remeasure=remeasure_hz, run_in=None,
             remarks={"serial": self.serial, "operator": self.operator, "notes": self.notes},
         )  # fmt: skip
@@ -187,6 +189,10 @@ class Desk:
         return header.plan
 
     def _options(self) -> PlanOptions:
+        if self.given_plan is not None:
+            plan = self.given_plan
+            lowest, highest = min(plan.frequencies_hz), max(plan.frequencies_hz)
+            return PlanOptions(plan.levels_vpk, lowest, highest, len(plan.frequencies_hz))
         if self.options.given or self.recipe is not None:
             return self.options
         return _WITHOUT_RECIPE

@@ -54,15 +54,14 @@ def levels_words(plan: SweepPlan) -> str:
 def point_words(stored: StoredPoint) -> str:
     """A point as a line: frequency, level, gain, error, phase, what is odd."""
     point = stored.point
+    odd = "".join(f" {words.upper()}" for flag, _, words in FLAG_MARKS if point.flags & flag)
+    where = f"{point.frequency_hz:.2f} Hz at {stored.source_vpk:g} V:"
     size = abs(point.gain)
-    gain = f"{20 * math.log10(size):.2f}" if size > 0 and math.isfinite(size) else "no reading"
+    if not (size > 0 and math.isfinite(size)):
+        return f"{where} no reading{odd}"
     error = "" if point.gain_std_db is None else f" +-{point.gain_std_db:.2f}"
     angle = math.degrees(math.atan2(point.gain.imag, point.gain.real))
-    odd = "".join(f" {words.upper()}" for flag, _, words in FLAG_MARKS if point.flags & flag)
-    return (
-        f"{point.frequency_hz:.2f} Hz at {stored.source_vpk:g} V: {gain}{error} dB "
-        f"{angle:.0f} deg{odd}"
-    )
+    return f"{where} {20 * math.log10(size):.2f}{error} dB {angle:.0f} deg{odd}"
 
 
 def span_words(seconds: float) -> str:

@@ -56,6 +56,7 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
         """The plan, and every check told so far."""
         self.query_one("#plan", Static).update(self._plan_text())
         self.query_one("#checks", Static).update("\n".join(self._lines()))
+        self.query_one("#lines", VerticalScroll).scroll_end(animate=False)
 
     def hint(self) -> str:
         """Check, or go on."""

@@ -29,6 +29,10 @@ _VERDICTS = {
 }
 
 
+_DEPARTURES = 4
+"""The strongest departures of the plain model that are shown."""
+
+
 class DiagnosisScreen(StepScreen):
     """Residual before and after, causes, rivals, the next measurement."""
 
@@ -144,6 +148,9 @@ def diagnosis_lines(document: Mapping[str, Any]) -> list[str]:
     gain = (document.get("gain") or {}).get("held_out_rms_ratio")
     if gain is not None:
         lines.append(f"gain             {gain:.2f} of the residual is left (1.00: nothing gained)")
+    if document.get("shape"):
+        lines.append(f"left by the plain model: {document['shape']}")
+    lines += [f"  {_departure(part)}" for part in document.get("residual", ())[:_DEPARTURES]]
     lines += ["", "Causes" if document["causes"] else "Causes: none named"]
     for rank, cause in enumerate(document["causes"], start=1):
         lines.append(f" {rank}. {cause['effect']}  probability {cause['probability']:.2f}")
@@ -157,6 +164,7 @@ def diagnosis_lines(document: Mapping[str, Any]) -> list[str]:
     if ratio:
         lines += ["", f"contribution ratio before {_value(ratio['baseline'])}, "
                   f"after {_value(ratio['extended'])}"]  # fmt: skip
+    lines += [f"warning: {text}" for text in document.get("warnings", ())]
     proposed = document.get("next_measurement")
     if proposed:
         apart = " from ".join(proposed["separates"])
@@ -169,7 +177,9 @@ def _explained(effect: str) -> str:
     from sim.catalogue import CATALOGUE
 
     known = CATALOGUE.get(effect)
-    return "" if known is None else f"{known.meaning.rstrip('.')}."
+    if known is None:
+        return ""
+    return f"{known.meaning.rstrip('.')}; on the bench: {known.bench_cause.rstrip('.')}."
 
 
 def _parameters(parameters: Mapping[str, Any]) -> str:
@@ -178,6 +188,14 @@ def _parameters(parameters: Mapping[str, Any]) -> str:
         for name, number in parameters.items()
     ]
     return f" {', '.join(parts)}" if parts else ""
+
+
+def _departure(part: Mapping[str, Any]) -> str:
+    low, high = part["band_hz"]
+    return (
+        f"{part['quantity']} {part['mean']:+.2g} from {low:.0f} to {high:.0f} Hz at "
+        f"{part['source_vpk']:g} V ({abs(part['sigma']):.1f} standard errors)"
+    )
 
 
 def _residual(part: Mapping[str, Any]) -> str:

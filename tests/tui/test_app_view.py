@@ -1,0 +1,197 @@
+"""What the bench screen keeps and draws, without a session behind it."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from screen import DIAGNOSIS, operated, run, text_of
+
+from daq import session_events as kinds
+from daq.analyser import SourceState, SweepPoint
+from daq.errors import InputError
+from daq.frf import FrequencyResponse, PointFlag
+from daq.plan import SweepPlan
+from daq.store_records import StoredPoint
+from tui.app.desk import plan_of_document
+from tui.app.run_view import RunView, source_words
+from tui.app.screens.diagnosis_screen import diagnosis_lines
+from tui.app.widgets.axes import DegreeAxis, LogHertzAxis
+from tui.app.widgets.traces import legend, traces_of_points, traces_of_response
+
+PLAN = SweepPlan((100.0, 110.0, 120.0), (1.5, 2.5))
+
+
+def stored(hertz=100.0, level=1.5, gain=0.5 + 0j, flags=0, number=1):
+    return StoredPoint(
+        number, level, hertz, SweepPoint(hertz, gain, 0.2, 1.0, PointFlag(flags)), ""
+    )
+
+
+def told(*events, hold=False):
+    run_view = RunView(hold=hold)
+    run_view.begin()
+    for event in events:
+        run_view.take(event)
+    return run_view
+
+
+OPENED = kinds.Opened(7, PLAN, 0, 6, 12.0)
+SOURCE_OFF = kinds.CheckLine("source", "pass", "confirmed off")
+
+
+def test_the_trial_point_is_not_called_off():
+    assert told(OPENED).source_text == "SOURCE not asked yet"
+    assert told(OPENED, SOURCE_OFF).source_text == "SOURCE ON at 1.5 V peak"
+    held = told(OPENED, SOURCE_OFF, kinds.Paused(SourceState.CONFIRMED_OFF), hold=True)
+    assert held.phase == "ready"
+    assert held.source_text == "SOURCE OFF (confirmed)"
+
+
+@pytest.mark.parametrize("state", [SourceState.UNCONFIRMED, SourceState.UNKNOWN])
+def test_a_source_that_is_not_proven_off_says_what_to_do(state):
+    assert "switch it off by hand" in told(OPENED, kinds.SourceSafe(state)).source_text
+
+
+def test_a_source_found_on_names_no_level_but_a_remedy():
+    assert source_words(SourceState.ON) == "SOURCE ON: switch it off by hand"
+
+
+def test_a_session_that_dies_while_driving_leaves_the_source_unknown():
+    view = told(OPENED, SOURCE_OFF, kinds.LevelStarted(2.5, 3))
+    assert view.source_text == "SOURCE ON at 2.5 V peak"
+    view.end(RuntimeError("gone"))
+    assert view.source is SourceState.UNKNOWN
+    assert not view.live
+
+
+def test_a_pause_in_the_sweep_is_no_hold_before_it():
+    view = told(
+        OPENED, SOURCE_OFF, kinds.Paused(SourceState.CONFIRMED_OFF), kinds.GoingOn(),
+        kinds.LevelStarted(1.5, 3), kinds.PointStored(stored(), 1, 6, 0.5, 2.0),
+        kinds.Paused(SourceState.CONFIRMED_OFF), hold=True,
+    )  # fmt: skip
+    assert view.phase == "paused"
+    assert view.done == 1
+
+
+def test_a_stop_that_was_asked_for_is_said_until_it_is_done():
+    view = told(OPENED, SOURCE_OFF, kinds.LevelStarted(2.5, 3))
+    view.stop_asked = True
+    assert view.source_text == "STOP REQUESTED, SOURCE ON at 2.5 V peak"
+
+
+def test_a_point_measured_again_takes_the_place_of_the_old_one():
+    view = told(OPENED)
+    view.preload([stored(gain=0.1 + 0j)])
+    view.take(kinds.PointStored(stored(gain=0.9 + 0j, number=9), 1, 6, 0.5, 2.0))
+    assert [point.id for point in view.points.values()] == [9]
+
+
+def test_traces_never_bridge_a_spoilt_point_and_mark_flags_by_shape():
+    points = [
+        stored(100.0), stored(110.0, flags=PointFlag.OVERLOAD), stored(120.0, gain=complex("nan"),
+        flags=PointFlag.SPOILT), stored(130.0, flags=PointFlag.NOT_PERIODIC), stored(140.0),
+        stored(100.0, 2.5),
+    ]  # fmt: skip
+    low, high = traces_of_points(points, (1.5, 2.5))
+    assert low.marks == ["o", "!", "?", "~", "o"]
+    assert [(run.start, run.stop) for run in low.runs] == [(0, 2), (3, 5)]
+    assert high.mark != low.mark
+    words = legend([low, high])
+    for word in ("o 1.5 V", "x 2.5 V", "! overload", "? spoilt", "~ not periodic"):
+        assert word in words
+    assert "coarse" not in words
+
+
+def test_a_response_is_drawn_with_its_levels_and_as_a_reference():
+    response = FrequencyResponse.from_arrays(
+        [100.0, 110.0, 100.0, 110.0], [1.0, 1.0, 2.0, 2.0], [1, 10, 1, 1], unit="ADSS"
+    )
+    one, two = traces_of_response(response)
+    np.testing.assert_allclose(one.gain_db, [0.0, 20.0])
+    assert (one.name, two.name) == ("1 V", "2 V")
+    assert all(trace.reference for trace in traces_of_response(response, "#3"))
+    assert "line #3 1 V" in legend(traces_of_response(response, "#3"))
+
+
+@pytest.mark.parametrize(
+    ("band", "ticks"),
+    [
+        ((10.0, 1000.0), ["10", "20", "50", "100", "200", "500", "1000"]),
+        ((100.0, 180.0), ["100", "120", "140", "160", "180"]),
+        ((130.0, 131.0), ["130", "130.2", "130.4", "130.6", "130.8", "131"]),
+    ],
+)
+def test_frequency_ticks_are_round(band, ticks):
+    axis = LogHertzAxis()
+    low, high = np.log10(band)
+    places = axis.get_ticks(low - 1e-9, high + 1e-9, 8)
+    assert axis.get_labels_for_ticks(places) == ticks
+
+
+def test_phase_ticks_are_parts_of_a_turn():
+    assert DegreeAxis().get_ticks(-190, 190, 5) == [-180.0, -90.0, 0.0, 90.0, 180.0]
+
+
+def test_a_proposed_plan_is_read_in_both_forms_and_refused_in_others():
+    whole = dataclasses.asdict(PLAN)
+    assert plan_of_document(whole) == PLAN
+    band = {"levels_vpk": [2.0], "start_hz": 100.0, "stop_hz": 120.0, "points": 3}
+    assert plan_of_document(band).frequencies_hz == (100.0, 110.0, 120.0)
+    for bad in ({}, {"levels_vpk": [2.0]}, band | {"levels_vpk": ["x"]}, band | {"points": 0}):
+        with pytest.raises(InputError):
+            plan_of_document(bad)
+
+
+def test_a_diagnosis_is_told_with_causes_rivals_and_what_next():
+    text = "\n".join(diagnosis_lines(DIAGNOSIS))
+    for words in (
+        "VERDICT: AMBIGUOUS", "before  4.2 standard errors, 1.9 dB", "load-inertia",
+        "J_L = 0.0031 +- 0.0001 kg.m^2", "shaft-stiffness  probability 0.41", "MEASURE THIS NEXT",
+    ):  # fmt: skip
+        assert words in text
+    nothing = DIAGNOSIS | {"verdict": "unexplained", "causes": [], "rivals": [],
+                           "next_measurement": None}  # fmt: skip
+    text = "\n".join(diagnosis_lines(nothing))
+    assert "Causes: none named" in text
+    assert "NEXT" not in text
+
+
+def test_without_colour_everything_is_still_said(tmp_path, monkeypatch):
+    async def way():
+        async with operated(tmp_path / "bench.db") as op:
+            await op.connects("sim:")
+            await op.sees("SIMULATED | SOURCE OFF (confirmed) | ADSS", "[2 Instrument]")
+            strips = op.app.screen._compositor.render_strips()
+            colours = {
+                (segment.style.color, segment.style.bgcolor)
+                for strip in strips for segment in strip if segment.style
+            }  # fmt: skip
+            for front, back in colours:
+                for colour in (front, back):
+                    if colour is not None:
+                        red, green, blue = colour.get_truecolor()
+                        assert max(red, green, blue) - min(red, green, blue) <= 1
+                assert front is None or back is None or front != back
+
+    monkeypatch.setenv("NO_COLOR", "1")
+    run(way)
+
+
+@pytest.mark.parametrize("size", [(60, 18), (80, 24)])
+def test_small_terminals_keep_banner_hint_and_keys(tmp_path, size):
+    async def way():
+        async with operated(tmp_path / "bench.db", size) as op:
+            await op.connects("sim:")
+            await op.plans()
+            await op.checks()
+            await op.press("ctrl+n", "s")
+            await op.sees("complete", "SIMULATED | SOURCE OFF (confirmed)", "^x STOP", "> ")
+            await op.press("f1")
+            await op.sees("Step 4: sweep", "starts the sweep")
+            await op.press("escape", "ctrl+p")
+            await op.press(*"stop")
+            await op.sees("Source: stop")
+            assert text_of(op.app)
+
+    run(way)
