@@ -14,6 +14,7 @@ from screen import nothing_found, operated
 from tui.app.analyses import Analyses
 
 SIZE = (104, 34)
+"""A size that reads well in a page."""
 PATIENCE_S = 600.0
 
 
@@ -28,12 +29,13 @@ async def take(folder: Path, db: Path) -> None:
     """Sweep, result, and the diagnosis where there is one."""
     async with operated(db, SIZE, analyses=Analyses(), find=nothing_found) as op:
 
-        def picture(name: str) -> None:
+        async def picture(name: str) -> None:
             op.app.clear_notifications()
+            await op.pilot.pause(0.3)
             svg = op.app.export_screenshot(title="lashbench", simplify=True)
             (folder / f"screen-{name}.svg").write_text(svg, encoding="utf-8")
 
-        await op.connects("sim:?ratio=0.3&seed=1")
+        await op.connects("sim:?ratio=0.3&seed=1&effect=load-viscous-damping:B_L=0.012")
         await op.plans(levels="1.5 2.5", start="108", stop="172", points="33", cycles=("20", "30"))
         await op.checks()
         await op.press("ctrl+n")
@@ -41,17 +43,17 @@ async def take(folder: Path, db: Path) -> None:
         await op.press("s")
         await op.sees("Paused")
         await holding
-        picture("sweep")
+        await picture("sweep")
         await op.press("space")
         await op.sees("complete", within_s=PATIENCE_S)
         await op.press("ctrl+n")
         await op.sees("contribution ratio r", within_s=PATIENCE_S)
-        picture("result")
+        await picture("result")
         await op.press("ctrl+n", "d")
         while not ("VERDICT" in op.screen or "NO DIAGNOSIS" in op.screen):
             await op.pilot.pause(0.5)
         if "VERDICT" in op.screen:
-            picture("diagnosis")
+            await picture("diagnosis")
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from textual.app import App, SystemCommand
 from textual.binding import Binding, BindingType
-from textual.screen import Screen
+from textual.screen import ModalScreen, Screen
 
 from daq.errors import LashbenchError
 from daq.session_events import Finished, PointStored, RunIn
@@ -27,7 +27,8 @@ from tui.app import bench_owner, messages
 from tui.app.analyses import Analyses
 from tui.app.analysis_keeper import AnalysisKeeper
 from tui.app.desk import Desk
-from tui.app.dialogs import Dialog, ErrorDialog, HelpDialog, QuestionDialog
+from tui.app.dialogs import ErrorDialog, HelpDialog, QuestionDialog
+from tui.app.run_view import RunView
 from tui.app.screens import SCREENS
 from tui.app.screens.instrument_screen import InstrumentScreen
 from tui.app.session_keeper import SessionKeeper
@@ -102,7 +103,7 @@ class BenchApp(App[int]):
 
     def go(self, step: int) -> None:
         """Put a step on top, if what it needs is there; else say what is missing."""
-        if not 1 <= step <= len(STEPS) or isinstance(self.screen, Dialog):
+        if not 1 <= step <= len(STEPS) or isinstance(self.screen, ModalScreen):
             return
         missing = self._missing(step)
         if missing:
@@ -223,12 +224,15 @@ class BenchApp(App[int]):
         self._close_messages_no_wait()
 
     def _listen_to_signals(self) -> None:
-        if threading.current_thread() is not threading.main_thread():
+        if self.is_headless or threading.current_thread() is not threading.main_thread():
             return
         loop = asyncio.get_running_loop()
         for name in ("SIGTERM", "SIGHUP"):
             with suppress(AttributeError, NotImplementedError, RuntimeError, ValueError):
                 loop.add_signal_handler(getattr(signal, name), self._end_and_leave)
+        if hasattr(signal, "SIGTSTP"):
+            # A halted program would leave the source driving.
+            signal.signal(signal.SIGTSTP, signal.SIG_IGN)
 
     # ------------------------------------------------------------ sessions
 
@@ -351,8 +355,15 @@ class BenchApp(App[int]):
         except LashbenchError as error:
             self.show_error("The measurement cannot be opened", error)
             return
+        self.desk.resume = self.desk.given_plan = None
         self.analyses.view(measurement.id)
         self.go(5)
+
+    def put_away(self) -> None:
+        """Another unit is on the desk: results and session of the one before are not about it."""
+        self.desk.run = RunView(source=self.desk.run.source)
+        self.desk.reference = None
+        self.analyses.view(None)
 
     # ------------------------------------------------------------ drawing
 

@@ -125,6 +125,13 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
     def _take_plan(self, options: PlanOptions | None) -> None:
         if options is None:
             return
+        # A session that holds on the old plan leaves its own on the desk when it ends.
+        if self.desk.run.phase == "ready":
+            self.bench.keeper.finish_then(lambda: self._apply(options))
+        else:
+            self._apply(options)
+
+    def _apply(self, options: PlanOptions) -> None:
         desk = self.desk
         before = desk.options, desk.given_plan, desk.resume
         desk.options, desk.given_plan, desk.resume = options, None, None
@@ -133,9 +140,6 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
         except LashbenchError as error:
             desk.options, desk.given_plan, desk.resume = before
             self.bench.show_error("The plan is refused; the old one stays", error)
-        else:
-            if desk.run.phase == "ready":
-                self.bench.keeper.finish_then(self.show)
         self.show()
 
     def _plan_text(self) -> str:
@@ -146,6 +150,7 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
             return f"REFUSED: {error}"
         if desk.resume is not None:
             lines.append(f"going on with measurement {desk.resume}: only missing points are taken")
+            lines.append("P: a new plan, and a new measurement, in its place")
         if desk.options.adaptive:
             lines.append("then refined around anti-resonance and resonance")
         return "\n".join(lines)

@@ -151,6 +151,7 @@ contribution ratio of every estimated session with its error bar. U lists all un
     def action_trend(self) -> None:
         """Back to the trend."""
         self.remove_class("-overlay")
+        self.show()
 
     def action_units(self) -> None:
         """Sessions of this unit, or all."""

@@ -176,11 +176,14 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
         if self.bench.keeper.busy and name != self.desk.unit_name:
             self.notify("a session is under way; its unit stays", severity="warning")
             return False
+        changes = name != self.desk.unit_name
         try:
             self.desk.choose_unit(name)
         except LashbenchError as error:
             self.bench.show_error("The unit file cannot be used", error)
             return False
+        if changes:
+            self.bench.put_away()
         self.show()
         return True
 

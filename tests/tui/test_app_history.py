@@ -1,0 +1,139 @@
+"""The bench screen with sessions behind it: reference, trend, overlay, opening, the palette."""
+
+import logging
+
+import pytest
+from screen import ESTIMATE, operated, quick_analyses, run
+
+from daq.store import Store
+from tui.app.log_file import log_path, logging_to_file
+from tui.cli import main
+
+SHORT = ["--settle-cycles", "3", "--integrate-cycles", "3", "--serial", "SN 7"]
+BAND = ["--level", "2.5", "--start", "120", "--stop", "160", "--points", "9"]
+
+
+@pytest.fixture
+def db(tmp_path):
+    """Two complete sessions, the first of them estimated."""
+    path = tmp_path / "bench.db"
+    words = ["measure", "--unit", "adss", "--db", str(path), *BAND, *SHORT]
+    for seed in (1, 2):
+        assert main([*words, "--instrument", f"sim:?seed={seed}"]) == 0
+    with Store(path) as store:
+        store.add_estimate(1, "test", ESTIMATE)
+    return path
+
+
+def test_trend_overlay_and_opening(db):
+    asked = []
+
+    def estimate(response, unit, progress):
+        asked.append(unit.name)
+        return ESTIMATE
+
+    async def way():
+        analyses = quick_analyses(estimate=estimate)
+        async with operated(db, (120, 40), analyses=analyses) as op:
+            await op.press("7")
+            screen = await op.sees("[7 Report]", "0.31+-0.05", "oldest first")
+            assert "ADSS SN 7 SIM." in screen
+            await op.press("o")
+            await op.sees("mark two sessions first")
+            await op.press("space", "down", "space", "o")
+            await op.sees("o 2.5 V", "line #2 2.5 V")
+            await op.press("t")
+            await op.sees("oldest first")
+            await op.press("enter")
+            await op.sees("[5 Result]", "measurement 1, SIMULATED", "r = 0.310")
+            assert asked == []
+            await op.press("7", "up", "enter")
+            await op.sees("[5 Result]", "measurement 2, SIMULATED", "r = 0.310")
+            assert asked == ["ADSS"]
+
+    run(way)
+    with Store(db, read_only=True) as store:
+        assert set(store.latest_estimates()) == {1, 2}
+
+
+def test_an_earlier_session_stands_behind_the_sweep(db):
+    async def way():
+        async with operated(db) as op:
+            await op.connects("sim:")
+            await op.plans()
+            await op.checks()
+            await op.press("ctrl+n", "l")
+            await op.sees("line #2 2.5 V")
+            await op.press("l")
+            await op.sees("no points yet")
+
+    run(way)
+
+
+def test_another_unit_takes_results_of_the_first_off_the_desk(db):
+    async def way():
+        async with operated(db) as op:
+            await op.press("7", "enter")
+            await op.sees("[5 Result]", "r = 0.310")
+            await op.press("1")
+            op.app.screen.query_one("#units").focus()
+            await op.press("end")
+            await op.sees("EDSS: SI units")
+            await op.press("5")
+            await op.sees("no measurement yet")
+            assert op.app.screen.STEP == 1
+
+    run(way)
+
+
+def test_a_plan_changed_after_the_checks_is_the_one_that_is_swept(db):
+    async def way():
+        async with operated(db) as op:
+            await op.connects("sim:")
+            await op.plans()
+            await op.checks()
+            await op.plans(start="125", stop="150", points="6")
+            await op.checks()
+            await op.press("ctrl+n", "s")
+            await op.sees("6 of 6 points stored; complete")
+
+    run(way)
+    with Store(db, read_only=True) as store:
+        plan = store.measurements()[-1].header.plan
+    assert (plan.frequencies_hz[0], len(plan.frequencies_hz)) == (125.0, 6)
+
+
+def test_the_palette_leads_to_every_step_and_copies(db):
+    async def way():
+        async with operated(db) as op:
+            await op.press("ctrl+p", *"report", "enter")
+            await op.press("ctrl+p", *"go to history", "enter")
+            await op.sees("[7 Report]")
+            await op.press("ctrl+y")
+            await op.sees("copied")
+            assert "ADSS SN 7 SIM." in op.app.clipboard
+
+    run(way)
+
+
+def test_the_log_has_the_trace_that_the_screen_leaves_out(db, tmp_path, monkeypatch):
+    def broken(response, unit, progress):
+        raise ZeroDivisionError("by design")
+
+    async def way():
+        analyses = quick_analyses(diagnose=broken)
+        async with operated(db, analyses=analyses, log=log_path()) as op:
+            await op.press("7", "enter")
+            await op.sees("r = 0.310")
+            await op.press("6", "d")
+            screen = await op.sees("NO DIAGNOSIS", "internal fault (ZeroDivisionError)")
+            assert "by design" not in screen
+
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    with logging_to_file() as path:
+        run(way)
+    assert path == tmp_path / "state" / "lashbench" / "lashbench.log"
+    text = path.read_text()
+    assert "Traceback" in text
+    assert "by design" in text
+    assert logging.getLogger("lashbench").handlers == []
