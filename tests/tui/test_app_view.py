@@ -131,6 +131,7 @@ def test_frequency_ticks_are_round(band, ticks):
 
 def test_phase_ticks_are_parts_of_a_turn():
     assert DegreeAxis().get_ticks(-190, 190, 5) == [-180.0, -90.0, 0.0, 90.0, 180.0]
+    assert DegreeAxis(rows=6).get_ticks(-190, 190, 8) == [-180.0, 0.0, 180.0]
 
 
 def test_a_proposed_plan_is_read_in_both_forms_and_refused_in_others():

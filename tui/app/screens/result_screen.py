@@ -85,9 +85,9 @@ least index marks the likeliest ratio. E estimates once more. Ctrl+Y copies ever
         plot = self.query_one(BodePlot)
         traces = [] if results.response is None else traces_of_response(results.response)
         features = [
-            (feature.frequency_hz, "")
+            (feature.frequency_hz, name)
             for level in results.features
-            for feature in (level.arf, level.rf)
+            for name, feature in (("ARF", level.arf), ("RF", level.rf))
             if feature is not None
         ]
         plot.draw(traces, None, features)

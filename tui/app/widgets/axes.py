@@ -60,7 +60,16 @@ class LogHertzAxis(AxisFormatter):
 
 
 class DegreeAxis(AxisFormatter):
-    """Phase ticks at parts of a turn."""
+    """Phase ticks at parts of a turn.
+
+    Parameters
+    ----------
+    rows
+        Height of the axis in lines; two ticks want a line between them.
+    """
+
+    def __init__(self, rows: int = 20) -> None:
+        self._most = max(2, rows // 2)
 
     def get_ticks(self, min_: float, max_: float, max_ticks: int = 8) -> list[float]:
         """Multiples of the smallest step that is not crowded, degrees."""
@@ -70,7 +79,7 @@ class DegreeAxis(AxisFormatter):
                 float(step * count)
                 for count in range(math.ceil(min_ / step), math.floor(max_ / step) + 1)
             ]
-            if len(ticks) <= max(2, max_ticks):
+            if len(ticks) <= min(max(2, max_ticks), self._most):
                 break
         return ticks
 

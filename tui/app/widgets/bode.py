@@ -84,9 +84,7 @@ class BodePlot(Vertical, can_focus=True):
 
     def on_mount(self) -> None:
         """Axes and the first, empty drawing."""
-        phase = self.query_one("#phase", _Panel)
-        phase.set_y_formatter(DegreeAxis())
-        phase.set_ylimits(-190.0, 190.0)
+        self.query_one("#phase", _Panel).set_ylimits(-190.0, 190.0)
         self.draw(self.traces)
 
     def draw(
@@ -164,12 +162,16 @@ class BodePlot(Vertical, can_focus=True):
                 _draw_gain(gain, trace)
                 _draw_phase(phase, trace)
             _fit(gain, self.traces)
+            # The frame takes three lines of it.
+            phase.set_y_formatter(DegreeAxis(phase.size.height - 3))
             for panel in (gain, phase):
-                for hertz, label in self._lines:
-                    panel.add_v_line(float(np.log10(hertz)), "green", label or None)
+                for hertz, _ in self._lines:
+                    panel.add_v_line(float(np.log10(hertz)), "green")
                 if self.cursor_hz is not None:
                     panel.add_v_line(float(np.log10(self.cursor_hz)), "bright_white")
             words = legend(self.traces) or "no points yet"
+            if names := dict.fromkeys(label for _, label in self._lines if label):
+                words += f"  \u2502 {', '.join(names)}"
             unit = "phase, wrapped, deg" if self.has_class("-phase-only") else "gain, dB re 1 V/V"
             self.query_one("#legend-line", Static).update(f"{unit} over Hz   {words}")
 
