@@ -18,7 +18,7 @@ from analysis.population import Group
 
 __all__ = ["HEAT", "groups_about", "groups_along", "groups_around"]
 
-HEAT = 12.0
+HEAT = 15.0
 """Neighbouring points of a sweep err together: a likelihood counts about so many for one."""
 
 _RATIOS = 10
@@ -26,7 +26,7 @@ _RATIOS = 10
 
 _FIRST_RATIO_REACH, _FIRST_SIZE_REACH = 0.14, 0.06
 _RATIO_REACH, _JITTER = 0.1, 0.01
-_WIDE, _LEAST_STD = 2.0, 0.015
+_WIDE, _LEAST_STD = 3.0, 0.015
 """Reach about a learned answer in its standard deviations, and the least of those."""
 
 _BEYOND, _CLOUD = 0.3, 250

