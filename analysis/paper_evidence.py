@@ -128,9 +128,9 @@ class Agreement:
         """Share of readings drawn from the likeliest place that would agree worse, 0 to 1."""
         known = np.isfinite(self.reading.values)
         rng = np.random.default_rng(0)
-        drawn = student.logpdf(
-            rng.standard_t(FREEDOM, size=(4000, int(known.sum()))), FREEDOM
-        ).sum(axis=1)
+        drawn = student.logpdf(rng.standard_t(FREEDOM, size=(4000, int(known.sum()))), FREEDOM).sum(
+            axis=1
+        )
         here = student.logpdf(self.sigma[known], FREEDOM).sum()
         return float(np.mean(drawn < here))
 

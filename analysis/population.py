@@ -16,20 +16,14 @@ from numpy.typing import NDArray
 from scipy.linalg import hadamard
 
 from analysis.causes import Hypothesis
-from analysis.ensemble import TOLERANCES, Machine
+from analysis.ensemble import TOLERANCES, Machine, safe_cycles
 from analysis.observation import Observation, channels_of_readings, readings_of_cycles
-from daq.errors import AnalysisError
-from sim.response import simulate_cycles
 from sim.unit import Unit
 
 __all__ = ["DEVIATING", "Group", "Population", "simulate_groups"]
 
 DEVIATING = ("R_m", "k_t", "J_L", "k_s1", "k_a")
 """Datasheet values whose spread is simulated; that of k_ts scales the gain alone."""
-
-_STEPS_S = (1e-5, 5e-6, 2.5e-6)
-"""The engine shows the same distribution of readings at 10 and at 5 us; it falls back where a
-heavily damped or stiffened shaft needs it."""
 
 _LOT = 12
 """Groups simulated between two reports of progress."""
@@ -159,14 +153,7 @@ def _read(
     mean = np.empty((len(servos), len(observation)), dtype=complex)
     variance = np.empty((len(servos), len(observation)))
     for plan, rows in observation.plans:
-        for step in _STEPS_S:
-            try:
-                cycles = simulate_cycles(servos, plan, longest_step_s=step)
-                break
-            except AnalysisError:
-                if step == _STEPS_S[-1]:
-                    raise
-        for i, one in enumerate(cycles):
+        for i, one in enumerate(safe_cycles(servos, plan)):
             first = one[..., 1].reshape(len(rows), -1)
             mean[i, rows], variance[i, rows] = readings_of_cycles(first)
     return mean, variance

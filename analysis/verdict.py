@@ -89,11 +89,14 @@ class Verdict:
 
     @property
     def rivals(self) -> tuple[Judged, ...]:
-        """Sets within the margin of a tie, the best one left out."""
+        """Sets within the margin of a tie that say something else than the best one."""
+        best = set(self.best.effects)
         return tuple(
             one
             for one in self.judged
-            if one is not self.best and one.effects and one.score > self.best.score - _TIE
+            if one.score > self.best.score - _TIE
+            and not set(one.effects) <= best
+            and not set(one.effects) >= best
         )
 
 
@@ -119,7 +122,7 @@ def judge_candidates(
     ]
     judged.sort(key=lambda one: -one.score)
     (baseline,) = (one for one in judged if not one.effects)
-    best = judged[0]
+    best = _simplest(judged)
     if not best.effects or best.score < baseline.score + _FALSE_ALARM:
         word: Word = "consistent" if baseline.adequate else "unexplained"
         return Verdict(word, baseline, tuple(judged), baseline)
@@ -129,6 +132,16 @@ def judge_candidates(
     if verdict.rivals:
         return Verdict("ambiguous", best, verdict.judged, baseline)
     return verdict
+
+
+def _simplest(judged: Sequence[Judged]) -> Judged:
+    """The best set, or the part of it that does nearly as well: a further cause must earn it."""
+    best = judged[0]
+    for one in judged:
+        part = one.effects and set(one.effects) < set(best.effects)
+        if part and one.adequate and one.score > judged[0].score - _FALSE_ALARM:
+            return one
+    return best
 
 
 def _score(candidate: Candidate, held_out: HeldOut) -> float:

@@ -7,10 +7,10 @@ draw is what nearly every draw gives; how often exactly, the blind study counts.
 import json
 from pathlib import Path
 
+import hidden
 import numpy as np
 import pytest
 
-import hidden
 from analysis.diagnosis import diagnose_response
 from analysis.diagnosis_figures import draw_diagnosis
 from daq.formats import read_response
@@ -57,7 +57,8 @@ def test_a_large_effect_drawn_at_random_is_named(cache):
     assert found.verdict.word in ("explained", "ambiguous")
     assert any(effect in names for names in named)
     assert found.held_out_sigma[1] < 0.8 * found.held_out_sigma[0]
-    assert found.departures and abs(found.departures[0].sigma) > 3.0
+    assert found.departures
+    assert abs(found.departures[0].sigma) > 3.0
     if found.verdict.word == "ambiguous":
         assert found.next_measurement is not None
 
@@ -67,7 +68,8 @@ def test_nothing_is_blamed_where_nothing_is_hidden(cache):
     print(f"seed {seed}")
     found = diagnose_response(response_hiding([], seed), ADSS, cache=cache)
     assert found.verdict.word == "consistent"
-    assert found.causes == () and found.next_measurement is None
+    assert found.causes == ()
+    assert found.next_measurement is None
 
 
 def test_a_cause_that_is_taken_out_is_not_blamed_with_confidence_on_another(cache):

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
+from synthetic import ADSS, LEVELS, candidate, observation, read
 
 import analysis.next_measurement as module
 from analysis.next_measurement import NextMeasurement, propose_measurement
 from daq.plan import SweepPlan
-from synthetic import ADSS, LEVELS, candidate, observation, read
 
 SEEN = observation(read(("load-inertia",), np.array([0.5, 0.5]), np.random.default_rng(0)))
 FIRST, SECOND = (candidate(SEEN, (e,)) for e in ("load-inertia", "shaft-stiffness"))
@@ -66,4 +66,5 @@ def test_two_models_that_differ_are_parted_by_a_real_simulation():
         SweepPlan(tuple(np.linspace(110.0, 150.0, 4)), (2.0,), settle_cycles=3, integrate_cycles=4),
         5e-4, np.random.default_rng(0),
     )  # fmt: skip
-    assert np.isfinite(far) and far > 0.0
+    assert np.isfinite(far)
+    assert far > 0.0

@@ -54,7 +54,8 @@ def test_an_atlas_is_kept_and_read_again_and_a_damaged_one_is_made_anew(tmp_path
     (file,) = tmp_path.iterdir()
     monkeypatch.setattr(module, "simulate_groups", None)
     again = make_atlas(ADSS, coarse, tmp_path)
-    assert list(again) == list(first) and len(first) == 23
+    assert list(again) == list(first)
+    assert len(first) == 23
     for key in first:
         np.testing.assert_array_equal(again[key].mean, first[key].mean)
     other = unread(SweepPlan((120.0, 141.0), (2.0,), settle_cycles=1, integrate_cycles=2), 1e-4)
@@ -75,7 +76,7 @@ def test_a_folder_that_cannot_be_written_costs_nothing_but_time(tmp_path, monkey
 
 
 def test_a_step_too_long_is_halved_before_giving_up(monkeypatch):
-    import analysis.population as module
+    import analysis.ensemble as module
 
     steps = []
 

@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-
 from synthetic import ROWS, SCATTER, SIGMAS, candidate, observation, read
 
 PLACE = np.array([0.55, 0.4])
@@ -54,7 +53,8 @@ def test_what_was_not_observed_does_not_count():
     values = read(EFFECT, PLACE, np.random.default_rng(1))
     values[1] = np.nan
     found = candidate(observation(values), EFFECT).best
-    assert np.all(np.isnan(found.residual[1])) and np.all(found.density[1] == 0.0)
+    assert np.all(np.isnan(found.residual[1]))
+    assert np.all(found.density[1] == 0.0)
     np.testing.assert_allclose(found.place, PLACE, atol=0.08)
 
 

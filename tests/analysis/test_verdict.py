@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from synthetic import BASE, LEVELS, ROWS, candidate, observation, read, shape
 
 from analysis.adequacy import judge_adequacy
 from analysis.holdout import hold_out
 from analysis.misfit import describe_departures, find_departures
 from analysis.verdict import judge_candidates
-from synthetic import BASE, LEVELS, ROWS, candidate, observation, read, shape
 
 TRUE, WRONG = ("load-inertia",), ("shaft-stiffness",)
 SETS = ((), TRUE, WRONG, ("cable-stiffness",), ("amplifier-gain",))
@@ -55,6 +55,16 @@ def test_two_causes_that_look_the_same_are_both_named(monkeypatch):
         assert {one.effects for one in verdict.judged[:2]} == {TRUE, WRONG}
     # Scores differ by chance, by about 18: more than the margin in one case of four.
     assert sum(verdict.word == "ambiguous" for verdict in verdicts) >= 3
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_second_cause_is_not_named_where_one_does(seed):
+    pair = tuple(sorted((*TRUE, *WRONG)))
+    observed = seen(TRUE, seed)
+    # The pair can do all that the single cause does, and a little more.
+    verdict = judge(observed, ((), TRUE, pair), 10 * seed)
+    assert verdict.best.effects == TRUE
+    assert verdict.word == "explained"
 
 
 def test_each_level_is_predicted_by_a_fit_that_has_not_seen_it():

@@ -78,10 +78,10 @@ def cache_folder() -> Path:
 
 
 def _diagnose_paper(unit: Unit, plots: Path | None, json: bool, console: Console) -> None:
-    from analysis.paper_diagnosis import diagnose_paper
-
     if plots is not None:
         raise InputError("--plots goes with a response; the paper's rows make no curves")
+    from analysis.paper_diagnosis import diagnose_paper
+
     result = diagnose_paper(unit, progress=console.progress)
     if json:
         console.document(result.to_json())

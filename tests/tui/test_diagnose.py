@@ -1,0 +1,99 @@
+"""The verb diagnose: what it refuses, what it hands on, and a cause hidden behind the analyser."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tui.cli import main
+
+PRACTICE = Path(__file__).parents[1] / "data" / "practice"
+SWEEP = str(PRACTICE / "practice-09.csv")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--unit", "adss"], "give either a response or --paper"),
+        ([SWEEP, "--unit", "adss", "--paper"], "not both"),
+        ([SWEEP, "--unit", "nosuch"], "nosuch"),
+        ([str(PRACTICE), "--unit", "adss"], "practice"),
+        (["missing.csv", "--unit", "adss"], "missing.csv"),
+        (["--unit", "adss", "--paper", "--plots", "out"], "--plots goes with a response"),
+    ],
+)
+def test_what_cannot_be_diagnosed_is_refused_in_one_line(
+    words, said, capsys, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    assert main(["diagnose", *words]) == 2
+    caught = capsys.readouterr()
+    assert caught.out == ""
+    (line,) = caught.err.strip().splitlines()
+    assert said in line
+
+
+class Told:
+    """Stands for a diagnosis."""
+
+    def to_json(self):
+        return {"verdict": "consistent"}
+
+    def summary(self):
+        return ["ADSS: consistent.", "  nothing"]
+
+
+@pytest.fixture
+def calls(monkeypatch):
+    import analysis.diagnosis
+
+    made = []
+
+    def known(response, unit, *, cache, progress):
+        made.append((response, unit, cache))
+        return Told()
+
+    monkeypatch.setattr(analysis.diagnosis, "diagnose_response", known)
+    return made
+
+
+def test_the_whole_response_is_handed_on_and_the_atlas_kept_where_caches_are(
+    calls, capsys, monkeypatch, tmp_path
+):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert main(["diagnose", SWEEP, "--unit", "adss", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"verdict": "consistent"}
+    ((response, unit, cache),) = calls
+    assert (len(response), unit.name, cache) == (183, "ADSS", tmp_path / "lashbench")
+    assert main(["diagnose", SWEEP, "--unit", "adss"]) == 0
+    assert capsys.readouterr().out == "ADSS: consistent.\n  nothing\n"
+
+
+def test_figures_go_where_they_are_asked_for(calls, capsys, monkeypatch, tmp_path):
+    import analysis.diagnosis_figures
+
+    monkeypatch.setattr(
+        analysis.diagnosis_figures, "draw_diagnosis", lambda result, folder: [folder / "a.png"]
+    )
+    assert main(["diagnose", SWEEP, "--unit", "adss", "--plots", str(tmp_path / "out")]) == 0
+    assert (tmp_path / "out").is_dir()
+    assert "a.png" in capsys.readouterr().err
+
+
+def test_an_effect_hidden_behind_the_simulated_analyser_is_found(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    bench = "sim:?ratio=0.45&seed=3&effect=amplifier-saturation:V_sat=6"
+    plan = ["--level", "2", "--level", "4.5", "--start", "110", "--stop", "165", "--points", "16"]
+    words = ["measure", "--unit", "adss", "--instrument", bench, *plan, "--yes", "--json"]
+    assert main(words) == 0
+    number = json.loads(capsys.readouterr().out)["id"]
+    assert main(["export", str(number), "--db", "lashbench.db", "--out", "hidden.csv"]) == 0
+    capsys.readouterr()
+    assert main(["diagnose", "hidden.csv", "--unit", "adss", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    sets = [[c["effect"] for c in found["causes"]], *(r["causes"] for r in found["rivals"])]
+    assert found["verdict"] in ("explained", "ambiguous")
+    # Sixteen points at two levels leave room for rivals, but not for missing it.
+    assert any("amplifier-saturation" in names for names in sets[:3])
+    assert found["gain"]["held_out_rms_ratio"] < 0.8
