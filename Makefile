@@ -5,13 +5,14 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: help demo test check bench lock clean
+.PHONY: help demo test check bench blind lock clean
 
 help:
 	@echo "make demo    the whole job without hardware; results in demo/"
 	@echo "make test    all checks and tests"
 	@echo "make check   style, types, floors and links; under a minute"
 	@echo "make bench   benchmarks"
+	@echo "make blind   hide effects and have the diagnosis find them; an hour or more"
 	@echo "make lock    write down the installed versions in requirements.lock"
 	@echo "make clean   remove what the other targets left, except .venv"
 
@@ -30,6 +31,10 @@ check: $(READY)
 
 bench: $(READY)
 	@for script in $(wildcard tests/benchmarks/*.py); do $(BIN)/python $$script || exit 1; done
+
+blind: $(READY)
+	@$(BIN)/python -m pytest -m study tests/analysis/test_diagnosis.py
+	@$(BIN)/python tests/campaigns/blind_study.py
 
 lock: $(READY)
 	@$(BIN)/python -m pip freeze --exclude-editable > requirements.lock
