@@ -1,0 +1,196 @@
+"""What to believe of the sets that were simulated: probabilities, a verdict, the error index.
+
+Owns the prior over sets, which pays for every further cause, and the words
+of the verdict. It simulates nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.error_index import error_index
+from analysis.paper_evidence import Agreement, RatioPrior
+from analysis.paper_exploration import Explored
+from analysis.paper_pairs import possible_pairs
+from analysis.paper_search import hold_against
+from analysis.paper_sweeps import Reading
+
+__all__ = ["Belief", "Index", "Judged", "Knowledge", "believe", "index_of"]
+
+Word = Literal["consistent", "explained", "ambiguous", "unexplained"]
+
+_ORDERS = (1.0, 0.5, 0.25)
+"""Prior weight of no cause, of one and of two; shared alike by all sets of an order."""
+
+_UNLIKE = 0.02
+"""A measurement that fewer runs of the best set than this would agree with worse is unlike it."""
+
+_SURE = 0.8
+"""Probability from which one set is the explanation."""
+
+_WORTH_NAMING = 0.02
+_RUNS = 20_000
+
+
+@dataclass(frozen=True, slots=True)
+class Knowledge:
+    """What is known before: the ratio or nothing, and effects that a measurement rules out."""
+
+    prior: RatioPrior
+    excluded: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A set with its agreement and its probability among all that were simulated."""
+
+    agreement: Agreement
+    probability: float
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Identifiers of its effects."""
+        return self.agreement.hypothesis.effects
+
+    @cached_property
+    def probability_of_worse(self) -> float:
+        """Share of its own readings that would agree worse with it."""
+        return self.agreement.probability_of_worse()
+
+    @property
+    def adequate(self) -> bool:
+        """Whether the measurement looks like one of its runs."""
+        return self.probability_of_worse >= _UNLIKE
+
+
+@dataclass(frozen=True)
+class Belief:
+    """Every simulated set, most probable first, under one state of knowledge."""
+
+    knowledge: Knowledge
+    judged: tuple[Judged, ...]
+
+    @property
+    def baseline(self) -> Judged:
+        """The plain model."""
+        return next(one for one in self.judged if not one.effects)
+
+    @property
+    def best(self) -> Judged:
+        """The most probable set whose own runs look like the measurement; else the likeliest."""
+        return next((one for one in self.judged if one.adequate), self.judged[0])
+
+    @property
+    def word(self) -> Word:
+        """The verdict."""
+        if not self.best.adequate:
+            return "unexplained"
+        if not self.best.effects:
+            return "consistent"
+        return "explained" if self.best.probability >= _SURE * self._adequate else "ambiguous"
+
+    @property
+    def _adequate(self) -> float:
+        """Probability of all sets whose own runs look like the measurement."""
+        return sum(one.probability for one in self.judged if one.adequate)
+
+    @property
+    def rivals(self) -> tuple[Judged, ...]:
+        """Other sets worth naming."""
+        return tuple(
+            one for one in self.judged if one is not self.best and one.probability >= _WORTH_NAMING
+        )
+
+    def inclusion(self) -> dict[str, float]:
+        """Probability that an effect is part of the answer, most probable first."""
+        shares: dict[str, float] = {}
+        for one in self.judged:
+            for effect in one.effects:
+                shares[effect] = shares.get(effect, 0.0) + one.probability
+        return dict(sorted(shares.items(), key=lambda item: -item[1]))
+
+    def probability_of_any(self, effects: Collection[str]) -> float:
+        """Probability that at least one of these effects is part of the answer."""
+        return float(sum(one.probability for one in self.judged if set(one.effects) & set(effects)))
+
+    def best_of(self, effects: Collection[str]) -> Judged | None:
+        """The set with the greatest evidence among those made of these effects alone."""
+        made = [one for one in self.judged if one.effects and set(one.effects) <= set(effects)]
+        return max(made, key=lambda one: one.agreement.log_evidence, default=None)
+
+    def ratio(self) -> tuple[float, float]:
+        """Mean and standard deviation of the ratio over all sets by their probability."""
+        moments = [one.agreement.moments() for one in self.judged]
+        weight = np.array([one.probability for one in self.judged])
+        mean = np.array([m[0] for m, _ in moments])
+        std = np.array([s[0] for _, s in moments])
+        centre = float(weight @ mean)
+        return centre, float(np.sqrt(weight @ (std**2 + (mean - centre) ** 2)))
+
+
+def believe(explored: Sequence[Explored], reading: Reading, knowledge: Knowledge) -> Belief:
+    """Probabilities of all sets that knowledge allows; those not simulated count as nothing."""
+    allowed = [one for one in explored if not set(one.effects) & set(knowledge.excluded)]
+    agreements = [hold_against(one, reading, knowledge.prior) for one in allowed]
+    causes = {one.effects[0] for one in allowed if len(one.effects) == 1}
+    counts = (1, max(len(causes), 1), max(len(possible_pairs(causes)), 1))
+    score = np.array(
+        [
+            one.log_evidence + np.log(_ORDERS[order] / counts[order])
+            for one in agreements
+            for order in (len(one.hypothesis.effects),)
+        ]
+    )
+    weight = np.exp(score - score.max())
+    weight /= weight.sum()
+    order = np.argsort(-weight)
+    return Belief(
+        knowledge, tuple(Judged(agreements[int(k)], float(weight[int(k)])) for k in order)
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Index:
+    """The error index, equation (21), of one set, Hz.
+
+    Parameters
+    ----------
+    value, std
+        At the likeliest place, and its spread from single runs and reading.
+    expected, expected_std
+        Of a single run over all places by their probability.
+    floor
+        What it would be on average if the set were the truth: two runs differ too.
+    """
+
+    value: float
+    std: float
+    expected: float
+    expected_std: float
+    floor: float
+
+
+def index_of(agreement: Agreement, seed: int = 0) -> Index:
+    """The error index that a set leaves."""
+    measured = agreement.reading.values
+    mean, _ = agreement.at_best
+    rng = np.random.default_rng(seed)
+    at_best = agreement.draw_runs(_RUNS, rng, at_best=True)
+    anywhere = _single(agreement.draw_runs(_RUNS, rng), measured)
+    return Index(
+        value=float(_single(mean[None], measured)[0]),
+        std=float(np.std(_single(at_best, measured))),
+        expected=float(np.mean(anywhere)),
+        expected_std=float(np.std(anywhere)),
+        floor=float(np.mean(_single(at_best, mean))),
+    )
+
+
+def _single(runs: NDArray[np.float64], against: NDArray[np.float64]) -> NDArray[np.float64]:
+    return error_index(runs[:, 0], runs[:, 2], against[0], against[2]).value_hz
