@@ -79,12 +79,15 @@ def search_causes(
     if judge_adequacy(rough.best, rng).sigma > _DOUBT:
         rough.start(_pairs(coarse, atlas, rough), _PAIR_GROUPS)
     fine = _Hunt(unit, observation, rng, _part(progress, 0.6, 1.0, "looking closer"))
-    third = _with_baseline(rough.leading(_THIRD, _TOO_FAR))
+    leading = rough.leading(_THIRD, _TOO_FAR)
+    third = _with_baseline([*leading, *_parts(leading[0], rough.found), rough.best_single])
     fine.take_over([rough.found[key] for key in third], _THIRD_GROUPS)
     leader, *near = fine.leading(len(third), _FAR)
+    # Whoever is compared with the leader is given as many runs: more runs fit better.
+    equals = [leader, *_parts(leader, fine.found), *(key for key in near if not key)]
     for _ in range(_LAST_ROUNDS):
-        fine.settle([leader, *(key for key in near if not key)], _LAST_GROUPS)
-    fine.look_closer([key for key in near if key][:1], _RIVAL_GROUPS)
+        fine.settle(list(dict.fromkeys(equals)), _LAST_GROUPS)
+    fine.look_closer([key for key in near if key not in equals][:1], _RIVAL_GROUPS)
     return sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
 
 
@@ -106,6 +109,11 @@ def _pairs(coarse: Observation, atlas: Atlas, rough: _Hunt) -> _Starts:
     places = screen_pairs(coarse, atlas, parents)
     ranked = sorted(places, key=lambda key: -places[key].log_likelihood)
     return {key: places[key].place for key in ranked[:_PAIRS]}
+
+
+def _parts(key: Effects, found: Mapping[Effects, Candidate]) -> list[Effects]:
+    """The causes that a pair is made of, each for itself, as far as they were looked at."""
+    return [(effect,) for effect in key if len(key) > 1 and (effect,) in found]
 
 
 def _with_baseline(keys: Sequence[Effects]) -> list[Effects]:
@@ -139,6 +147,12 @@ class _Hunt:
     def best(self) -> Candidate:
         """The most likely candidate."""
         return max(self.found.values(), key=lambda c: c.best.log_likelihood)
+
+    @property
+    def best_single(self) -> Effects:
+        """The most likely single cause."""
+        single: list[Effects] = [key for key in self.found if len(key) == 1]
+        return max(single, key=lambda key: self.found[key].best.log_likelihood)
 
     def leading(self, most: int, behind: float = np.inf) -> list[Effects]:
         """The most likely hypotheses, none too far behind the first."""

@@ -45,10 +45,10 @@ _TIE = 20.0
 """Within so much of the best, a set is a rival: the scores of two sets that say the same about
 everything differ by about as much, as each has runs of its own."""
 
-_UNLIKE = 3.0
+_UNLIKE = 4.0
 """A fit worse than own runs' by more standard deviations than this is no explanation."""
 
-_UNPREDICTED = 1.4
+_UNPREDICTED = 1.35
 """Nor is one that misses levels not fitted by so many standard deviations, root mean square."""
 
 _JUDGED = 6
