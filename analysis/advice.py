@@ -11,7 +11,7 @@ from typing import Any
 
 from sim.unit import Unit
 
-__all__ = ["limit_lines", "stage_to_adjust"]
+__all__ = ["limit_lines", "stage_actions", "stage_to_adjust"]
 
 _HALF = 0.5
 _SIGMA = 2.0
@@ -55,14 +55,43 @@ def limit_lines(document: Mapping[str, Any], unit: Unit) -> list[str]:
     return lines
 
 
+def stage_actions(document: Mapping[str, Any], unit: Unit) -> list[str]:
+    """What to do about each stage that has a limit: leave, adjust or replace, measure again."""
+    actions = []
+    for stage in (1, 2):
+        name = f"b{stage}_deg"
+        limit = getattr(unit.limits, name)
+        if limit is None:
+            continue
+        value, std = document[name]["value"], document[name]["std"] or 0.0
+        actions.append(f"Stage {stage}: {_ACTIONS[_verdict(value, std, limit)]}")
+    if not actions:
+        return [
+            "No limits are set; b1_deg and b2_deg under [limits] of the unit file would say "
+            "whether to adjust, replace or leave a stage."
+        ]
+    return actions
+
+
 def _interval(ratio: Mapping[str, Any]) -> tuple[float, float]:
     std = ratio["std"] or 0.0
     return max(0.0, ratio["value"] - 2.0 * std), min(1.0, ratio["value"] + 2.0 * std)
 
 
+_WITHIN, _ABOVE, _OPEN = "WITHIN", "ABOVE", "NOT DECIDED, too close for its error"
+_ACTIONS = {
+    _WITHIN: "leave it; its backlash is within the limit.",
+    _ABOVE: (
+        "adjust its mesh (centre distance or preload) and measure again; replace the gear pair "
+        "where nothing is left to adjust, or where the play came with wear."
+    ),
+    _OPEN: "measure again at further source levels; its backlash is too near the limit to decide.",
+}
+
+
 def _verdict(value: float, std: float, limit: float) -> str:
     if value + _SIGMA * std <= limit:
-        return "WITHIN"
+        return _WITHIN
     if value - _SIGMA * std > limit:
-        return "ABOVE"
-    return "NOT DECIDED, too close for its error"
+        return _ABOVE
+    return _OPEN

@@ -37,14 +37,19 @@ def draw_response(response: FrequencyResponse, features: Sequence[LevelFeatures]
     """
     figure = Figure(figsize=(9.0, 6.5), layout="constrained")
     gain, phase = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    found = {feature.source_vpk: feature for feature in features}
-    for index, level in enumerate(response.levels_vpk.tolist()):
+    found = {_key(feature.source_vpk): feature for feature in features}
+    for index, level in enumerate(map(_key, response.levels_vpk.tolist())):
         style: dict[str, Any] = {
             "color": _COLOURS[index % len(_COLOURS)],
             "marker": _MARKERS[index % len(_MARKERS)],
             "markersize": 3.0,
         }
-        _draw_level(gain, phase, response.at_level(level), _label(level, found.get(level)), style)
+        part = (
+            response.take(~np.isfinite(response.source_vpk))
+            if level is None
+            else response.at_level(level)
+        )
+        _draw_level(gain, phase, part, _label(level, found.get(level)), style)
         if level in found:
             _mark(gain, found[level], style["color"])
     _dress(gain, phase, response)
@@ -75,14 +80,20 @@ def _draw_level(
         gain.plot(part.frequency_hz[spoilt], part.gain_db[spoilt], **hollow)
 
 
-def _label(level: float, found: LevelFeatures | None) -> str:
+def _key(source_vpk: float) -> float | None:
+    """A level that can be looked up: None where the response does not say it."""
+    return source_vpk if np.isfinite(source_vpk) else None
+
+
+def _label(level: float | None, found: LevelFeatures | None) -> str:
+    name = "? V" if level is None else f"{level:g} V"
     if found is None:
-        return f"{level:g} V"
+        return name
     parts = [
         f"{name} {feature.frequency_hz:.1f} ± {feature.std_hz:.1f} Hz" if feature else f"no {name}"
         for name, feature in (("ARF", found.arf), ("RF", found.rf))
     ]
-    return f"{level:g} V: {', '.join(parts)}"
+    return f"{name}: {', '.join(parts)}"
 
 
 def _mark(gain: Axes, found: LevelFeatures, colour: str) -> None:
@@ -95,7 +106,8 @@ def _mark(gain: Axes, found: LevelFeatures, colour: str) -> None:
 
 def _dress(gain: Axes, phase: Axes, response: FrequencyResponse) -> None:
     simulated = response.provenance.get("kind") == "simulated"
-    gain.set_title(f"{response.unit}{', SIMULATED' if simulated else ''}")
+    # A name is no formula, whatever dollars stand in it.
+    gain.set_title(f"{response.unit}{', SIMULATED' if simulated else ''}", parse_math=False)
     gain.set_ylabel("gain V_o/V_i (dB re 1 V/V)")
     gain.legend(title="source level, V peak", fontsize=8)
     phase.set_ylabel("phase, wrapped (deg)")

@@ -30,6 +30,7 @@ VERBS = {
     "measure": ("tui.commands.measure:measure", "Measure a unit on the bench."),
     "history": ("tui.commands.history:history", "List a bench's measurements and their trend."),
     "export": ("tui.commands.export:export", "Write a stored measurement to a file."),
+    "report": ("tui.commands.report:report", "Write a report that prints, as one HTML file."),
     "serve": ("tui.commands.serve:serve", "Serve a simulated 35670A on a wire."),
     "demo": ("tui.commands.demo:demo", "Do the whole job without hardware."),
     "bench": ("tui.commands.bench:bench", "Open the bench screen; so does no verb at all."),

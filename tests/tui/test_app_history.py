@@ -6,8 +6,9 @@ import pytest
 from screen import ESTIMATE, operated, quick_analyses, run
 
 from daq.store import Store
-from tui.app.log_file import log_path, logging_to_file
+from tui.app.log_file import logging_to_file
 from tui.cli import main
+from tui.places import log_path
 
 SHORT = ["--settle-cycles", "3", "--integrate-cycles", "3", "--serial", "SN 7"]
 BAND = ["--level", "2.5", "--start", "120", "--stop", "160", "--points", "9"]

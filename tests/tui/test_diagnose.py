@@ -82,13 +82,14 @@ def test_figures_go_where_they_are_asked_for(calls, capsys, monkeypatch, tmp_pat
 
 def test_an_effect_hidden_behind_the_simulated_analyser_is_found(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    for place in ("CACHE", "DATA"):
+        monkeypatch.setenv(f"XDG_{place}_HOME", str(tmp_path))
     bench = "sim:?ratio=0.45&seed=3&effect=amplifier-saturation:V_sat=6"
     plan = ["--level", "2", "--level", "4.5", "--start", "110", "--stop", "165", "--points", "16"]
     words = ["measure", "--unit", "adss", "--instrument", bench, *plan, "--yes", "--json"]
     assert main(words) == 0
     number = json.loads(capsys.readouterr().out)["id"]
-    assert main(["export", str(number), "--db", "lashbench.db", "--out", "hidden.csv"]) == 0
+    assert main(["export", str(number), "--out", "hidden.csv"]) == 0
     capsys.readouterr()
     assert main(["diagnose", "hidden.csv", "--unit", "adss", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)

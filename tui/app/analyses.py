@@ -44,7 +44,9 @@ def _diagnose(response: FrequencyResponse, unit: Unit, progress: Progress) -> An
 
 
 def _report(task: Task, diagnosis: Any, path: Path) -> None:
-    raise AnalysisError("this installation writes no reports; update lashbench")
+    from tui.reports import report_measurement
+
+    report_measurement(path, task.db, task.measurement, task.unit, diagnosis=diagnosis)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
 """The log file, where everything goes that no operator should have to see.
 
-Owns where it lies (the user's state directory) and the handler that writes it.
+Owns the handler that writes it.
 """
 
 from __future__ import annotations
@@ -11,16 +11,11 @@ from contextlib import contextmanager
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
 
-__all__ = ["log_path", "logging_to_file"]
+from tui.places import log_path
+
+__all__ = ["logging_to_file"]
 
 _BYTES = 1_000_000
-
-
-def log_path() -> Path:
-    """The log file's place; it may not be there yet."""
-    from platformdirs import user_state_path
-
-    return user_state_path("lashbench", appauthor=False) / "lashbench.log"
 
 
 @contextmanager

@@ -10,17 +10,18 @@ from pathlib import Path
 
 from daq.errors import InputError
 from tui.output import Injected
+from tui.places import history_path
 
 __all__ = ["bench", "is_terminal", "require_terminal"]
 
 
-def bench(*, db: Path = Path("lashbench.db"), console: Injected) -> int:
+def bench(*, db: Path | None = None, console: Injected) -> int:
     """Open the bench screen: from a unit to a report, guided, by keyboard or mouse.
 
     Parameters
     ----------
     db
-        File of the bench's history; made by the first session.
+        File of the bench's history, made by the first session; yours, if left out.
     """
     require_terminal("bench")
     from tui.app.application import BenchApp
@@ -29,7 +30,7 @@ def bench(*, db: Path = Path("lashbench.db"), console: Injected) -> int:
     with logging_to_file() as log:
         if log is None:
             console.note("the log file cannot be written; going on without")
-        app = BenchApp(db, log=log)
+        app = BenchApp(history_path(db, create=True), log=log)
         code = app.run()
     return code if code is not None else app.return_code or 0
 

@@ -1,23 +1,22 @@
 """``lashbench diagnose``: what the simulation gets wrong, and why.
 
-Owns the options of the verb and where the atlas is kept. The diagnosis is the
-analysis's.
+Owns the options of the verb. The diagnosis is the analysis's.
 """
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.errors import InputError
 from tui.options import Json, Plots, UnitName, prepare_directory
 from tui.output import Console, Injected
+from tui.places import cache_folder
 
 if TYPE_CHECKING:
     from sim.unit import Unit
 
-__all__ = ["cache_folder", "diagnose"]
+__all__ = ["diagnose"]
 
 
 def diagnose(
@@ -71,18 +70,12 @@ def diagnose(
         console.data("\n".join(result.summary()))
 
 
-def cache_folder() -> Path:
-    """Where what can be computed again is kept, by the XDG convention."""
-    base = os.environ.get("XDG_CACHE_HOME")
-    return (Path(base) if base else Path.home() / ".cache") / "lashbench"
-
-
 def _diagnose_paper(unit: Unit, plots: Path | None, json: bool, console: Console) -> None:
     if plots is not None:
         raise InputError("--plots goes with a response; the paper's rows make no curves")
     from analysis.paper_diagnosis import diagnose_paper
 
-    result = diagnose_paper(unit, progress=console.progress)
+    result = diagnose_paper(unit.name, progress=console.progress)
     if json:
         console.document(result.to_json())
     else:

@@ -12,6 +12,7 @@ from cyclopts import Parameter
 
 from tui.options import Whole
 from tui.output import Injected
+from tui.places import history_path
 
 __all__ = ["export"]
 
@@ -20,7 +21,7 @@ def export(
     measurement: Annotated[Whole, Parameter(help="Identifier, as `history` lists it.")],
     /,
     *,
-    db: Path,
+    db: Path | None = None,
     out: Path,
     console: Injected,
 ) -> None:
@@ -31,7 +32,7 @@ def export(
     Parameters
     ----------
     db
-        File of the bench's history.
+        File of the bench's history; yours, if left out.
     out
         File to write: csv, h5, uff or mat by its suffix.
     """
@@ -39,7 +40,7 @@ def export(
     from daq.store import Store
 
     check_writable(out)
-    with Store(db, read_only=True) as store:
+    with Store(history_path(db), read_only=True) as store:
         response = store.response(measurement)
     write_response(response, out)
     console.note(f"wrote {len(response)} points of measurement {measurement} to {out}")

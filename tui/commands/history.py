@@ -17,6 +17,7 @@ from daq.errors import ConfigurationError, InputError, LashbenchError
 from tui.history_rows import estimated_groups, measurement_row, trend_lines, trend_rows
 from tui.options import Json
 from tui.output import Console, Injected
+from tui.places import history_path
 
 if TYPE_CHECKING:
     from daq.store import Store
@@ -31,7 +32,7 @@ _BAR = 41
 
 def history(
     *,
-    db: Path,
+    db: Path | None = None,
     unit: Annotated[str | None, Parameter(name="--unit")] = None,
     estimate: Literal["none", "some", "all"] = "some",
     json: Json = False,
@@ -45,7 +46,7 @@ def history(
     Parameters
     ----------
     db
-        File of the bench's history.
+        File of the bench's history; yours, if left out.
     unit
         Only measurements of this unit: adss, edss, the path of a unit file, or a name.
     estimate
@@ -54,6 +55,7 @@ def history(
     """
     from daq.store import Store
 
+    db = history_path(db)
     with Store(db, read_only=True) as store:
         measurements = store.measurements(_unit_name(unit, store))
         known = {key: dict(e.document) for key, e in store.latest_estimates().items()}

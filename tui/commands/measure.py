@@ -19,6 +19,7 @@ from daq.errors import InputError, LashbenchError, MeasurementError
 from tui.measure_options import PlanOptions, read_band, session_request
 from tui.options import Json, Real, UnitName, Whole
 from tui.output import Console, Injected
+from tui.places import history_path
 
 if TYPE_CHECKING:
     from daq.session_events import Finished, SessionEvent
@@ -46,7 +47,7 @@ def measure(
     recipe: str | None = None,
     bench: str = "default",
     adaptive: bool = False,
-    db: Path = Path("lashbench.db"),
+    db: Path | None = None,
     resume: Whole | None = None,
     remeasure: str | None = None,
     run_in: Whole | None = None,
@@ -92,7 +93,7 @@ def measure(
     adaptive
         Go on around anti-resonance and resonance until they are known well.
     db
-        File of the bench's history; made if it is not there.
+        File of the bench's history, made if it is not there; yours, if left out.
     resume
         Measurement to go on with, by its identifier.
     remeasure
@@ -121,6 +122,7 @@ def measure(
         settle_cycles, integrate_cycles, offset, adaptive,
     )  # fmt: skip
     subject = load_unit(unit)
+    db = history_path(db, create=not dry_run)
     request = session_request(
         options, unit, subject, instrument, db,
         recipe=recipe, bench=bench, resume=resume, remeasure=read_band(remeasure), run_in=run_in,

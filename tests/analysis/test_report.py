@@ -1,0 +1,328 @@
+"""The report: what it says, that nothing breaks it, and what a browser makes of it."""
+
+import hashlib
+import json
+import re
+import xml.etree.ElementTree as ET
+from datetime import UTC, datetime
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+import report_makings as makings
+from browser import look
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from analysis.markup import Markup, data_block, element
+from analysis.report import file_origin, write_report
+from analysis.report_data import Origin
+from daq.errors import AnalysisError, InputError
+from sim.unit import load_unit, unit_from_mapping
+
+ADSS = load_unit("adss")
+MADE = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
+CAUSES = [("load-inertia",), ("shaft-stiffness",), ("load-inertia", "motor-resistance")]
+VOID = {"meta", "br", "hr", "col"}
+
+
+class Page(HTMLParser):
+    """A page as its elements, failing where one is not closed in order."""
+
+    def __init__(self, text):
+        super().__init__(convert_charrefs=True)
+        self.open, self.tags, self.attributes, self.words, self.blocks = [], [], [], [], {}
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.attributes += [(tag, name, value) for name, value in attrs]
+        if tag not in VOID:
+            self.open.append((tag, dict(attrs)))
+
+    def handle_startendtag(self, tag, attrs):
+        self.tags.append(tag)
+        self.attributes += [(tag, name, value) for name, value in attrs]
+
+    def handle_endtag(self, tag):
+        assert self.open.pop()[0] == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1][0] == "script":
+            self.blocks[self.open[-1][1].get("id")] = data
+        elif self.open and self.open[-1][0] not in ("style", "text"):
+            self.words.append(data)
+
+    @property
+    def text(self):
+        return " ".join(" ".join(self.words).split())
+
+    @property
+    def data(self):
+        return json.loads(self.blocks["lashbench-report"])
+
+
+@pytest.fixture
+def report(tmp_path):
+    def make(response=None, unit=ADSS, **parts):
+        path = tmp_path / "report.html"
+        parts = {"origin": Origin("x.csv"), "estimate": makings.ESTIMATE, "made": MADE} | parts
+        assert write_report(path, response or makings.response(), unit, **parts) == path
+        return path, Page(path.read_text(encoding="utf-8"))
+
+    return make
+
+
+@pytest.fixture(scope="module")
+def explained():
+    with pytest.MonkeyPatch.context() as patch:
+        return makings.diagnosis(patch, ("load-inertia",), CAUSES)
+
+
+def with_limits(b1_deg, b2_deg):
+    document = ADSS.model_dump(by_alias=True)
+    document["limits"] |= {"b1_deg": b1_deg, "b2_deg": b2_deg}
+    return unit_from_mapping(document, "test")
+
+
+def test_it_says_what_was_measured_and_how(report):
+    _, page = report()
+    for words in (
+        "Backlash report: ADSS SN 7", "Operator A. B.", "Notes warm", "HP 35670A, serial 1",
+        "48 points, 100 to 180 Hz, up", "1.5, 4 V peak", "20 cycles settled, 30 averaged",
+        "Begun 2026-01-02T03:04:05+00:00", "Report made 2026-01-02T03:04:05+00:00",
+    ):  # fmt: skip
+        assert words in page.text
+    assert "SIMULATED" not in page.text
+
+
+def test_the_features_and_the_estimate_stand_in_words_and_numbers(report):
+    _, page = report()
+    assert "Adjust stage 2 first: 30 % of the backlash sits in stage 1" in page.text
+    assert "backlash of stage 1, b1 0.2079 deg 0.0139 0.1800 to 0.2360" in page.text
+    assert "the model leaves 2.0 standard deviations" in page.text
+    rows = re.findall(r"129\.6\d+ ± 0\.0\d+ ", page.text)
+    assert len(rows) == 2
+
+
+@pytest.mark.parametrize(
+    ("limits", "said"),
+    [
+        ((0.3, 0.1), ["Stage 1: leave it", "Stage 2: leave it"]),
+        ((0.1, 0.04), ["Stage 1: adjust its mesh", "replace the gear pair", "Stage 2: adjust"]),
+        ((0.21, 0.1), ["Stage 1: measure again", "Stage 2: leave it"]),
+    ],
+)
+def test_it_says_whether_to_adjust_replace_or_leave(report, limits, said):
+    _, page = report(unit=with_limits(*limits))
+    for words in said:
+        assert words in page.text
+
+
+def test_the_diagnosis_has_its_causes_gain_and_pictures(report, explained):
+    path, page = report(diagnosis=explained)
+    document = explained.to_json()
+    assert "Explained." in page.text
+    assert "load-inertia in the mechanics J_L = " in page.text
+    sigma = document["baseline"]["held_out_rms_sigma"]
+    assert f"model of the unit alone {sigma:.2f}" in page.text
+    assert f"leave {document['gain']['held_out_rms_ratio']:.2f} of the residual" in page.text
+    assert "Departures left with the causes: none beyond chance" in page.text
+    assert path.read_text().count("<svg") == 4
+    assert page.data["diagnosis"]["causes"] == document["causes"]
+
+
+@pytest.mark.parametrize(
+    ("hidden", "judged", "verdict", "said"),
+    [
+        ((), [("load-inertia",)], "consistent", "nothing else needs to be looked for"),
+        (("load-inertia",), [("shaft-stiffness",)], "unexplained", "no known cause explains"),
+        (("amplifier-gain",), [("amplifier-gain",)], "explained", "put the measuring chain right"),
+    ],
+)
+def test_every_verdict_has_its_words(report, monkeypatch, hidden, judged, verdict, said):
+    found = makings.diagnosis(monkeypatch, hidden, judged)
+    assert found.to_json()["verdict"] == verdict
+    _, page = report(diagnosis=found)
+    assert said in page.text
+    assert page.text.count("Departures left") == (verdict == "explained")
+
+
+def test_a_tie_is_told_with_the_sweep_that_would_break_it(report):
+    class Told:
+        def to_json(self):
+            from screen import DIAGNOSIS
+
+            plan = DIAGNOSIS["next_measurement"]["plan"] | {"command": "lashbench measure --x"}
+            return DIAGNOSIS | {"next_measurement": DIAGNOSIS["next_measurement"] | {"plan": plan}}
+
+    _, page = report(diagnosis=Told())
+    assert "may explain the response, and so may others" in page.text
+    assert "Other sets judged: shaft-stiffness (0.41)" in page.text
+    assert "To tell load-inertia from shaft-stiffness (5.0 sigma expected)" in page.text
+    assert "lashbench measure --x" in page.text
+
+
+def test_what_is_missing_says_why(report):
+    remarks = {"estimate": "No estimate: too noisy.", "diagnosis": "Left out."}
+    _, page = report(estimate=None, remarks=remarks)
+    assert "No estimate: too noisy." in page.text
+    assert "Left out." in page.text
+    assert page.data["estimate"] is None
+
+
+def test_doubts_stand_at_the_top(report):
+    response = makings.response(unit="other", kind="simulated", state="interrupted")
+    _, page = report(response)
+    top = page.text[: page.text.index("Measurement Unit")]
+    assert "SIMULATED" in top
+    assert "names unit other; it was taken for ADSS" in top
+    assert "The unit file has changed since this was measured" in top
+    assert "not complete: interrupted" in top
+
+
+def test_no_doubt_where_the_unit_is_the_one_that_was_measured(report):
+    from daq.configs import config_path
+
+    text = config_path("units", "adss").read_text(encoding="utf-8")
+    _, page = report(makings.response(configurations={"unit": text}))
+    assert "has changed" not in page.text
+
+
+def test_the_copy_for_programs_is_whole_and_its_hashes_hold(report, tmp_path):
+    file = tmp_path / "data.csv"
+    file.write_bytes(b"some bytes")
+    response = makings.response()
+    _, page = report(response, origin=file_origin(file))
+    data = page.data
+    columns = data["response"]
+    np.testing.assert_allclose(columns["gain_db"], response.gain_db, rtol=0, atol=0)
+    np.testing.assert_allclose(columns["frequency_hz"], response.frequency_hz, rtol=0, atol=0)
+    compact = json.dumps(columns, sort_keys=True, separators=(",", ":")).encode()
+    source = data["provenance"]
+    assert source["response_sha256"] == hashlib.sha256(compact).hexdigest()
+    assert source["file_sha256"] == hashlib.sha256(b"some bytes").hexdigest()
+    bench = source["configurations"]["bench"]
+    assert bench["sha256"] == hashlib.sha256(bench["text"].encode()).hexdigest()
+    assert data["estimate"]["b1_deg"] == makings.ESTIMATE["b1_deg"]
+    assert unit_from_mapping(data["unit"]["document"], "copy") == ADSS
+    for digest in (source["response_sha256"], source["file_sha256"], bench["sha256"]):
+        assert digest in page.text
+
+
+def test_one_changed_reading_changes_the_hash(report):
+    _, page = report()
+    first = page.data["provenance"]["response_sha256"]
+    response = makings.response()
+    response.gain[7] *= 1.0 + 1e-12
+    _, page = report(response)
+    assert page.data["provenance"]["response_sha256"] != first
+
+
+def test_the_same_report_is_the_same_file(report, explained):
+    once = report(diagnosis=explained)[0].read_bytes()
+    assert report(diagnosis=explained)[0].read_bytes() == once
+
+
+def test_nothing_is_fetched_and_no_name_is_given_twice(report, explained):
+    path, page = report(diagnosis=explained)
+    assert "script-src" not in path.read_text()
+    assert page.tags.count("script") == 1
+    assert not {"img", "link", "iframe", "object"} & set(page.tags)
+    names = [value for _, name, value in page.attributes if name == "id"]
+    assert len(names) == len(set(names))
+    for tag, name, value in page.attributes:
+        assert not name.startswith("on"), (tag, name)
+        if name in ("href", "xlink:href", "src"):
+            assert value[0] == "#", value
+            assert value[1:] in names
+        for target in re.findall(r"url\(#([^)]+)\)", value or ""):
+            assert target in names
+    assert "@import" not in path.read_text()
+
+
+def test_every_picture_is_an_image_with_words_and_sound_xml(report):
+    path, _ = report()
+    pictures = re.findall(r"<svg.*?</svg>", path.read_text(encoding="utf-8"), re.DOTALL)
+    assert len(pictures) == 2
+    for picture in pictures:
+        root = ET.fromstring(picture)
+        assert root.get("role") == "img"
+        assert root.get("aria-label")
+        assert len(root.findall(".//{http://www.w3.org/2000/svg}path")) > 10
+
+
+def test_what_an_operator_writes_stays_text(report):
+    nasty = makings.NASTY
+    response = makings.response(
+        unit=nasty, operator=nasty, notes=nasty, serial=nasty, address=nasty,
+        configurations={nasty: nasty}, instrument={"maker": nasty, "model": nasty},
+    )  # fmt: skip
+    estimate = makings.ESTIMATE | {"warnings": [nasty]}
+    _, page = report(response, estimate=estimate, remarks={"diagnosis": nasty})
+    assert page.tags.count("script") == 1
+    assert "img" not in page.tags
+    assert page.data["measurement"]["operator"] == nasty
+    assert page.data["provenance"]["configurations"][nasty]["text"] == nasty
+    assert "<script>alert(1)</script>" in page.text
+
+
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.text(), st.text())
+def test_markup_cannot_be_broken(text, other):
+    whole = element("p", text, element("b", other), class_=text) + data_block({text: other}, "d")
+    page = Page(whole)
+    assert page.tags == ["p", "b", "script"]
+    assert json.loads(page.blocks["d"]) == {text: other}
+
+
+def test_markup_is_escaped_once_and_a_number_that_is_none_refused():
+    assert element("p", Markup("<i>"), "<i>") == "<p><i>&lt;i&gt;</p>"
+    with pytest.raises(ValueError, match="JSON"):
+        data_block({"a": float("nan")}, "d")
+
+
+def test_a_long_remark_does_not_fill_the_pages(report):
+    _, page = report(makings.response(notes="word " * 5000))
+    assert "the rest is in the data" in page.text
+    assert page.data["measurement"]["notes"] == "word " * 5000
+
+
+def test_without_phase_errors_levels_or_words_it_still_is_a_report(report):
+    from daq.frf import FrequencyResponse
+
+    bare = FrequencyResponse.from_arrays(
+        np.linspace(100, 200, 21), None, np.full(21, 0.1), unit="ADSS", phase_known=False
+    )
+    _, page = report(bare, estimate=None)
+    assert "21 points, 100 to 200 Hz" in page.text
+    assert page.data["response"]["phase_deg"] == [None] * 21
+
+
+def test_a_place_that_cannot_be_written_and_an_empty_response_are_refused(tmp_path):
+    response = makings.response()
+    with pytest.raises(InputError, match="no directory"):
+        write_report(tmp_path / "no" / "r.html", response, ADSS, Origin("x"))
+    with pytest.raises(AnalysisError, match="no reading"):
+        write_report(tmp_path / "r.html", response.take(slice(0, 0)), ADSS, Origin("x"))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_browser_shows_all_of_it_without_complaint_on_two_to_four_pages(
+    report, explained, tmp_path
+):
+    path, page = report(makings.response(notes=makings.NASTY), diagnosis=explained)
+    seen = look(path, tmp_path)
+    assert seen.complaints == []
+    assert 2 <= seen.pages <= 4
+    assert seen.text.count("<svg") == seen.text.count("</svg>") == 4
+    # Markup in a remark that came to life would have become elements of the page.
+    assert Page(seen.text).tags.count("script") == page.tags.count("script") == 1
+
+
+def test_the_browser_would_have_complained(tmp_path):
+    bad = tmp_path / "bad.html"
+    bad.write_text("<!DOCTYPE html><script>null.x</script><img src='https://example.org/a.png'>")
+    assert look(bad, tmp_path).complaints

@@ -1,0 +1,56 @@
+"""Where a user's own files lie, by the XDG convention.
+
+Owns the places of history, cache and log; the environment variables
+XDG_DATA_HOME, XDG_CACHE_HOME and XDG_STATE_HOME move them. Nothing is made
+before it is needed.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from daq.errors import InputError
+
+__all__ = ["cache_folder", "history_path", "log_path"]
+
+
+def history_path(given: Path | None, *, create: bool = False) -> Path:
+    """The history that is meant: the one given, else the user's own.
+
+    Parameters
+    ----------
+    create
+        Make the folder of the user's own, for a program that is about to write.
+
+    Raises
+    ------
+    InputError
+        If that folder cannot be made.
+    """
+    from platformdirs import user_data_path
+
+    if given is not None:
+        return given
+    folder = user_data_path("lashbench", appauthor=False)
+    if create:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(
+                f"{folder}: cannot be made ({error.strerror or error}); give --db FILE"
+            ) from error
+    return folder / "lashbench.db"
+
+
+def cache_folder() -> Path:
+    """Where what can be computed again is kept."""
+    from platformdirs import user_cache_path
+
+    return user_cache_path("lashbench", appauthor=False)
+
+
+def log_path() -> Path:
+    """The log file; it may not be there yet."""
+    from platformdirs import user_state_path
+
+    return user_state_path("lashbench", appauthor=False) / "lashbench.log"
