@@ -26,6 +26,9 @@ NOISE_V = 5e-4
 SHARES = (0.06, 0.4)
 """By how much a datasheet value is off, up or down."""
 
+GROWTH = (0.4, 1.4)
+"""Logarithm of the factor by which a friction of the datasheet has grown."""
+
 SIZES = (0.4, 0.75)
 """Where other effects lie between the ends of their range, by logarithm."""
 
@@ -57,6 +60,9 @@ def drawn_effect(unit: Unit, effect: str, rng: np.random.Generator) -> EffectSet
         if hypothesis.centred:
             off = rng.uniform(*SHARES) * rng.choice([-1.0, 1.0])
             values[parameter.name] = known[parameter.name] * (1.0 + off)
+        elif parameter.name in known:
+            # Friction of the datasheet: what wear or cold grease make of it.
+            values[parameter.name] = float(known[parameter.name] * np.exp(rng.uniform(*GROWTH)))
         elif parameter.name == "f_p":
             # A payload that resonates in or near the band that is measured.
             values[parameter.name] = float(rng.uniform(0.8, 1.2)) * rng.uniform(*_band(unit))
