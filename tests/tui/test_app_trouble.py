@@ -211,6 +211,25 @@ def test_a_band_picked_on_the_plot_is_measured_again(tmp_path):
         assert len(store.points(measurement, superseded=True)) == 20
 
 
+def test_the_stop_key_works_without_a_session(tmp_path):
+    """It switches off what was found driving, once the instrument has answered."""
+
+    async def way(url):
+        async with operated(tmp_path / "bench.db") as op:
+            await op.press("ctrl+x")
+            await op.sees("no instrument is connected")
+            screen = await op.connects(url)
+            assert "SOURCE ON: switch it off by hand" in screen
+            await op.press("enter", "ctrl+x")
+            await op.sees("source confirmed off", "SOURCE OFF (confirmed)")
+
+    analyser = gimbal_analyser()
+    for line in (b"*RST\n", b"INST:SEL SINE\n", b"SOUR:VOLT 2 VPK\n"):
+        analyser.listen(line, end=True)
+    with served(analyser) as url:
+        run(lambda: way(url))
+
+
 def test_no_instrument_says_what_to_try(tmp_path):
     async def way():
         async with operated(tmp_path / "bench.db") as op:

@@ -64,7 +64,7 @@ class SessionKeeper:
         desk = self._app.desk
         if desk.unit is None or not self._free("a session is under way; stop it first"):
             return False
-        run = RunView(hold=hold)
+        run = RunView(hold=hold, source=desk.run.source)
         try:
             request = desk.request(remeasure_hz)
             if desk.resume is not None:
@@ -93,7 +93,8 @@ class SessionKeeper:
             self._control.interrupt("stopped by the operator")
             return "stopping: the source is being made safe"
         if self.busy:
-            return "the instrument is being asked; nothing drives"
+            self._then = self._app.action_stop_source
+            return "the source is switched off as soon as the instrument has answered"
         if desk.identity is None or desk.unit is None:
             return "no instrument is connected; nothing can drive"
         work = partial(bench_owner.stop_source, self._app.post_message, desk.url, desk.unit)
