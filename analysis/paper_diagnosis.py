@@ -133,6 +133,7 @@ def diagnose_paper(
     *,
     progress: Progress | None = None,
     seed: int = 0,
+    without: Collection[str] = (),
     effort: Effort | None = None,
 ) -> PaperDiagnosis:
     """Diagnose one of the paper's units from its own measured row.
@@ -145,6 +146,8 @@ def diagnose_paper(
         Told the share done and what is being done, from the calling thread.
     seed
         Of the starts and places of the simulations.
+    without
+        Effects to leave out of the catalogue.
     effort
         How much is simulated.
 
@@ -162,6 +165,7 @@ def diagnose_paper(
         paper_reading(name),
         load_unit(name),
         known_ratio=row.ratio_percent / 100.0,
+        without=without,
         progress=progress,
         seed=seed,
         effort=effort,

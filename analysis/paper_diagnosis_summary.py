@@ -108,9 +108,12 @@ def _damping(belief: Belief) -> list[str]:
 
 def _sets(belief: Belief) -> list[str]:
     lines = ["  sets by probability (and share of their own runs that agree worse, %):"]
-    for one in (belief.best, *belief.rivals):
-        worse = 100.0 * one.probability_of_worse
-        lines.append(f"    {one.probability:6.3f}  {_name(one)}  ({worse:.2g})")
+    named = {id(one) for one in (belief.best, *belief.rivals)}
+    for one in belief.judged:
+        if id(one) in named:
+            mark = "" if one.adequate else ", unlike its own runs"
+            worse = 100.0 * one.probability_of_worse
+            lines.append(f"    {one.probability:6.3f}  {_name(one)}  ({worse:.2g}{mark})")
     found = list(belief.inclusion().items())[:5]
     lines.append("  causes by probability: " + ", ".join(f"{e} {p:.2f}" for e, p in found))
     return lines

@@ -56,8 +56,8 @@ class Effort:
     """
 
     lanes: int = 16
-    points: int = 36
-    settle_cycles: int = 30
+    points: int = 34
+    settle_cycles: int = 25
     integrate_cycles: int = 20
     baseline: int = 3
     first: int = 4
@@ -65,7 +65,7 @@ class Effort:
     refined: int = 6
     refinement: int = 2
     pairs: int = 3
-    pair_groups: int = 7
+    pair_groups: int = 6
     places: int = 4
 
     def groups(self, hypothesis: Hypothesis) -> int:

@@ -36,7 +36,7 @@ LONGEST_STEP_S = 1e-5
 LEAST_RISE_DB = 0.5
 """A hill that stands out of its valley by less is no feature."""
 
-_BELOW, _ABOVE = 0.72, 1.4
+_BELOW, _ABOVE = 0.74, 1.4
 """The band from this share of ARF to this multiple of RF."""
 
 
