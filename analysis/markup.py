@@ -55,7 +55,7 @@ def table(
     **attributes: str,
 ) -> Markup:
     """A table; with `row_heads` the first cell of each row is its heading."""
-    top = ()
+    top: tuple[Markup, ...] = ()
     if head:
         top = (
             element("thead", element("tr", [element("th", cell, scope="col") for cell in head])),
