@@ -29,12 +29,17 @@ _ORDERS = (1.0, 0.5, 0.25)
 """Prior weight of no cause, of one and of two; shared alike by all sets of an order."""
 
 _UNLIKE = 0.02
-"""A measurement that fewer runs of the best set than this would agree with worse is unlike it."""
+"""A measurement is unlike a set of whose own runs fewer than this share would agree worse."""
 
 _SURE = 0.8
 """Probability from which one set is the explanation."""
 
 _WORTH_NAMING = 0.02
+
+_EVIDENCE_STD = 1.0
+"""Error of a log-evidence from the runs that it rests on; searches of other seeds differ by it."""
+
+_EVIDENCE_DRAWS = 1000
 _RUNS = 20_000
 
 
@@ -119,6 +124,17 @@ class Belief:
         """Probability that at least one of these effects is part of the answer."""
         return float(sum(one.probability for one in self.judged if set(one.effects) & set(effects)))
 
+    def expected_index(self) -> tuple[float, float]:
+        """Error index of a single run, Hz: mean and std over the sets worth naming."""
+        named = [one for one in self.judged if one is self.best or one.probability > _WORTH_NAMING]
+        weight = np.array([one.probability for one in named])
+        weight = weight / weight.sum()
+        indices = [index_of(one.agreement) for one in named]
+        mean = np.array([one.expected for one in indices])
+        std = np.array([one.expected_std for one in indices])
+        centre = float(weight @ mean)
+        return centre, float(np.sqrt(weight @ (std**2 + (mean - centre) ** 2)))
+
     def best_of(self, effects: Collection[str]) -> Judged | None:
         """The set with the greatest evidence among those made of these effects alone."""
         made = [one for one in self.judged if one.effects and set(one.effects) <= set(effects)]
@@ -147,12 +163,19 @@ def believe(explored: Sequence[Explored], reading: Reading, knowledge: Knowledge
             for order in (len(one.hypothesis.effects),)
         ]
     )
-    weight = np.exp(score - score.max())
-    weight /= weight.sum()
+    weight = _probabilities(score)
     order = np.argsort(-weight)
     return Belief(
         knowledge, tuple(Judged(agreements[int(k)], float(weight[int(k)])) for k in order)
     )
+
+
+def _probabilities(score: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Probabilities of sets from their log-scores, averaged over the error of these."""
+    rng = np.random.default_rng(0)
+    drawn = score + _EVIDENCE_STD * rng.standard_normal((_EVIDENCE_DRAWS, len(score)))
+    weight = np.exp(drawn - drawn.max(axis=1, keepdims=True))
+    return np.asarray(np.mean(weight / weight.sum(axis=1, keepdims=True), axis=0))
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from analysis.paper_belief import Belief, Judged, index_of
 from analysis.paper_evidence import Agreement
-from analysis.paper_pairs import DISSIPATION, VISCOUS
+from analysis.paper_pairs import DISSIPATION, LOADS, VISCOUS
 from analysis.paper_sweeps import PAPER_LEVEL_VPK
 from sim.catalogue import CATALOGUE
 
@@ -25,6 +25,8 @@ __all__ = ["damping_is_enough", "document", "held_out", "parameters", "residual"
 _QUANTITIES = ("arf-frequency", "arf-gain", "rf-frequency", "rf-gain", "arf-half-power-width")
 _UNITS = ("Hz", "dB", "Hz", "dB", "Hz")
 _GAINS = [1, 3]
+
+_CHAIN = tuple(effect.id for effect in CATALOGUE.values() if effect.site == "chain")
 
 _NOT_TOLD_APART = 3.0
 """Sets whose log-evidence differs by less than this (1 in 20) are not told apart."""
@@ -70,6 +72,11 @@ def _section(belief: Belief) -> dict[str, Any]:
         ],
         "site": list(best.hypothesis.sites),
         "inclusion": belief.inclusion(),
+        "kinds": {
+            "loses-energy": belief.probability_of_any(DISSIPATION),
+            "more-on-the-load": belief.probability_of_any(LOADS),
+            "measuring-chain": belief.probability_of_any(_CHAIN),
+        },
         "anything_missing": 1.0 - belief.baseline.probability,
         "baseline": _model(belief.baseline, base_sigma, base_db),
         "extended": _model(belief.best, best_sigma, best_db),
@@ -183,9 +190,11 @@ def _model(judged: Judged, sigma: float, db: float) -> dict[str, Any]:
 
 def _index_section(belief: Belief) -> dict[str, Any]:
     before, after = (index_of(one.agreement) for one in (belief.baseline, belief.best))
+    over_all, over_all_std = belief.expected_index()
     return {
         "before": _index(belief.baseline.agreement),
         "after": _index(belief.best.agreement),
+        "all_sets": {"expected_hz": over_all, "expected_std_hz": over_all_std},
         "fall_hz": {
             "value": before.expected - after.expected,
             "std": float(np.hypot(before.expected_std, after.expected_std)),
@@ -220,7 +229,6 @@ def _damping_alone(belief: Belief) -> dict[str, Any] | None:
         "log_evidence_behind_best": _behind(alone, belief),
         "error_index": _index(alone.agreement),
         "residual": residual(alone.agreement),
-        "probability_that_energy_is_lost": belief.probability_of_any(DISSIPATION),
     }
 
 

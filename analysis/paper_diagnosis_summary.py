@@ -11,7 +11,7 @@ import numpy as np
 
 from analysis.paper_belief import Belief, Judged, index_of
 from analysis.paper_diagnosis_document import damping_is_enough, parameters, residual
-from analysis.paper_pairs import DISSIPATION, VISCOUS
+from analysis.paper_pairs import DISSIPATION, LOADS, VISCOUS
 from sim.catalogue import CATALOGUE
 
 if TYPE_CHECKING:
@@ -83,10 +83,12 @@ def _wrong(belief: Belief) -> list[str]:
 
 def _index(belief: Belief) -> list[str]:
     before, after = (index_of(one.agreement) for one in (belief.baseline, belief.best))
+    over_all, over_all_std = belief.expected_index()
     return [
         f"  error index of a single run: {before.expected:.1f} +- {before.expected_std:.1f} Hz for "
-        f"the plain model, {after.expected:.1f} +- {after.expected_std:.1f} Hz for the best set; "
-        f"two runs of one machine differ by {after.floor:.1f} Hz"
+        f"the plain model, {after.expected:.1f} +- {after.expected_std:.1f} Hz for the best set, "
+        f"{over_all:.1f} +- {over_all_std:.1f} Hz over all sets by probability; two runs of the "
+        f"best differ by {after.floor:.1f} Hz"
     ]
 
 
@@ -102,7 +104,8 @@ def _damping(belief: Belief) -> list[str]:
         f"error index {index.expected:.1f} +- {index.expected_std:.1f} Hz, "
         f"{100.0 * alone.probability_of_worse:.2g} % of its own runs agree worse",
         f"  something takes energy out of the motion: probability "
-        f"{belief.probability_of_any(DISSIPATION):.2f}",
+        f"{belief.probability_of_any(DISSIPATION):.2f}; more hangs on the load than the datasheet "
+        f"says: {belief.probability_of_any(LOADS):.2f}",
     ]
 
 

@@ -20,7 +20,7 @@ from analysis.paper_exploration import Explored
 from analysis.paper_surface import FREEDOM
 from analysis.paper_sweeps import Reading
 
-__all__ = ["DISSIPATION", "VISCOUS", "GuessedPair", "guess_pairs", "possible_pairs"]
+__all__ = ["DISSIPATION", "LOADS", "VISCOUS", "GuessedPair", "guess_pairs", "possible_pairs"]
 
 VISCOUS = ("load-viscous-damping", "shaft-damping", "mesh1-damping", "mesh2-damping")
 """What the paper calls missing damping: its model has none in the gear train or on the load."""
@@ -33,6 +33,9 @@ DISSIPATION = (
     "load-stribeck-friction",
 )
 """Whatever takes energy out of the motion; one of each pair is one of these."""
+
+LOADS = ("load-inertia", "payload-flexibility")
+"""What the paper may mean by uncertainty of the load."""
 
 _RATIOS, _SIZES = 8, 24
 _HEAT, _MARGIN = 3.0, 0.1

@@ -101,7 +101,7 @@ def test_a_cause_left_out_is_not_explained_by_the_plain_model(
     explorer: Explorer, explored: list[Explored]
 ) -> None:
     """Heavy damping is none of what was offered; the plain model must not pass for it."""
-    for reading in read_hidden(explorer, "shaft-damping", 0.012, 4):
+    for reading in read_hidden(explorer, "shaft-damping", 0.03, 4):
         belief = believe(explored, reading, KNOWN)
         assert belief.word != "consistent"
         assert not belief.baseline.adequate

@@ -217,7 +217,8 @@ def test_every_further_cause_must_pay() -> None:
     right = Reading(np.array([60.0, -30.0, 80.0, -5.0, 8.0]), np.full(5, 0.5))
     belief = believe([baseline, other], right, Knowledge(RatioPrior()))
     assert belief.word == "consistent"
-    assert belief.baseline.probability == pytest.approx(2.0 / 3.0, abs=0.12)
+    assert belief.baseline.probability == pytest.approx(0.63, abs=0.12)
+    assert sum(one.probability for one in belief.judged) == pytest.approx(1.0)
 
 
 def test_what_nothing_gives_is_unexplained() -> None:
