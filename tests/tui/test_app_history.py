@@ -6,6 +6,7 @@ import pytest
 from screen import ESTIMATE, operated, quick_analyses, run
 
 from daq.store import Store
+from tui.app.analyses import Analyses
 from tui.app.log_file import logging_to_file
 from tui.cli import main
 from tui.places import log_path
@@ -55,6 +56,26 @@ def test_trend_overlay_and_opening(db):
     run(way)
     with Store(db, read_only=True) as store:
         assert set(store.latest_estimates()) == {1, 2}
+
+
+def test_the_report_is_written_where_the_operator_is(db, tmp_path, monkeypatch):
+    async def way():
+        analyses = Analyses(quick_analyses().estimate, quick_analyses().diagnose)
+        async with operated(db, analyses=analyses) as op:
+            await op.press("7", "enter")
+            await op.sees("r = 0.310")
+            await op.press("7", "w")
+            await op.sees("REPORT: report-2.html in ")
+
+    folder = tmp_path / "here"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    run(way)
+    (page,) = folder.iterdir()
+    text = page.read_text()
+    assert "SIMULATED" in text
+    assert "ADSS" in text
+    assert "SN 7" in text
 
 
 def test_an_earlier_session_stands_behind_the_sweep(db):

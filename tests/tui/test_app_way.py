@@ -8,7 +8,8 @@ from daq.store import Store
 
 
 @pytest.mark.parametrize("size", SIZES, ids=[f"{w}x{h}" for w, h in SIZES])
-def test_all_seven_steps(tmp_path, size):
+def test_all_seven_steps(tmp_path, monkeypatch, size):
+    monkeypatch.chdir(tmp_path)
     db = tmp_path / "bench.db"
 
     async def way(url):

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from textual.message import Message
 
-from daq.errors import AnalysisError, LashbenchError
+from daq.errors import LashbenchError
 from tui.app.messages import AnalysisDone, AnalysisFailed, AnalysisProgressed, Job
 
 if TYPE_CHECKING:
@@ -36,17 +36,19 @@ def _estimate(response: FrequencyResponse, unit: Unit, progress: Progress) -> Ma
 
 
 def _diagnose(response: FrequencyResponse, unit: Unit, progress: Progress) -> Any:
-    try:
-        from analysis.diagnosis import diagnose_response
-    except ImportError as error:
-        raise AnalysisError("this installation has no diagnosis; update lashbench") from error
-    return diagnose_response(response, unit, progress=progress)
+    from analysis.diagnosis import diagnose_response
+    from tui.places import cache_folder
+
+    return diagnose_response(response, unit, cache=cache_folder(), progress=progress)
 
 
 def _report(task: Task, diagnosis: Any, path: Path) -> None:
     from tui.reports import report_measurement
 
-    report_measurement(path, task.db, task.measurement, task.unit, diagnosis=diagnosis)
+    remarks = {} if diagnosis is not None else {"diagnosis": "No diagnosis was asked for."}
+    report_measurement(
+        path, task.db, task.measurement, task.unit, diagnosis=diagnosis, remarks=remarks
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,6 +127,8 @@ class Task:
 
 def read_result(task: Task, analyses: Analyses) -> None:
     """Features first, since they are quick; then the estimate, from the history if it is there."""
+    from daq.store import Store
+    from tui.reports import kept_estimate
 
     def features() -> tuple[FrequencyResponse, Any]:
         from analysis.resonance import extract
@@ -133,7 +137,8 @@ def read_result(task: Task, analyses: Analyses) -> None:
         return response, extract(response)
 
     def estimate() -> Mapping[str, Any]:
-        known = _known_estimate(task)
+        with Store(task.db, read_only=True) as store:
+            known = kept_estimate(store, task.measurement, task.unit)
         if known is not None:
             return known
         made = analyses.estimate(task.response(), task.unit, task.progress("result"))
@@ -158,18 +163,6 @@ def write_report(task: Task, analyses: Analyses, diagnosis: Any, path: Path) -> 
         return path
 
     task.run("report", work)
-
-
-def _known_estimate(task: Task) -> Mapping[str, Any] | None:
-    """The last estimate, unless it failed or points were taken since."""
-    from daq.store import Store
-
-    with Store(task.db, read_only=True) as store:
-        known = store.latest_estimates().get(task.measurement)
-        ended = store.measurement(task.measurement).ended
-    if known is None or "contribution_ratio" not in known.document:
-        return None
-    return known.document if ended is not None and known.made > ended else None
 
 
 def _keep_estimate(task: Task, document: Mapping[str, Any]) -> None:

@@ -114,8 +114,9 @@ contribution ratio of every estimated session with its error bar. U lists all un
         if desk.measurement is None:
             self.notify("open a session first: Enter", severity="warning")
             return
-        path = desk.db.parent / f"report-{desk.measurement}.html"
-        self.bench.analyses.begin("report", Path(path))
+        # Where the operator is, not where the history lies: that may be a hidden folder.
+        path = Path.cwd() / f"report-{desk.measurement}.html"
+        self.bench.analyses.begin("report", path)
         self.show()
 
     def action_mark(self) -> None:
@@ -234,13 +235,15 @@ contribution ratio of every estimated session with its error bar. U lists all un
         panel.errorbar(place, value, None, std, marker="o", marker_style="bright_blue")
 
     def _lines(self) -> list[str]:
-        results = self.desk.results
-        lines = [] if self.has_class("-overlay") else [_TREND_WORDS]
-        lines += [line for line in trend_lines(trend_rows(self._rows)) if line]
+        results, lines = self.desk.results, []
+        # What was just asked for comes first; small screens show the first lines only.
         if results.report is not None:
-            lines.append(f"REPORT: {results.report}")
+            lines.append(f"REPORT: {results.report.name} in {results.report.parent}")
         if "report" in results.faults:
             lines.append(f"NO REPORT: {results.faults['report']}")
+        if not self.has_class("-overlay"):
+            lines.append(_TREND_WORDS)
+        lines += [line for line in trend_lines(trend_rows(self._rows)) if line]
         if not any(row["contribution_ratio"] for row in self._rows):
             lines.append("no session is estimated yet: open one with Enter")
         return lines
