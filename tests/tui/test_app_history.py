@@ -65,7 +65,7 @@ def test_the_report_is_written_where_the_operator_is(db, tmp_path, monkeypatch):
             await op.press("7", "enter")
             await op.sees("r = 0.310")
             await op.press("7", "w")
-            await op.sees("REPORT: report-2.html in ")
+            await op.sees("REPORT: report-2.html")
 
     folder = tmp_path / "here"
     folder.mkdir()
