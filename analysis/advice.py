@@ -25,6 +25,8 @@ def stage_to_adjust(document: Mapping[str, Any]) -> str:
     ratio lies on one side of one half.
     """
     ratio = document["contribution_ratio"]
+    if ratio["value"] == 1.0 and not ratio["std"]:
+        return "There is one gear stage: it holds all of the backlash."
     low, high = ratio.get("interval95") or _interval(ratio)
     share = f"{100 * ratio['value']:.0f} % of the backlash sits in stage 1 (95 %: "
     share += f"{100 * low:.0f} to {100 * high:.0f} %)"
@@ -42,9 +44,9 @@ def limit_lines(document: Mapping[str, Any], unit: Unit) -> list[str]:
     them the whole backlash in that stage is the greatest value there can be.
     """
     b_t = unit.backlash.b_t_deg
-    most = {"b1_deg": b_t * unit.stage2.N, "b2_deg": b_t}
+    most = {"b1_deg": b_t * unit.output_ratio, "b2_deg": b_t}
     lines = []
-    for stage, name in enumerate(most, start=1):
+    for stage, name in enumerate(list(most)[: unit.stages], start=1):
         value, std = document[name]["value"], document[name]["std"] or 0.0
         limit = getattr(unit.limits, name)
         said = f"b{stage} = {value:.4f} +- {std:.4f} deg"
@@ -58,7 +60,7 @@ def limit_lines(document: Mapping[str, Any], unit: Unit) -> list[str]:
 def stage_actions(document: Mapping[str, Any], unit: Unit) -> list[str]:
     """What to do about each stage that has a limit: leave, adjust or replace, measure again."""
     actions = []
-    for stage in (1, 2):
+    for stage in range(1, unit.stages + 1):
         name = f"b{stage}_deg"
         limit = getattr(unit.limits, name)
         if limit is None:

@@ -23,6 +23,7 @@ from analysis.observation import Observation, observe
 from analysis.search import search_causes
 from analysis.sizing import size_candidate
 from analysis.verdict import Judged, Verdict, judge_candidates
+from daq.errors import AnalysisError
 from daq.frf import FrequencyResponse
 from sim.catalogue import CATALOGUE
 from sim.unit import Unit
@@ -205,8 +206,13 @@ def diagnose_response(
     Raises
     ------
     AnalysisError
-        If no usable point is left, or a motion grew without bound.
+        If no usable point is left, a motion grew without bound, or the unit has one stage.
     """
+    if unit.stages == 1:
+        raise AnalysisError(
+            f"unit {unit.name} has one gear stage, and the search shares the backlash out between "
+            "two; estimate tells its backlash"
+        )
     started = time.perf_counter()
     observation = observe(response)
 

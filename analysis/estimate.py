@@ -19,6 +19,7 @@ from analysis.ensemble import Machine
 from analysis.fit import RATIO, Axis, Posterior, fit_posterior
 from analysis.observation import observe
 from analysis.paper_estimate import IndexCurve, index_curve_of_response
+from daq.errors import InputError
 from daq.frf import FrequencyResponse
 from sim.unit import Unit
 
@@ -114,7 +115,9 @@ def estimate_response(
     unit
         The unit under test.
     total_backlash_unknown
-        Fit the total backlash too, over 0.5 to 2 times the unit's.
+        Fit the total backlash too, over 0.5 to 2 times the unit's. A drive
+        with one stage has nothing to share out: there the total is what is
+        estimated, over 0.2 to 3 times the unit's, and the ratio is 1.
     progress
         Told the share done and what is being done.
     seed
@@ -127,7 +130,9 @@ def estimate_response(
     """
     observation = observe(response)
     axes: tuple[Axis, ...] = (RATIO,)
-    if total_backlash_unknown:
+    if unit.stages == 1:
+        axes = (_play_axis(unit),)
+    elif total_backlash_unknown:
         axes = (replace(RATIO, coarse=17, scale=0.12), _total_axis(unit))
     posterior = fit_posterior(unit, observation, axes, seed=seed, progress=progress)
     curve = index_curve_of_response(response, observation, posterior.draws)
@@ -149,10 +154,15 @@ def estimate_features(
     Raises
     ------
     InputError
-        If the frequencies are not positive or not in order.
+        If the frequencies are not positive or not in order, or the unit has one gear stage.
     AnalysisError
         If the simulated unit shows no such features anywhere near.
     """
+    if unit.stages == 1:
+        raise InputError(
+            f"unit {unit.name} has one gear stage: two frequencies share nothing out; "
+            "estimate from a whole response"
+        )
     from analysis.paper_estimate import fit_features
 
     fitted = fit_features(arf_hz, rf_hz, unit, seed=seed, progress=progress)
@@ -178,6 +188,16 @@ def _total_axis(unit: Unit) -> Axis:
     return Axis("b_t_deg", 0.5 * b_t, 2.0 * b_t, 9, 0.2 * b_t, put)
 
 
+def _play_axis(unit: Unit) -> Axis:
+    """The total backlash of a drive with one stage, which holds all of it."""
+    b_t = unit.backlash.b_t_deg
+
+    def put(machine: Machine, value: float) -> Machine:
+        return replace(machine, ratio=1.0, b_t_deg=value)
+
+    return Axis("b_t_deg", 0.2 * b_t, 3.0 * b_t, 33, 0.2 * b_t, put)
+
+
 def _robust_rms(posterior: Posterior) -> float:
     z = posterior.match.residual[:2] / posterior.match.std[:2]
     z = z[np.isfinite(z)]
@@ -187,7 +207,9 @@ def _robust_rms(posterior: Posterior) -> float:
 def _from_posterior(
     unit: Unit, posterior: Posterior, curve: IndexCurve | None, warnings: tuple[str, ...]
 ) -> Estimate:
-    mesh = np.meshgrid(*posterior.values, indexing="ij")
+    mesh = list(np.meshgrid(*posterior.values, indexing="ij"))
+    if unit.stages == 1:
+        mesh = [np.ones_like(mesh[0]), *mesh]
     ratios = mesh[0].ravel()
     total = mesh[1].ravel() if len(mesh) > 1 else np.full(ratios.shape, unit.backlash.b_t_deg)
     return _assemble(
@@ -209,7 +231,7 @@ def _assemble(
     return Estimate(
         unit=unit.name,
         contribution_ratio=_uncertain(ratios, weight),
-        b1_deg=_uncertain(ratios * total_deg * unit.stage2.N, weight),
+        b1_deg=_uncertain(ratios * total_deg * unit.output_ratio, weight),
         b2_deg=_uncertain((1.0 - ratios) * total_deg, weight),
         b_t_deg=Uncertain(float(total_deg[0]), 0.0) if known else _uncertain(total_deg, weight),
         curve=curve,

@@ -15,7 +15,7 @@ from analysis.paper_numbers import UnitName
 from daq.plan import SweepPlan
 from sim.paper_scheme import PAPER_LEVEL_VPK, paper_gains
 from sim.response import Servo, simulate_cycles
-from sim.unit import load_unit, stage_backlash
+from sim.unit import load_unit
 
 __all__ = ["exact_runs_db", "grid_hz", "paper_runs_db"]
 
@@ -49,7 +49,7 @@ def paper_runs_db(
     unit = load_unit(unit_name)
     gains = paper_gains(
         unit,
-        stage_backlash(ratio_percent / 100.0, unit.backlash.b_t_deg, unit.stage2.N),
+        unit.split(ratio_percent / 100.0),
         grid_hz(unit_name).tolist(),
         starts=runs,
         start_spread=start_spread,

@@ -15,7 +15,7 @@ from daq.errors import ConfigurationError
 
 __all__ = ["config_names", "config_path", "sample_names", "sample_path"]
 
-Kind = Literal["units", "benches", "recipes", "paper"]
+Kind = Literal["units", "benches", "recipes", "paper", "templates"]
 
 
 def _root() -> Path:

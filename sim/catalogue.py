@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, Literal
 
-from sim.drivetrain import Drivetrain
+from daq.errors import ConfigurationError
+from sim.drivetrain import Drivetrain, shaft_end
 from sim.elements import (
     ConstantTorque,
     Damper,
@@ -75,12 +76,12 @@ def _span(low: float, high: float) -> Callable[[Unit], tuple[float, float]]:
 
 def _load_critical(unit: Unit) -> float:
     """Damping that would be critical for the load on shaft 1, N.m.s/rad: a natural scale."""
-    stiffness = unit.stage1.k_s1 * unit.stage2.N**2
+    stiffness = unit.stage1.k_s1 * unit.output_ratio**2
     return 2.0 * math.sqrt(stiffness * unit.load.J_L)
 
 
 def _shaft_critical(unit: Unit) -> float:
-    return _load_critical(unit) / unit.stage2.N**2
+    return _load_critical(unit) / unit.output_ratio**2
 
 
 def _add_load_damper(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrain:
@@ -90,16 +91,27 @@ def _add_load_damper(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drive
 def _add_shaft_dampers(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrain:
     return d.adding(
         shaft_gear_damper=Damper({"th_g1": 1.0, "th_s1": -1.0}, 2.0 * v["c_s1"]),
-        shaft_pinion_damper=Damper({"th_s1": 1.0, "th_p2": -1.0}, 2.0 * v["c_s1"]),
+        shaft_pinion_damper=Damper({"th_s1": 1.0, shaft_end(unit): -1.0}, 2.0 * v["c_s1"]),
     )
 
 
 def _harden_shaft(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrain:
-    k = 2.0 * unit.stage1.k_s1
-    return d.adding(
-        gear_half_hardening=HardeningSpring("harden1", {"th_g1": 1.0, "th_s1": -1.0}, k, v["h"]),
-        pinion_half_hardening=HardeningSpring("harden2", {"th_s1": 1.0, "th_p2": -1.0}, k, v["h"]),
+    k, halves = (
+        2.0 * unit.stage1.k_s1,
+        ({"th_g1": 1.0, "th_s1": -1.0}, {"th_s1": 1.0, shaft_end(unit): -1.0}),
     )
+    return d.adding(
+        gear_half_hardening=HardeningSpring("harden1", halves[0], k, v["h"]),
+        pinion_half_hardening=HardeningSpring("harden2", halves[1], k, v["h"]),
+    )
+
+
+def _damp_mesh2(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrain:
+    if unit.stage2 is None:
+        raise ConfigurationError(
+            f"effect mesh2-damping: unit {unit.name} has one gear stage; leave it out"
+        )
+    return d.replacing("mesh2", c=v["c_2"])
 
 
 def _add_payload(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrain:
@@ -148,12 +160,12 @@ def _drive_voltage(unit: Unit) -> float:
 def _stall_torque(unit: Unit) -> float:
     """Torque at the load for 1 V at the amplifier, a natural scale of load torques, N.m."""
     motor = unit.motor
-    ratio = unit.stage1.N_1 * unit.stage2.N
+    ratio = unit.stage1.N_1 * unit.output_ratio
     return unit.electronics.k_a * motor.k_t / motor.R_m * ratio
 
 
 def _shaft_at_load(unit: Unit) -> float:
-    return unit.stage1.k_s1 * unit.stage2.N**2
+    return unit.stage1.k_s1 * unit.output_ratio**2
 
 
 _P = EffectParameter
@@ -190,7 +202,7 @@ _ALL = (
         "plant",
         "Gear 2 loses energy while its teeth touch.",
         "thick or fresh grease in gear stage 2",
-        on_drivetrain=lambda d, unit, v: d.replacing("mesh2", c=v["c_2"]),
+        on_drivetrain=_damp_mesh2,
     ),
     Effect(
         "load-coulomb-friction",

@@ -238,6 +238,8 @@ def open_loopback(
     def open_one(rest: str) -> Loopback:
         wanted = read_loopback_settings(rest)
         share = wanted.ratio if "ratio=" in rest or ratio is None else ratio
+        if unit.stages == 1 and "ratio=" not in rest and ratio is None:
+            share = 1.0
         instrument = Analyser35670A(
             SteppedServo(unit, share, wanted.effects or tuple(effects), seed=wanted.seed),
             Choices(seed=wanted.seed, noise_v=wanted.noise_v, options=wanted.options),

@@ -10,9 +10,9 @@ import math
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from daq.configs import config_path
 from daq.errors import ConfigurationError
@@ -72,8 +72,8 @@ class Stage1(_Section):
     """Stiffness of shaft 1, N.m/rad; each half is 2 k_s1."""
     J_s1: Positive
     """Lumped inertia in the middle of shaft 1, kg.m^2."""
-    J_p2: Positive
-    """Pinion 2, kg.m^2."""
+    J_p2: Positive | None = None
+    """Pinion 2, kg.m^2; left out where there is no second stage."""
 
 
 class Stage2(_Section):
@@ -123,10 +123,46 @@ class Unit(_Section):
     motor: Motor
     electronics: Electronics
     stage1: Stage1
-    stage2: Stage2
+    stage2: Stage2 | None = None
+    """Left out by a drive with one gear stage, whose shaft 1 carries the load itself."""
     load: Load
     backlash: Backlash
     limits: Limits
+
+    @model_validator(mode="after")
+    def _has_whole_stages(self) -> Self:
+        if self.stage2 is not None and self.stage1.J_p2 is None:
+            raise ValueError("stage1.J_p2 is required by [stage2]; a one-stage drive has neither")
+        if self.stage2 is None and self.stage1.J_p2 is not None:
+            raise ValueError("[stage2] is required by stage1.J_p2; a one-stage drive has neither")
+        if self.stage2 is None and self.limits.b2_deg is not None:
+            raise ValueError("limits.b2_deg limits stage 2, and there is none; leave it out")
+        return self
+
+    @property
+    def stages(self) -> int:
+        """Number of gear stages, 1 or 2."""
+        return 1 if self.stage2 is None else 2
+
+    @property
+    def output_ratio(self) -> float:
+        """Ratio from shaft 1 to the load: that of stage 2, or 1 where there is none."""
+        return 1.0 if self.stage2 is None else self.stage2.N
+
+    def split(self, ratio: float) -> StageBacklash:
+        """The backlash of each stage at a contribution ratio.
+
+        Raises
+        ------
+        ConfigurationError
+            If the ratio is outside 0 to 1, or not 1 where there is one stage only.
+        """
+        if self.stage2 is None and ratio != 1.0:
+            raise ConfigurationError(
+                f"contribution ratio {ratio}: unit {self.name} has one gear stage, which holds "
+                "all of the backlash; give 1"
+            )
+        return stage_backlash(ratio, self.backlash.b_t_deg, self.output_ratio)
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -142,6 +178,7 @@ class Unit(_Section):
         return {
             name: value
             for section in sections
+            if section is not None
             for name, value in section.model_dump().items()
             if isinstance(value, float)
         }
@@ -182,6 +219,8 @@ def unit_from_mapping(document: dict[str, Any], source: str) -> Unit:
         faults = "; ".join(
             f"{'.'.join(str(part) for part in fault['loc'])}: {fault['msg']}"
             + ("" if fault["type"] == "missing" else f" (got {fault['input']!r})")
+            if fault["loc"]
+            else str(fault["msg"]).removeprefix("Value error, ")
             for fault in error.errors()
         )
         raise ConfigurationError(f"{source}: {faults}") from error

@@ -31,6 +31,7 @@ VERBS = {
     "history": ("tui.commands.history:history", "List a bench's measurements and their trend."),
     "export": ("tui.commands.export:export", "Write a stored measurement to a file."),
     "report": ("tui.commands.report:report", "Write a report that prints, as one HTML file."),
+    "new-unit": ("tui.commands.new_unit:new_unit", "Write a unit file to fill in."),
     "serve": ("tui.commands.serve:serve", "Serve a simulated 35670A on a wire."),
     "demo": ("tui.commands.demo:demo", "Do the whole job without hardware."),
     "bench": ("tui.commands.bench:bench", "Open the bench screen; so does no verb at all."),

@@ -1,0 +1,40 @@
+"""The estimate on a drive with one gear stage: its play, when nothing is to be shared out."""
+
+import pytest
+
+from analysis.advice import limit_lines, stage_actions, stage_to_adjust
+from analysis.diagnosis import diagnose_response
+from analysis.estimate import estimate_features, estimate_response
+from daq.configs import config_path
+from daq.errors import AnalysisError, InputError
+from daq.plan import SweepPlan, spaced_frequencies
+from sim.response import simulate
+from sim.unit import load_unit
+
+ONE = load_unit(str(config_path("templates", "one-stage")))
+
+
+@pytest.fixture(scope="module")
+def measured():
+    worn = ONE.with_parameters(b_t_deg=0.21)
+    return simulate(worn, 1.0, SweepPlan(spaced_frequencies(50, 130, 14, "lin"), (2.0,)), seed=5)
+
+
+@pytest.mark.slow
+def test_the_play_is_found_though_the_file_says_another(measured):
+    found = estimate_response(measured, ONE).to_json()
+    b_t = found["b_t_deg"]
+    assert abs(b_t["value"] - 0.21) < 3.0 * b_t["std"]
+    assert b_t["std"] < 0.03
+    assert found["b1_deg"] == b_t
+    assert (found["b2_deg"]["value"], found["contribution_ratio"]["value"]) == (0.0, 1.0)
+    assert stage_to_adjust(found).startswith("There is one gear stage")
+    assert len(limit_lines(found, ONE)) == 1
+    assert "No limits are set" in stage_actions(found, ONE)[0]
+
+
+def test_what_needs_two_stages_says_so(measured):
+    with pytest.raises(InputError, match="one gear stage"):
+        estimate_features(62.0, 101.0, ONE)
+    with pytest.raises(AnalysisError, match="one gear stage"):
+        diagnose_response(measured, ONE)
