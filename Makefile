@@ -5,7 +5,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: help demo test check bench blind lock clean
+.PHONY: help demo test check bench blind faults lock clean
 
 help:
 	@echo "make demo    the whole job without hardware; results in demo/"
@@ -13,6 +13,7 @@ help:
 	@echo "make check   style, types, floors and links; under a minute"
 	@echo "make bench   benchmarks"
 	@echo "make blind   hide effects and have the diagnosis find them; an hour or more"
+	@echo "make faults  hundreds of sessions with something going wrong in each; half an hour"
 	@echo "make lock    write down the installed versions in requirements.lock"
 	@echo "make clean   remove what the other targets left, except .venv"
 
@@ -35,6 +36,9 @@ bench: $(READY)
 blind: $(READY)
 	@$(BIN)/python -m pytest -m study tests/analysis/test_diagnosis.py
 	@$(BIN)/python tests/campaigns/blind_study.py
+
+faults: $(READY)
+	@$(BIN)/python tests/campaigns/faults.py
 
 lock: $(READY)
 	@$(BIN)/python -m pip freeze --exclude-editable > requirements.lock

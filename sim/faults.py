@@ -157,6 +157,15 @@ class FaultBoard:
         self.phase: Phase = "prepare"
         self.points_begun = 0
 
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """Those that are armed, with how often each has struck."""
+        return tuple(self._faults)
+
+    def disarm(self) -> None:
+        """Let nothing strike any more; what was broken stays so."""
+        self._faults.clear()
+
     def take(self, name: str) -> Fault | None:
         """The fault of that name if it strikes now."""
         for fault in self._faults:

@@ -1,0 +1,120 @@
+"""The fault campaign: hundreds of sessions with something going wrong in each, judged one by one.
+
+Run as ``python tests/campaigns/faults.py [--runs N] [--seed S] [--lanes N]
+[--only NUMBER]``, or as ``make faults``. It prints the seed, every broken
+promise as it is found and a table of outcomes, and with ``--write`` puts the
+table into docs/reliability.md. It ends with 1 if any promise was broken.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections import Counter
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / "tests"))
+
+from fault_cases import DISTURBANCES, WIRES, Case, draw_cases  # noqa: E402
+from fault_runs import Campaign, Outcome  # noqa: E402
+
+from sim.faults import CATALOGUE  # noqa: E402
+
+PAGE = ROOT / "docs" / "reliability.md"
+BEGIN, END = "<!-- campaign begins -->", "<!-- campaign ends -->"
+SEED = 20007
+
+
+def main() -> int:
+    """Run, print, and perhaps write."""
+    words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    words.add_argument("--runs", type=int, default=520)
+    words.add_argument("--seed", type=int, default=SEED)
+    words.add_argument("--lanes", type=int, default=4, help="runs at the same time")
+    words.add_argument("--only", type=int, help="only the run of that number")
+    words.add_argument("--kind", help="only runs with that fault or disturbance")
+    words.add_argument("--write", action="store_true", help="write the table into the docs")
+    given = words.parse_args()
+    cases = list(draw_cases(given.runs, given.seed))
+    if given.only is not None:
+        cases = [case for case in cases if case.number == given.only]
+    if given.kind is not None:
+        cases = [case for case in cases if given.kind in (case.fault_name, case.disturbance)]
+    print(f"{len(cases)} runs, seed {given.seed}", flush=True)
+    began = time.monotonic()
+    outcomes = run_all(cases, given.lanes)
+    elapsed_s = time.monotonic() - began
+    lines = table(outcomes, given.seed, elapsed_s)
+    print("\n".join(lines))
+    if given.write:
+        write(lines)
+    return 1 if any(outcome.wrongs for outcome in outcomes) else 0
+
+
+def run_all(cases: Sequence[Case], lanes: int) -> list[Outcome]:
+    """Some at a time: most of a run is waiting."""
+    campaign, done = Campaign(), 0
+    outcomes = []
+    with ThreadPoolExecutor(lanes) as pool:
+        for outcome in pool.map(campaign.run, cases):
+            done += 1
+            outcomes.append(outcome)
+            for wrong in outcome.wrongs:
+                print(f"BROKEN  {outcome.case}\n        {wrong}", flush=True)
+            if done % 50 == 0:
+                print(f"{done} of {len(cases)}", flush=True)
+    return outcomes
+
+
+def table(outcomes: Sequence[Outcome], seed: int, elapsed_s: float) -> list[str]:
+    """What came of it, one row for each fault and each disturbance."""
+    wires = Counter(outcome.case.wire for outcome in outcomes)
+    broken = sum(bool(outcome.wrongs) for outcome in outcomes)
+    off = [o.off_after_s for o in outcomes if o.off_after_s is not None]
+    lines = [
+        f"{len(outcomes)} runs, seed {seed}, {elapsed_s / 60:.0f} minutes; "
+        f"{', '.join(f'{wire} {wires[wire]}' for wire in WIRES)}. "
+        f"Runs with a broken promise: {broken}. Longest session: "
+        f"{max(o.elapsed_s for o in outcomes):.0f} s. Longest time from the end of the program "
+        f"to the source off: {max(off, default=0.0):.1f} s.",
+        "",
+        "| what went wrong | runs | struck | complete | ended early, by exit code | source said "
+        "to be | broken |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for name in (*CATALOGUE, *DISTURBANCES):
+        mine = [o for o in outcomes if name in (o.case.fault_name, o.case.disturbance)]
+        if mine:
+            lines.append(_row(name, mine))
+    return lines
+
+
+def _row(name: str, mine: Sequence[Outcome]) -> str:
+    complete = sum(outcome.code == 0 for outcome in mine)
+    codes = Counter("killed" if o.code is None else str(o.code) for o in mine if o.code != 0)
+    sources = Counter(outcome.source or "not touched" for outcome in mine)
+    cells = [
+        f"`{name}`",
+        str(len(mine)),
+        str(sum(o.fault_struck if o.case.fault_name == name else o.disturbed for o in mine)),
+        str(complete),
+        ", ".join(f"{code}: {codes[code]}" for code in sorted(codes)) or "-",
+        ", ".join(f"{state} {sources[state]}" for state in sorted(sources)),
+        str(sum(bool(outcome.wrongs) for outcome in mine)),
+    ]
+    return f"| {' | '.join(cells)} |"
+
+
+def write(lines: Sequence[str]) -> None:
+    """Put the table between its marks."""
+    text = PAGE.read_text(encoding="utf-8")
+    before, after = text[: text.index(BEGIN)], text[text.index(END) :]
+    PAGE.write_text(f"{before}{BEGIN}\n\n" + "\n".join(lines) + f"\n\n{after}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,128 @@
+"""What may go wrong in one run of the fault campaign, drawn at random; nothing is done here.
+
+A case is a wire, a fault of the instrument, a disturbance on this side, or
+both at once. The first cases go through every fault in every phase and every
+disturbance once on every wire that it can strike; the rest are drawn.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+
+from sim.faults import CATALOGUE, PHASES
+
+WIRES = ("loopback", "tcp", "prologix_tcp", "prologix_pty", "ar488_pty")
+LEVELS_VPK, POINTS = (1.0, 2.0), 7
+"""The plan: so many points at each level."""
+
+DISTURBANCES = {
+    "sigint": "Ctrl-C",
+    "sigterm": "SIGTERM",
+    "sighup": "SIGHUP, the terminal is closed",
+    "kill": "kill -9 of the program",
+    "kill-both": "kill -9 of the program and of its watchdog",
+    "suspend": "SIGSTOP, and SIGCONT a while later",
+    "full-disk": "the disk is full (a small tmpfs; a file size limit where none can be mounted)",
+    "file-limit": "a limit on the size of files (RLIMIT_FSIZE)",
+    "read-only": "the database may suddenly not be written",
+    "held-briefly": "another program holds the database for a moment",
+    "held-long": "another program holds the database for longer than is waited",
+    "reader": "another program reads the database all the time",
+    "second-session": "a second session is started on the same database",
+    "clock-jumps": "the clock jumps by days at every look",
+    "unplugged": "the wire is gone for good until the next start",
+    "intruder": "another program talks to the instrument in between",
+}
+NEEDS_WIRE = {"kill", "kill-both", "unplugged", "intruder"}
+"""What makes no sense where instrument and program are one process."""
+
+RUNS_INTO_TIME_LIMITS = ("silence", "slow-reply", "lost-power", "adapter-reset")
+_SECONDS = {
+    "silence": (0.3, 2.0, 1e6),
+    "slow-reply": (0.2, 0.8, 3.0),
+    "lost-power": (0.3, 1.5),
+    "adapter-reset": (0.3, 1.5),
+}
+
+
+@dataclass(frozen=True)
+class Case:
+    """One run."""
+
+    number: int
+    wire: str
+    fault: str | None
+    """As `sim.faults.parse_fault` reads it."""
+    disturbance: str | None
+    after: int
+    """Points told before the disturbance strikes."""
+    delay_s: float
+    """How long after the last of them."""
+    seed: int
+    """Of whatever else the run draws."""
+
+    @property
+    def fault_name(self) -> str | None:
+        """Without its parameters."""
+        return self.fault.partition(":")[0] if self.fault else None
+
+    def __str__(self) -> str:
+        parts = [self.wire]
+        if self.fault:
+            parts.append(self.fault)
+        if self.disturbance:
+            parts.append(f"{self.disturbance} after {self.after} points + {self.delay_s:.3f} s")
+        return f"{self.number}: " + ", ".join(parts)
+
+
+def draw_cases(count: int, seed: int) -> Iterator[Case]:
+    """So many cases; the same for the same seed."""
+    chance = random.Random(seed)
+    wanted = _every_one_once()
+    chance.shuffle(wanted)
+    for number in range(1, count + 1):
+        wire, name, phase, disturbance = wanted.pop() if wanted else _any(chance)
+        yield Case(
+            number=number,
+            wire=wire,
+            fault=None if name is None else _fault(name, phase, chance),
+            disturbance=disturbance,
+            after=chance.randrange(0, 2 * POINTS),
+            delay_s=chance.choice((0.0, chance.uniform(0.0, 0.03), chance.uniform(0.0, 0.3))),
+            seed=chance.randrange(1 << 30),
+        )
+
+
+def _every_one_once() -> list[tuple[str, str | None, str | None, str | None]]:
+    faults = [(w, n, p, None) for w, n, p in product(WIRES, CATALOGUE, PHASES)]
+    others = [(w, None, None, d) for w, d in product(WIRES, DISTURBANCES) if can_strike(d, w)]
+    return [*faults, *others]
+
+
+def can_strike(disturbance: str, wire: str) -> bool:
+    """Whether the disturbance makes sense on that wire."""
+    return wire != "loopback" or disturbance not in NEEDS_WIRE
+
+
+def _any(chance: random.Random) -> tuple[str, str | None, str | None, str | None]:
+    wire = chance.choice(WIRES)
+    disturbance = chance.choice([d for d in DISTURBANCES if can_strike(d, wire)])
+    kind = chance.choice(("fault", "disturbance", "both"))
+    name = None if kind == "disturbance" else chance.choice(list(CATALOGUE))
+    return wire, name, chance.choice(PHASES), None if kind == "fault" else disturbance
+
+
+def _fault(name: str, phase: str | None, chance: random.Random) -> str:
+    if name in ("missing-option", "calibration-failure"):  # these know one moment only
+        return name
+    point = 0 if phase == "prepare" else chance.randrange(1, 2 * POINTS + 1)
+    words = [f"phase={phase}", f"point={point}", f"times={chance.choice((1, 1, 1, 2, 0))}"]
+    words.append(f"skip={chance.choice((0, 0, chance.randrange(40)))}")
+    if name in _SECONDS:
+        words.append(f"seconds={chance.choice(_SECONDS[name])}")
+    if CATALOGUE[name].size is not None:
+        words.append(f"size={chance.randrange(1, 40)}")
+    return f"{name}:{','.join(words)}"

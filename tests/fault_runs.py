@@ -1,0 +1,262 @@
+"""One run of the fault campaign: start it, disturb it, judge it, and go on where it ended.
+
+The simulated analyser lives here, where the truth of its source can be looked
+at; the measuring program is a child (`fault_child`). Five things are judged:
+no told point is lost or changed, nothing waits beyond its bound, the source is
+what is said of it, every unflagged point is right, and the measurement can be
+resumed to its end.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import tempfile
+import time
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import fault_child
+from fault_bench import Child, Programs, Served
+from fault_beside import Beside
+from fault_cases import LEVELS_VPK, POINTS, Case
+
+from daq.bench_lock import BenchLock
+from daq.errors import LashbenchError
+from daq.frf import PointFlag
+from daq.store import Store
+
+END_S = 30.0
+"""Bound of a session, time limits shortened as in `fault_child.shorten_waits`."""
+OFF_S = 30.0
+"""Bound from the end of a killed program to the source off and the bench free again."""
+SPOILS = int(PointFlag.OVERLOAD | PointFlag.SPOILT)
+_TOTAL = len(LEVELS_VPK) * POINTS
+
+
+@dataclass
+class Outcome:
+    """How a run went; `wrongs` is empty where every promise was kept."""
+
+    case: Case
+    code: int | None = None
+    """Exit code; None for a program that was killed."""
+    said: str = ""
+    source: str = ""
+    """What was said of the source, at last in the history."""
+    kept: int = 0
+    fault_struck: bool = False
+    disturbed: bool = False
+    """Whether the moment of the disturbance came before the end."""
+    elapsed_s: float = 0.0
+    off_after_s: float | None = None
+    """From the end of the program to the source off; None if it was cut off from it."""
+    wrongs: list[str] = field(default_factory=list)
+
+
+class Campaign:
+    """Many runs, with measuring programs from one fork server."""
+
+    def __init__(self) -> None:
+        self.programs = Programs()
+
+    def run(self, case: Case) -> Outcome:
+        """One run, in a folder of its own."""
+        with tempfile.TemporaryDirectory(prefix="faults-") as folder:
+            run = Run(self.programs, case, Path(folder))
+            try:
+                run.go()
+            except Exception as error:  # one run must not end the campaign
+                run.wrong(f"the campaign itself failed: {type(error).__name__}: {error}")
+            return run.outcome
+
+
+class Run:
+    """A case, from its instrument to its outcome."""
+
+    def __init__(self, programs: Programs, case: Case, folder: Path) -> None:
+        self._programs = programs
+        self._case = case
+        self._chance = random.Random(case.seed)
+        self._db = folder / ("disk" if case.disturbance == "full-disk" else ".") / "bench.db"
+        self._db.parent.mkdir(exist_ok=True)
+        self._folder = folder
+        self.instrument, self._board = fault_child.instrument_of(case.fault)
+        self._served: Served | None = None
+        self.outcome = Outcome(case)
+
+    def wrong(self, what: str) -> None:
+        """A promise was broken."""
+        self.outcome.wrongs.append(what)
+
+    def go(self) -> None:
+        """The whole run."""
+        try:
+            if self._case.wire != "loopback":
+                self._served = Served(self.instrument, self._case.wire)
+            child = self._first()
+            if self._case.disturbance == "full-disk" and not self._db.exists():
+                self._db = self._folder / "bench.db"
+            self.judge_end(child)
+            self.judge_points(child.measurement, child.told)
+            self._resume(child)
+        finally:
+            if self._served is not None:
+                self._served.unplug()
+
+    # ------------------------------------------------------------ the disturbed session
+
+    def _first(self) -> Child:
+        child = self._start(0, plain=False)
+        began, struck, ended_s = time.monotonic(), False, None
+        beside = Beside(
+            self._case, self._db, self._served, lambda: self._start(0, plain=True), self.wrong
+        )
+        with ExitStack() as stack:
+            while child.listen(0.05):
+                if not struck and child.measurement and len(child.told) >= self._case.after:
+                    struck = True
+                    stack.enter_context(beside.going_on())
+                if self._case.disturbance == "suspend":
+                    self._wake(child)
+                if child.verdict is not None:
+                    break
+                if time.monotonic() - began > END_S:
+                    self.wrong(f"did not end within {END_S:g} s")
+                    break
+            ended_s = time.monotonic()
+        self.outcome.elapsed_s = ended_s - began
+        child.end()
+        if child.verdict is None and self._case.disturbance not in ("kill", "kill-both"):
+            self.wrong("ended without a word")
+        return child
+
+    def _start(self, resume: int, *, plain: bool) -> Child:
+        url = "sim:" if self._served is None else self._served.url
+        return self._programs.start(url, str(self._db), resume, self._case, plain)
+
+    def _wake(self, child: Child) -> None:
+        with suppress(OSError):
+            state = Path(f"/proc/{child.pid}/stat").read_text(encoding="ascii").split()[2]
+            if state == "T":
+                time.sleep(self._chance.choice((0.1, 0.5, 2.5)))
+                os.kill(child.pid, signal.SIGCONT)
+
+    # ------------------------------------------------------------ judging
+
+    def judge_end(self, child: Child) -> None:
+        outcome, verdict = self.outcome, child.verdict
+        self._note_strikes(child)
+        if verdict is None:
+            self._judge_killed(child)
+            return
+        outcome.code, outcome.said = verdict["code"], verdict["said"]
+        outcome.source = verdict["source"]
+        if outcome.code == -1:
+            self.wrong(f"{verdict['kind']} went through: {outcome.said}")
+        if "\n" in outcome.said or (outcome.code not in (0, 130) and not outcome.said):
+            self.wrong(f"said, in more or fewer than one line: {outcome.said!r}")
+        is_on = verdict["driving"] if verdict["driving"] is not None else self._drives()
+        if outcome.source == "confirmed-off" and is_on:
+            self.wrong("the source was called off and drives")
+        reachable = self._case.disturbance != "unplugged" and not self.instrument.damage.dead
+        if is_on and reachable and outcome.source not in ("unknown", "unconfirmed", "on"):
+            self.wrong(f"the source drives and was called {outcome.source!r}")
+        if not is_on:
+            outcome.off_after_s = 0.0
+
+    def _judge_killed(self, child: Child) -> None:
+        """The watchdog, or without it the next session, has to see to the source."""
+        began = time.monotonic()
+        if self._case.disturbance == "kill-both":
+            return
+        while self._drives() and time.monotonic() - began < OFF_S:
+            time.sleep(0.005)
+        reachable = not self.instrument.damage.dead
+        if not self._drives():
+            self.outcome.off_after_s = time.monotonic() - began
+        elif reachable:
+            self.wrong(f"the source still drives {OFF_S:g} s after the program was killed")
+        try:
+            BenchLock(self._db, patience_s=OFF_S).release()
+        except LashbenchError as error:
+            self.wrong(f"the bench is not free again: {error}")
+        self.outcome.source = self._recorded(child.measurement)
+        if self.outcome.source == "confirmed-off" and self._drives():
+            self.wrong("the history calls the source off and it drives")
+
+    def _recorded(self, measurement: int) -> str:
+        if not measurement:
+            return ""
+        with Store(self._db, read_only=True) as store:
+            return store.measurement(measurement).source_state.value
+
+    def _drives(self) -> bool:
+        return fault_child.drives(self.instrument)
+
+    def _note_strikes(self, child: Child) -> None:
+        faults = any(fault.struck for fault in self._board.faults)
+        verdict = child.verdict
+        self.outcome.fault_struck = faults or (verdict is not None and verdict["struck"])
+        came = child.measurement > 0 and len(child.told) >= self._case.after
+        dies = self._case.disturbance in ("kill", "kill-both")
+        self.outcome.disturbed = came and not (dies and verdict is not None)
+
+    def judge_points(self, measurement: int, told: list[Any]) -> None:
+        if not measurement:
+            return
+        with Store(self._db) as store:
+            kept = {point.id: point for point in store.points(measurement, superseded=True)}
+        self.outcome.kept = max(self.outcome.kept, len(kept))
+        for number, level, hz, gain, flags in told:
+            point = kept.get(number)
+            if point is None:
+                self.wrong(f"the point at {hz:g} Hz and {level:g} V peak was told and is lost")
+            elif not _same(point.point.gain, gain) or int(point.point.flags) != flags:
+                self.wrong(f"the point at {hz:g} Hz and {level:g} V peak was told otherwise")
+        for point in kept.values():
+            true = fault_child.true_gain(point.point.frequency_hz, point.source_vpk)
+            if not int(point.point.flags) & SPOILS and not abs(
+                point.point.gain - true
+            ) <= 1e-4 * abs(true):
+                self.wrong(
+                    f"the point at {point.requested_hz:g} Hz and {point.source_vpk:g} V peak "
+                    f"is wrong by a factor of {abs(point.point.gain / true):.4g} and not flagged"
+                )
+
+    # ------------------------------------------------------------ the next start
+
+    def _resume(self, first: Child) -> None:
+        """Whatever was broken is mended; the measurement goes on to its end."""
+        self._board.disarm()
+        if self.instrument.damage.dead or self._case.fault_name == "missing-option":
+            self.instrument, self._board = fault_child.instrument_of(None)
+        if self._served is not None:
+            self._served.unplug()
+            self._served = Served(self.instrument, self._case.wire)
+        child = self._start(first.measurement, plain=True)
+        began = time.monotonic()
+        while child.verdict is None and child.listen(0.1):
+            if time.monotonic() - began > 2 * END_S:
+                self.wrong(f"going on did not end within {2 * END_S:g} s")
+                break
+        child.end()
+        verdict = child.verdict or {"code": None, "said": "nothing", "source": ""}
+        if verdict["code"] != 0:
+            self.wrong(f"going on ended with {verdict['code']}: {verdict['said']}")
+        elif verdict["source"] != "confirmed-off":
+            self.wrong(f"after going on the source is {verdict['source']}")
+        if self._served is not None and self._drives():
+            self.wrong("the source drives after the next session")
+        measurement = child.measurement or first.measurement
+        self.judge_points(measurement, [*first.told, *child.told])
+        with Store(self._db) as store:
+            if measurement and len(store.points(measurement)) != _TOTAL:
+                self.wrong(f"{len(store.points(measurement))} of {_TOTAL} points after going on")
+
+
+def _same(one: complex, other: complex) -> bool:
+    return one == other or (one != one and other != other)

@@ -1,0 +1,109 @@
+"""A dozen runs of the fault campaign; `make faults` runs hundreds."""
+
+from concurrent.futures import ThreadPoolExecutor
+from itertools import chain
+from types import SimpleNamespace
+
+import pytest
+from fault_cases import DISTURBANCES, WIRES, Case, can_strike, draw_cases
+from fault_child import true_gain
+from fault_runs import Campaign, Run
+
+from daq.analyser import SweepPoint
+from daq.frf import PointFlag
+from daq.plan import SweepPlan
+from daq.store import Store
+from daq.store_records import MeasurementHeader
+from sim.faults import CATALOGUE, PHASES, parse_fault
+
+KINDS = (
+    ("tcp", None, "sigint"),
+    ("prologix_tcp", None, "kill"),
+    ("tcp", None, "kill-both"),
+    ("loopback", None, "full-disk"),
+    ("tcp", None, "read-only"),
+    ("loopback", None, "held-briefly"),
+    ("tcp", None, "intruder"),
+    ("tcp", None, "clock-jumps"),
+    ("loopback", None, "reader"),
+    ("ar488_pty", "truncated-block:phase=read-out,point=2", None),
+    ("tcp", "dropped-connection:phase=sweep,point=5", None),
+    ("loopback", None, "sighup"),
+    ("loopback", "hardware-error:phase=sweep,point=9", None),
+)
+
+
+def case(number, wire, fault, disturbance):
+    after = 5 if fault is None else 2
+    return Case(number, wire, fault, disturbance, after=after, delay_s=0.0, seed=number)
+
+
+@pytest.fixture(scope="module")
+def outcomes():
+    campaign = Campaign()
+    with ThreadPoolExecutor(4) as pool:
+        return list(
+            pool.map(campaign.run, [case(number, *kind) for number, kind in enumerate(KINDS)])
+        )
+
+
+def test_no_promise_is_broken_whatever_goes_wrong(outcomes):
+    assert list(chain.from_iterable(outcome.wrongs for outcome in outcomes)) == []
+
+
+def test_what_was_meant_to_go_wrong_did(outcomes):
+    for outcome in outcomes:
+        struck = outcome.fault_struck if outcome.case.fault else outcome.disturbed
+        assert struck, outcome.case
+    by_kind = {(o.case.wire, o.case.fault_name, o.case.disturbance): o.code for o in outcomes}
+    assert by_kind["tcp", None, "sigint"] == 130
+    assert by_kind["prologix_tcp", None, "kill"] is None
+    assert by_kind["loopback", None, "full-disk"] == 1
+    assert by_kind["tcp", None, "read-only"] == 2
+    assert by_kind["loopback", None, "held-briefly"] == 0
+    assert by_kind["loopback", "hardware-error", None] == 1
+
+
+def test_the_judge_sees_a_source_that_drives_and_is_called_off(tmp_path):
+    run = Run(None, case(1, "tcp", None, "sigint"), tmp_path)
+    run.instrument.source.offset_v = 1.0
+    verdict = {"code": 0, "said": "", "source": "confirmed-off", "driving": None, "struck": False}
+    run.judge_end(SimpleNamespace(verdict=verdict, measurement=1, told=[]))
+    assert "the source was called off and drives" in run.outcome.wrongs
+
+
+def test_the_judge_sees_points_that_are_lost_changed_or_wrong(tmp_path):
+    run = Run(None, case(1, "loopback", None, None), tmp_path)
+    right = SweepPoint(150.0, true_gain(150.0, 1.0))
+    spoilt = SweepPoint(160.0, 9.0 + 0j, flags=PointFlag.SPOILT)
+    with Store(tmp_path / "bench.db", create=True) as store:
+        measurement = store.begin(
+            MeasurementHeader("U", "", SweepPlan((1.0,), (1.0,)), "sim:", "t")
+        )
+        kept = store.add_point(measurement, 1.0, 150.0, right)
+        store.add_point(measurement, 1.0, 160.0, spoilt)
+        told = [(kept.id, 1.0, 150.0, right.gain, 0)]
+        run.judge_points(measurement, told)
+        assert run.outcome.wrongs == []
+        store.add_point(measurement, 2.0, 150.0, right)
+    run.judge_points(measurement, [(kept.id, 1.0, 150.0, 1j, 0), (99, 1.0, 170.0, 1j, 0)])
+    first, second, third = run.outcome.wrongs
+    assert "told otherwise" in first
+    assert "170 Hz and 1 V peak was told and is lost" in second
+    assert "150 Hz and 2 V peak is wrong by a factor of" in third
+
+
+def test_five_hundred_runs_go_through_everything_and_are_the_same_again():
+    cases = list(draw_cases(520, 3))
+    assert cases == list(draw_cases(520, 3)) != list(draw_cases(520, 4))
+    struck = {(c.wire, c.fault_name, c.disturbance) for c in cases}
+    for wire in WIRES:
+        for name in CATALOGUE:
+            assert (wire, name, None) in struck
+        for name in DISTURBANCES:
+            assert ((wire, None, name) in struck) == can_strike(name, wire)
+    phased = {(c.fault_name, p) for c in cases if c.fault for p in PHASES if p in c.fault}
+    assert len(phased) >= 3 * (len(CATALOGUE) - 2)
+    for one in cases:
+        if one.fault is not None:
+            parse_fault(one.fault)
