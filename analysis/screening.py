@@ -9,13 +9,13 @@ to decide what to simulate. It simulates nothing itself.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.atlas import Atlas
-from analysis.candidate import Effects
+from analysis.candidate import Candidate, Effects
 from analysis.observation import Observation
 from analysis.population import Population
 from analysis.surface import Surface, differences
@@ -52,16 +52,17 @@ def screen_singles(coarse: Observation, atlas: Atlas) -> dict[Effects, Place]:
 
 
 def screen_pairs(
-    coarse: Observation, atlas: Atlas, parents: Mapping[Effects, NDArray[np.float64]]
+    coarse: Observation, atlas: Atlas, parents: Mapping[Effects, Candidate]
 ) -> dict[Effects, Place]:
-    """The best place of every pair of a parent (a single cause at its best place) and another."""
+    """The best place of every pair of a parent (a single cause looked at closely) and another."""
     surfaces = {effects: _surface(coarse, population) for effects, population in atlas.items()}
     found: dict[Effects, Place] = {}
-    for parent, best in parents.items():
+    for parent, candidate in parents.items():
+        alone = _about_best(candidate)
         for other in atlas:
             if not other or other == parent:
                 continue
-            place = _best_pair(surfaces, parent, best, other)
+            place = _best_pair(parent, alone, other, surfaces[other], surfaces[()])
             key = tuple(sorted((*parent, *other)))
             known = found.get(key)
             if known is None or place.log_likelihood > known.log_likelihood:
@@ -69,25 +70,36 @@ def screen_pairs(
     return found
 
 
+_Expected = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+
+
+def _about_best(candidate: Candidate) -> list[_Expected]:
+    """Places about a candidate's best one, with the mean and the scatter expected there."""
+    best, surface = candidate.best.place, replace(candidate.surface, tailed=False)
+    places = [
+        np.array([ratio, *np.clip(best[1:] + step, 0.0, 1.0)])
+        for ratio in np.unique(np.clip(best[0] + _PAIR_RATIOS, 0.0, 1.0))
+        for step in _PAIR_SIZES
+    ]
+    return [(place, *surface.expected(place)) for place in places]
+
+
 def _best_pair(
-    surfaces: Mapping[Effects, Surface],
-    parent: Effects,
-    best: NDArray[np.float64],
-    other: Effects,
+    parent: Effects, alone: Sequence[_Expected], other: Effects, second: Surface, none: Surface
 ) -> Place:
-    top, where = -np.inf, best
-    first, second, none = surfaces[parent], surfaces[other], surfaces[()]
+    top, where = -np.inf, alone[0][0]
     added = _grid(second.places.shape[1], ratios=1)[:, 1:]
-    for ratio in np.unique(np.clip(best[0] + _PAIR_RATIOS, 0.0, 1.0)):
+    for ratio in {float(place[0]) for place, _, _ in alone}:
         plain, _ = none.expected(np.array([ratio]))
         extra = [second.expected(np.array([ratio, *sizes])) for sizes in added]
-        for step in _PAIR_SIZES:
-            sizes = np.clip(best[1:] + step, 0.0, 1.0)
-            mean, std = first.expected(np.array([ratio, *sizes]))
+        for place, mean, std in alone:
+            if place[0] != ratio:
+                continue
             for more, (moved, wide) in zip(added, extra, strict=True):
-                value = float(first.log_density(mean + moved - plain, np.maximum(std, wide)).sum())
+                shifted = mean + moved - plain
+                value = float(Surface.log_density(shifted, np.maximum(std, wide)).sum())
                 if value > top:
-                    top, where = value, _joined(parent, other, ratio, sizes, more)
+                    top, where = value, _joined(parent, other, ratio, place[1:], more)
     return Place(where, top)
 
 

@@ -17,6 +17,7 @@ from analysis.adequacy import judge_adequacy
 from analysis.atlas import Atlas, coarse_stride, make_atlas
 from analysis.candidate import Candidate, Effects, form_candidates
 from analysis.causes import Hypothesis
+from analysis.holdout import hold_out
 from analysis.observation import Observation
 from analysis.placement import groups_about, groups_along, groups_around
 from analysis.population import Group, Population, simulate_groups
@@ -37,11 +38,16 @@ _THIRD, _THIRD_GROUPS = 4, 4
 _LAST_ROUNDS, _LAST_GROUPS, _RIVAL_GROUPS = 2, 4, 4
 """Further groups of the leading candidate and of the baseline, and of the closest rival."""
 
-_FAR, _TOO_FAR = 60.0, 200.0
-"""Log-likelihood behind the leader from which the last and the third round leave one out."""
+_CHANCES = 4
+"""Pairs that are looked at once more where none fits yet."""
+
+_FAR, _TOO_FAR = 60.0, 300.0
+"""Log-likelihood behind the leader from which the last and the earlier rounds leave one out."""
 
 _DOUBT = 2.0
-"""Misfit of the best single cause, in standard deviations, from which pairs are tried."""
+"""Misfit of the best single cause, in standard deviations, from which pairs are tried; and the
+root mean square of what it misses of levels not fitted, in theirs: where few runs of its own fit
+each other the first is blind, and the second is not."""
 
 
 def search_causes(
@@ -76,12 +82,22 @@ def search_causes(
     rough = _Hunt(unit, coarse, rng, _part(progress, 0.4, 0.6, "narrowing down"))
     rough.start(_singles(coarse, atlas), _FIRST_GROUPS)
     rough.look_closer(_with_baseline(rough.leading(_SECOND)), _SECOND_GROUPS)
-    if judge_adequacy(rough.best, rng).sigma > _DOUBT:
+    doubted = _is_doubtful(rough.best, rng)
+    if doubted:
         rough.start(_pairs(coarse, atlas, rough), _PAIR_GROUPS)
     fine = _Hunt(unit, observation, rng, _part(progress, 0.6, 1.0, "looking closer"))
-    leading = rough.leading(_THIRD, _TOO_FAR)
-    third = _with_baseline([*leading, *_parts(leading[0], rough.found), rough.best_single])
+    third = _third(rough)
     fine.take_over([rough.found[key] for key in third], _THIRD_GROUPS)
+    if not doubted and _is_doubtful(fine.best, rng):
+        # All rows show what the thinned ones did not: a single cause will not do after all.
+        rough.start(_pairs(coarse, atlas, rough), _PAIR_GROUPS)
+        pairs = [key for key in _third(rough) if key not in fine.found]
+        fine.take_over([rough.found[key] for key in pairs], _THIRD_GROUPS)
+        third += pairs
+    if any(len(key) > 1 for key in fine.found) and _is_doubtful(fine.best, rng):
+        # Pairs trade off in ways that evenly placed runs miss: each gets a second chance.
+        pairs = [key for key in fine.leading(len(third), _TOO_FAR) if len(key) > 1]
+        fine.settle(pairs[:_CHANCES], _LAST_GROUPS)
     leader, *near = fine.leading(len(third), _FAR)
     # Whoever is compared with the leader is given as many runs: more runs fit better.
     equals = [leader, *_parts(leader, fine.found), *(key for key in near if not key)]
@@ -103,12 +119,23 @@ def _singles(coarse: Observation, atlas: Atlas) -> _Starts:
 
 def _pairs(coarse: Observation, atlas: Atlas, rough: _Hunt) -> _Starts:
     """Best places of the pairs that the atlas favours, a leading single cause in each."""
-    parents: _Starts = {
-        key: rough.found[key].best.place for key in rough.leading(_PARENTS) if len(key) == 1
-    }
+    leading = rough.leading(_PARENTS)
+    parents: dict[Effects, Candidate] = {k: rough.found[k] for k in leading if len(k) == 1}
     places = screen_pairs(coarse, atlas, parents)
     ranked = sorted(places, key=lambda key: -places[key].log_likelihood)
     return {key: places[key].place for key in ranked[:_PAIRS]}
+
+
+def _is_doubtful(candidate: Candidate, rng: np.random.Generator) -> bool:
+    if judge_adequacy(candidate, rng).sigma > _DOUBT:
+        return True
+    return hold_out(candidate, candidate.surface.observation).rms_sigma > _DOUBT
+
+
+def _third(rough: _Hunt) -> list[Effects]:
+    """Who is looked at on all rows: the leaders, the parts of the first, and the baseline."""
+    leading = rough.leading(_THIRD, _TOO_FAR)
+    return _with_baseline([*leading, *_parts(leading[0], rough.found), rough.best_single])
 
 
 def _parts(key: Effects, found: Mapping[Effects, Candidate]) -> list[Effects]:

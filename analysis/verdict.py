@@ -135,8 +135,13 @@ def judge_candidates(
 
 
 def _simplest(judged: Sequence[Judged]) -> Judged:
-    """The best set, or the part of it that does nearly as well: a further cause must earn it."""
-    best = judged[0]
+    """The best set, or the part of it that does nearly as well: a further cause must earn it.
+
+    Where the best set does not look like its own runs and another that ties with it does, it is
+    the other that is believed.
+    """
+    tied = [one for one in judged if one.score > judged[0].score - _TIE and one.adequate]
+    best = tied[0] if tied else judged[0]
     for one in judged:
         part = one.effects and set(one.effects) < set(best.effects)
         if part and one.adequate and one.score > judged[0].score - _FALSE_ALARM:
