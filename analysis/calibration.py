@@ -89,7 +89,8 @@ def _regress(
 ) -> Calibrated:
     features, asked = _features(observation, readings)
     count = len(features)
-    apart = ((features[:, None] - features[None]) ** 2).mean(axis=-1)
+    # Row by row: all pairs at once would be hundreds of megabytes, far outside any cache.
+    apart = np.array([((one - features) ** 2).mean(axis=-1) for one in features])
     scale = _REACH * float(np.median(apart[np.triu_indices(count, 1)])) + 1e-12
     kernel = np.exp(-apart / scale)
     likeness = np.exp(-((features - asked) ** 2).mean(axis=-1) / scale)
