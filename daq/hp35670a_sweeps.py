@@ -19,8 +19,10 @@ from daq.dialogue import Dialogue
 from daq.errors import InputError
 from daq.frf import PointFlag
 from daq.hp35670a_settings import (
+    DC_OFFSET,
     DIRECTION,
     GRID_HZ,
+    LEVEL,
     MANUAL_FREQUENCY,
     RESOLUTION,
     SPACING,
@@ -73,6 +75,7 @@ def point_by_point(
         dialogue.check(what)
         if keys:
             _confirm_unchanged(dialogue, setup)
+        _confirm_drive(dialogue, setup)
         yield _point(setup, picture, nearest_row(picture.frequency_hz, actual_hz), actual_hz, flags)
 
 
@@ -185,6 +188,7 @@ def _new_points(
     picture = read_picture(dialogue, setup.axis_hz)
     # Read after the picture: an overload of the next point may count for these, none is lost.
     seen = _read_voltage(dialogue)
+    _confirm_drive(dialogue, setup)
     rows = np.flatnonzero(picture.measured) if held_back else np.arange(len(picture.measured))
     ordered = (rows if progress.upward else rows[::-1]).tolist()
     sure = ordered[: len(ordered) - held_back]
@@ -250,6 +254,12 @@ def _confirm_unchanged(dialogue: Dialogue, setup: SetUp) -> None:
     """After a key was pressed at the front panel: raise `InstrumentError` if a setting moved."""
     for setting, value in setup.table:
         dialogue.confirm(setting, value)
+
+
+def _confirm_drive(dialogue: Dialogue, setup: SetUp) -> None:
+    """Raise `InstrumentError` if level or offset moved: no bit tells of another program's hand."""
+    dialogue.confirm(LEVEL, setup.settings.source_vpk)
+    dialogue.confirm(DC_OFFSET, setup.settings.dc_offset_v)
 
 
 def _bound_s(setup: SetUp, timing: Timing, frequencies_hz: Sequence[float]) -> float:

@@ -27,8 +27,8 @@ __all__ = [
 ]
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(E[+-]?\d{1,3})?", re.IGNORECASE | re.ASCII)
-_INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
-_ERROR = re.compile(r'([+-]?\d+)\s*,\s*"((?:[^"]|"")*)"', re.ASCII)
+_INTEGER = re.compile(r"[+-]?\d{1,18}", re.ASCII)
+_ERROR = re.compile(r'([+-]?\d{1,18})\s*,\s*"((?:[^"]|"")*)"', re.ASCII)
 
 
 def parse_number(text: str) -> float:

@@ -18,6 +18,7 @@ from sqlalchemy import event
 from sqlalchemy.exc import DBAPIError
 from sqlalchemy.pool import QueuePool
 
+from daq.bounded_text import parse_json
 from daq.errors import FileFormatError, InputError, LashbenchError, MeasurementError
 from daq.store_schema import SCHEMA_VERSION, migrate, schema_version
 
@@ -59,7 +60,9 @@ def engine_of(path: Path, mode: str) -> sa.Engine:
             uri, uri=True, timeout=_BUSY_S, isolation_level=None, check_same_thread=False
         )
 
-    engine = sa.create_engine("sqlite://", creator=connect, poolclass=QueuePool, pool_size=4)
+    engine = sa.create_engine(
+        "sqlite://", creator=connect, poolclass=QueuePool, pool_size=4, json_deserializer=parse_json
+    )
 
     @event.listens_for(engine, "connect")
     def _settle(connection: sqlite3.Connection, _record: object) -> None:

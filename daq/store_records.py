@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 from daq.analyser import Identity, SourceState, SweepPoint
+from daq.bounded_text import parse_json
 from daq.errors import FileFormatError, InputError
 from daq.plan import SweepPlan
 
@@ -131,7 +132,7 @@ def plan_from_text(text: str) -> SweepPlan:
         If the text is not a plan.
     """
     try:
-        document = json.loads(text)
+        document = parse_json(text)
         for name in ("frequencies_hz", "levels_vpk"):
             document[name] = tuple(document[name])
         return SweepPlan(**document)

@@ -210,6 +210,9 @@ def schema_version(connection: sa.Connection, name: str) -> int:
             f"{name}: was written by a newer lashbench (layout {version}, this one knows "
             f"{SCHEMA_VERSION}); nothing was changed, update lashbench to open it"
         )
+    programs = "SELECT count(*) FROM sqlite_master WHERE type IN ('view', 'trigger')"
+    if connection.exec_driver_sql(programs).scalar_one():
+        raise FileFormatError(f"{name}: holds views or triggers, which a history never has")
     if version < 1:
         raise FileFormatError(f"{name}: bears the mark of lashbench but no layout version")
     return version

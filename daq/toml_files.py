@@ -6,15 +6,17 @@ What a file may hold is said by the model that is handed in.
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from daq.bounded_text import parse_toml, read_text
 from daq.errors import ConfigurationError
 
-__all__ = ["NonNegative", "Positive", "Section", "load_toml"]
+__all__ = ["NonNegative", "Positive", "Section", "load_toml", "read_toml"]
+
+_LIMIT_BYTES = 1 << 20
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -38,12 +40,7 @@ def load_toml(model: type[Model], path: Path) -> Model:
         If it cannot be read, is not TOML, or any key or value is wrong; the
         message names the file, then key and fault for each thing that is.
     """
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigurationError(f"{path}: cannot be read ({error}); give a TOML file") from error
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigurationError(f"{path}: is not valid TOML ({error})") from error
+    document = read_toml(path)
     try:
         return model.model_validate(document)
     except ValidationError as error:
@@ -53,3 +50,21 @@ def load_toml(model: type[Model], path: Path) -> Model:
             for fault in error.errors()
         )
         raise ConfigurationError(f"{path}: {faults}") from error
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """What a TOML file holds, unchecked.
+
+    Raises
+    ------
+    ConfigurationError
+        If it cannot be read or is not TOML.
+    """
+    try:
+        text = read_text(path, _LIMIT_BYTES)
+    except (OSError, ValueError) as error:
+        raise ConfigurationError(f"{path}: cannot be read ({error}); give a TOML file") from error
+    try:
+        return parse_toml(text)
+    except ValueError as error:
+        raise ConfigurationError(f"{path}: is not valid TOML ({error})") from error

@@ -7,15 +7,14 @@ backlash between the stages. It builds no equations.
 from __future__ import annotations
 
 import math
-import tomllib
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from daq.configs import config_path
 from daq.errors import ConfigurationError
+from daq.toml_files import read_toml
 
 __all__ = ["StageBacklash", "Unit", "load_unit", "stage_backlash", "unit_from_mapping"]
 
@@ -235,16 +234,7 @@ def load_unit(name_or_path: str) -> Unit:
         If the file is not there, is not TOML, or any value in it is wrong.
     """
     path = config_path("units", name_or_path)
-    return unit_from_mapping(_read_toml(path), source=str(path))
-
-
-def _read_toml(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigurationError(f"{path}: cannot be read ({error}); give a TOML file") from error
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigurationError(f"{path}: is not valid TOML ({error})") from error
+    return unit_from_mapping(read_toml(path), source=str(path))
 
 
 def _lists_as_tuples(value: Any) -> Any:

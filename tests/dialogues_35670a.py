@@ -257,7 +257,17 @@ PICTURE = """
 # 0 0.06 0 0
 """
 
-POINT = BEGIN + STATUS + PICTURE + "> STAT:DEV?\n< +32\n" + EMPTY
+# Level and offset are where they were put: another program's hand sets no bit.
+UNMOVED = """
+> SOUR:VOLT?
+< +2.50000000000E+000
+> SOUR:VOLT? UNIT
+< VPK
+> SOUR:VOLT:OFFS?
+< +0.00000000000E+000
+"""
+
+POINT = BEGIN + STATUS + PICTURE + "> STAT:DEV?\n< +32\n" + EMPTY + UNMOVED
 QUIET = "> ABOR\n> SOUR:VOLT 0 VPK\n> SOUR:VOLT:OFFS 0 V\n"
 END = QUIET + EMPTY
 

@@ -21,7 +21,6 @@ marked as spoilt are not written as rows but listed under `spoilt_points`.
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +29,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from daq.bounded_text import parse_toml, read_bytes
 from daq.errors import FileFormatError, InputError
 from daq.formats.atomic import write_text
 from daq.formats.csv_columns import EXTRA_KEYS, extra_columns, extra_comments
@@ -43,6 +43,9 @@ COLUMNS = ("frequency_hz", "source_vpk", "gain_db", "phase_deg", "gain_std_db")
 
 LEAST_POINTS = 3
 """Points below which a source level is no frequency response."""
+
+_LIMIT_BYTES = 64 << 20
+"""Size above which a file is not read; a million readings have less."""
 
 _MAY_BE_EMPTY = ("phase_deg", "gain_std_db")
 _PROCEDURE = (
@@ -199,7 +202,7 @@ def _text(path: Path) -> str:
     if path.is_dir():
         raise FileFormatError(f"{path}: is a directory; give a CSV file")
     try:
-        content = path.read_bytes()
+        content = read_bytes(path, _LIMIT_BYTES)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise FileFormatError(f"{path}: cannot be read ({reason}); give a CSV file") from error
@@ -219,9 +222,9 @@ def _add_comment(comments: dict[str, Any], text: str, place: str) -> None:
         return
     try:
         if text.startswith("["):
-            raise tomllib.TOMLDecodeError("a section has no place here")
-        entry = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+            raise ValueError("a section has no place here")
+        entry = parse_toml(text)
+    except ValueError as error:
         raise FileFormatError(
             f"{place}: comment {_shown(text)} is not 'key = value' in TOML ({error})"
         ) from error

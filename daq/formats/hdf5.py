@@ -85,6 +85,8 @@ def _document(file: h5py.File, path: Path) -> str:
 
 def _array(file: h5py.File, name: str, path: Path) -> Any:
     held = _plain_dataset(file, f"{_GROUP}/{name}", path)
+    if held.dtype.newbyteorder("=") != np.dtype(ARRAYS[name][0]):
+        raise FileFormatError(f"{path}: {name} holds {held.dtype}; give {_KIND}")
     if held.ndim != 1 or held.size > ROW_LIMIT:
         raise FileFormatError(f"{path}: {name} has the shape {held.shape}; give {_KIND}")
     return held[()]
@@ -103,4 +105,9 @@ def _plain_dataset(file: h5py.File, name: str, path: Path) -> h5py.Dataset:
         held = held[part]
     if not isinstance(held, h5py.Dataset) or held.is_virtual or held.external:
         raise FileFormatError(f"{path}: {name} is not an array held in the file; give {_KIND}")
+    # Numbers one after the other, as `write` lays them: the library does not survive every
+    # damaged chunk, filter or element of varying length, and unpacks without a bound.
+    layout = held.id.get_create_plist()
+    if layout.get_layout() != h5py.h5d.CONTIGUOUS or layout.get_nfilters():
+        raise FileFormatError(f"{path}: {name} is packed or in pieces; give {_KIND}")
     return held

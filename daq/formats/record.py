@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from daq.bounded_text import parse_json
 from daq.errors import FileFormatError, InputError
 from daq.frf import FrequencyResponse, PointFlag
 
@@ -131,6 +132,8 @@ def checked_file(path: Path, kind: str) -> Path:
     """
     if path.is_dir():
         raise FileFormatError(f"{path}: is a directory; give {kind}")
+    if path.exists() and not path.is_file():
+        raise FileFormatError(f"{path}: is not a regular file; give {kind}")
     try:
         with path.open("rb") as file:
             size = path.stat().st_size
@@ -174,8 +177,8 @@ def _plain(value: Any) -> Any:
 
 def _document(text: str, path: Path) -> dict[str, Any]:
     try:
-        document = json.loads(text)
-    except (ValueError, RecursionError) as error:
+        document = parse_json(text)
+    except ValueError as error:
         raise FileFormatError(f"{path}: its document is not JSON ({error})") from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise FileFormatError(f"{path}: is no {FORMAT}")

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from daq.bounded_text import parse_json
 from daq.errors import FileFormatError
 from daq.formats.atomic import write_text
 from daq.formats.record import ARRAYS, ROW_LIMIT, checked_file, response_from, taken_apart
@@ -122,7 +123,7 @@ def _companion(arrays: Mapping[str, NDArray[Any]], document: str) -> str:
 
 def _exact(companion: str, path: Path) -> FrequencyResponse:
     try:
-        content = json.loads(companion)
+        content = parse_json(companion)
         document, rows = content["document"], content["rows"]
         arrays = {}
         for name, (dtype, _) in ARRAYS.items():

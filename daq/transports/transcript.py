@@ -16,12 +16,14 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from daq import errors
+from daq.bounded_text import parse_json, read_text
 from daq.errors import FileFormatError, InputError, LashbenchError, ProtocolError
 from daq.transports.base import Deadline, Transport
 
 __all__ = ["Recorder", "Replay"]
 
 _VERSION = 1
+_LIMIT_BYTES = 256 << 20
 _RAISED = {name: getattr(errors, name) for name in errors.__all__}
 _Result = TypeVar("_Result")
 
@@ -193,8 +195,8 @@ _GIVES: dict[str, tuple[type, ...]] = {
 
 def _entries(path: Path) -> list[tuple[int, dict[str, Any]]]:
     try:
-        text = path.read_text(encoding="ascii")
-    except (OSError, UnicodeDecodeError) as error:
+        text = read_text(path, _LIMIT_BYTES, "ascii")
+    except (OSError, ValueError) as error:
         raise FileFormatError(f"{path}: cannot be read as a transcript ({error})") from error
     lines = text.splitlines(keepends=True)
     if lines and not lines[-1].endswith("\n"):
@@ -211,7 +213,7 @@ def _entries(path: Path) -> list[tuple[int, dict[str, Any]]]:
 
 def _document(path: Path, number: int, line: str) -> dict[str, Any]:
     try:
-        document = json.loads(line)
+        document = parse_json(line)
     except ValueError as error:
         raise FileFormatError(f"{path}, line {number}: is not JSON ({error})") from error
     if not isinstance(document, dict):

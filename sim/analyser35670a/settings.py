@@ -202,10 +202,15 @@ class Settings:
         text = data[8:]
         if data[:8] != b"%08X" % zlib.crc32(text) or not text.startswith(b'{"state":"35670A"'):
             raise ScpiError(-161, "Data block does not contain a STATE.")
-        document = json.loads(text)
-        self.mode, self._after_reset = Mode(document["mode"]), document["after_reset"]
-        self._shared = _from_plain(document["shared"])
-        self._by_mode = {mode: _from_plain(document["modes"][mode.value]) for mode in Mode}
+        try:
+            document = json.loads(text)
+            mode, after_reset = Mode(document["mode"]), document["after_reset"]
+            shared = _from_plain(document["shared"])
+            by_mode = {mode: _from_plain(document["modes"][mode.value]) for mode in Mode}
+        except (ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
+            raise ScpiError(-161, "Data block does not contain a STATE.") from error
+        self.mode, self._after_reset = mode, after_reset
+        self._shared, self._by_mode = shared, by_mode
 
 
 def _plain(key: str) -> str:

@@ -16,6 +16,7 @@ from dialogues_35670a import (
     READ_BACK,
     SETTINGS,
     STATUS,
+    UNMOVED,
     driver,
     prepared,
 )
@@ -63,7 +64,7 @@ def test_an_end_that_is_never_reported_is_noticed_by_the_second_witness():
 
 def test_a_measurement_that_runs_long_is_waited_for():
     dozen = "= 0\n" * 12 + "> *ESR?\n< +0\n> STAT:OPER:COND?\n< +272\n"
-    rest = STATUS + PICTURE + "> STAT:DEV?\n< +32\n" + EMPTY + END
+    rest = STATUS + PICTURE + "> STAT:DEV?\n< +32\n" + EMPTY + UNMOVED + END
     analyser, script = prepared(after_begin(dozen * 5 + "= 96\n> *ESR?\n< +1\n" + rest))
     assert len(list(analyser.sweep([100.3]))) == 1
     script.finish()
@@ -154,12 +155,27 @@ def test_what_does_not_read_back_stops_the_set_up(old, new, then, fault):
 
 
 def test_a_key_pressed_has_everything_read_again():
-    pressed = POINT.replace("> STAT:DEV?\n< +32", "> STAT:DEV?\n< +48")
-    analyser, script = prepared(DRIVE + pressed + READ_BACK + END)
+    pressed = POINT.replace("> STAT:DEV?\n< +32", "> STAT:DEV?\n< +48").removesuffix(UNMOVED)
+    analyser, script = prepared(DRIVE + pressed + READ_BACK + UNMOVED + END)
     assert len(list(analyser.sweep([100.3]))) == 1
     script.finish()
     changed = READ_BACK[: READ_BACK.index("< DC")] + "< AC\n" + EMPTY + QUIET
     analyser, script = prepared(DRIVE + pressed + changed)
     with pytest.raises(InstrumentError, match="coupling was set to 'DC' and reads back AC"):
+        list(analyser.sweep([100.3]))
+    script.finish()
+
+
+@pytest.mark.parametrize(
+    ("moved", "fault"),
+    [
+        (UNMOVED.replace("+2.5", "+4.0"), "source level .* was set to 2.5 and reads back 4"),
+        (UNMOVED.replace("+0.0", "+2.0"), "source offset .* was set to 0.0 and reads back 2"),
+    ],
+)
+def test_a_point_driven_otherwise_than_asked_is_not_given(moved, fault):
+    lines = moved.split("> SOUR:VOLT:OFFS?")[0] if "+4.0" in moved else moved
+    analyser, script = prepared(DRIVE + POINT.removesuffix(UNMOVED) + lines + EMPTY + QUIET)
+    with pytest.raises(InstrumentError, match=fault):
         list(analyser.sweep([100.3]))
     script.finish()

@@ -1,0 +1,164 @@
+"""The fuzz campaign: a million executions against everything that reads what others wrote.
+
+Run as ``python tests/campaigns/fuzz.py [--runs N] [--seed S] [--only NAME]
+[--write]``, or as ``make fuzz``. It needs the extra ``fuzz`` (atheris, which
+is libFuzzer for Python): coverage of our own code guides what is tried next.
+Each target runs in a process of its own, which a crash, ten seconds without an
+end or 2 GiB of memory end; the input that did it is kept in ``.fuzz/``. The
+number of runs is shared out so that slow targets get fewer.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / "tests"))
+
+PAGE = ROOT / "docs" / "reliability.md"
+KEPT = ROOT / ".fuzz"
+BEGIN, END = "<!-- fuzz begins -->", "<!-- fuzz ends -->"
+SEED = 20007
+SHARES = {
+    "csv": 10,
+    "hdf5": 2,
+    "uff": 5,
+    "mat": 10,
+    "sdf": 10,
+    "unit": 10,
+    "bench": 10,
+    "recipe": 5,
+    "transcript": 15,
+    "history": 1,
+    "block": 20,
+    "replies": 20,
+    "address": 15,
+    "prologix": 3,
+    "analyser": 3,
+    "adapter": 3,
+}
+"""Of the runs, by target."""
+_INSTRUMENTED = ["daq", "sim", "pyuff", "sdfascii", "tomllib"]
+
+
+@dataclass(frozen=True)
+class Result:
+    """What came of one target."""
+
+    name: str
+    runs: int
+    coverage: int
+    """Edges of our code that were reached."""
+    elapsed_s: float
+    fault: str
+
+
+def main() -> int:
+    """Run all, print, and perhaps write."""
+    words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    words.add_argument("--runs", type=int, default=1_000_000)
+    words.add_argument("--seed", type=int, default=SEED)
+    words.add_argument("--only", choices=SHARES, help="only that target, with all the runs")
+    words.add_argument("--write", action="store_true", help="write the table into the docs")
+    words.add_argument("--inside", help=argparse.SUPPRESS)
+    given, rest = words.parse_known_args()
+    if given.inside:
+        inside(given.inside, rest)
+    shares = {given.only: 1} if given.only else SHARES
+    results = []
+    print(f"{given.runs} runs, seed {given.seed}", flush=True)
+    for name, share in shares.items():
+        runs = -(-given.runs * share // sum(shares.values()))
+        results.append(outside(name, runs, given.seed))
+        print(results[-1], flush=True)
+    lines = table(results, given.seed)
+    print("\n".join(lines))
+    if given.write:
+        text = PAGE.read_text(encoding="utf-8")
+        before, after = text[: text.index(BEGIN)], text[text.index(END) :]
+        PAGE.write_text(f"{before}{BEGIN}\n\n" + "\n".join(lines) + f"\n\n{after}", "utf-8")
+    return 1 if any(result.fault for result in results) else 0
+
+
+def outside(name: str, runs: int, seed: int) -> Result:
+    """Start the process of one target and read what it said."""
+    from fuzz_targets import seeds
+
+    corpus = KEPT / name
+    corpus.mkdir(parents=True, exist_ok=True)
+    for number, content in enumerate(seeds(name)):
+        (corpus / f"seed-{number}").write_bytes(content)
+    began = time.monotonic()
+    done = subprocess.run(
+        [
+            sys.executable, __file__, "--inside", name, str(corpus),
+            f"-runs={runs}", f"-seed={seed}", "-timeout=10", "-rss_limit_mb=2048",
+            f"-artifact_prefix={KEPT}/{name}-", "-max_len=70000" if name == "history" else
+            "-max_len=20000", "-print_final_stats=1",
+        ],
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", check=False,
+    )  # fmt: skip
+    covered = [int(number) for number in re.findall(r"cov: (\d+)", done.stdout)]
+    executed = re.search(r"number_of_executed_units: (\d+)", done.stdout)
+    fault = ""
+    if done.returncode:
+        said = re.findall(r"^(?:\w*Error\b.*|.*ERROR: libFuzzer.*)", done.stdout, re.MULTILINE)
+        fault = "; ".join(said)[:300] or done.stdout[-300:]
+    return Result(
+        name,
+        int(executed.group(1)) if executed else 0,
+        max(covered, default=0),
+        time.monotonic() - began,
+        fault,
+    )
+
+
+def inside(name: str, words: Sequence[str]) -> None:
+    """Fuzz one target; does not return."""
+    import logging
+    import warnings
+
+    import atheris
+
+    with atheris.instrument_imports(include=_INSTRUMENTED):
+        # Readers are imported when they are used, which would be too late here.
+        for module in ("csv", "hdf5", "uff", "mat", "sdf"):
+            import_module(f"daq.formats.{module}")
+        import_module("pyuff")
+        import_module("sdfascii")
+        from fuzz_targets import targets
+    logging.disable()
+    warnings.simplefilter("ignore")
+    with targets() as all_targets:
+        atheris.Setup([sys.argv[0], *words], all_targets[name])
+        atheris.Fuzz()
+
+
+def table(results: Sequence[Result], seed: int) -> list[str]:
+    """What came of it."""
+    total = sum(result.runs for result in results)
+    hours = sum(result.elapsed_s for result in results) / 3600.0
+    faults = sum(bool(result.fault) for result in results)
+    lines = [
+        f"{total} executions, seed {seed}, {hours:.1f} h; faults: {faults}.",
+        "",
+        "| target | executions | edges reached | fault |",
+        "| --- | --- | --- | --- |",
+    ]
+    for result in results:
+        lines.append(
+            f"| {result.name} | {result.runs} | {result.coverage} | {result.fault or '-'} |"
+        )
+    return lines
+
+
+if __name__ == "__main__":
+    sys.exit(main())
