@@ -3,3 +3,15 @@
 The third floor. It turns frequency responses into statements with error bars
 and draws nothing on a terminal.
 """
+
+__all__ = [
+    "diagnosis",
+    "estimate",
+    "paper",
+    "paper_diagnosis",
+    "report",
+    "resonance",
+    "response_figure",
+    "trend",
+]
+"""The modules whose names others may rely on; docs/api.md lists them."""

@@ -92,8 +92,13 @@ def observe(response: FrequencyResponse) -> Observation:
     Raises
     ------
     AnalysisError
-        If no usable point is left.
+        If no usable point is left, or a source level is not known.
     """
+    if np.any(np.isnan(response.source_vpk)):
+        raise AnalysisError(
+            "the response does not say at which source level it was swept, and a servo with play "
+            "answers differently at each; write the level into it (docs/how-to/foreign-files.md)"
+        )
     usable = ((response.flags & (PointFlag.SPOILT | PointFlag.OVERLOAD)) == 0) & (
         np.abs(response.gain) > 0
     )

@@ -3,3 +3,17 @@
 The second floor. It knows how a geared servo moves and nothing about judging
 a measurement.
 """
+
+__all__ = [
+    "analyser35670a",
+    "catalogue",
+    "drivetrain",
+    "effects",
+    "elements",
+    "faults",
+    "loopback",
+    "response",
+    "serve",
+    "unit",
+]
+"""The modules whose names others may rely on; docs/api.md lists them."""

@@ -1,10 +1,32 @@
 """The documentation: links lead somewhere, and what is quoted can be run."""
 
+import ast
+import re
+import runpy
+import shutil
+import sys
+from importlib import import_module
 from pathlib import Path
 
+import api_page
+import numpy as np
+import pytest
 from links import broken_links
+from printed import Newcomer, mentions, pages, pieces, stocked_history
+
+from analysis.causes import every_single_cause
+from daq.formats import read_response
+from daq.plan import SweepPlan
+from daq.store import Store
+from daq.store_records import MeasurementHeader
+from sim.catalogue import CATALOGUE
+from sim.unit import load_unit
+from tui import cli
 
 ROOT = Path(__file__).parents[1]
+EXAMPLES = sorted((ROOT / "docs" / "examples").glob("*.py"))
+ELSEWHERE = {"docs/instrument.md"}
+"""Pages whose Python is run by a test of its own, with arguments."""
 
 
 def test_every_link_of_the_documentation_leads_somewhere():
@@ -30,3 +52,147 @@ def test_the_link_checker_finds_what_is_broken(tmp_path):
         "README.md: ../../etc",
         "docs/page.md: README.md",
     ]
+
+
+def name_of(page):
+    return str(page.relative_to(ROOT))
+
+
+@pytest.fixture(scope="module")
+def history(tmp_path_factory):
+    path = tmp_path_factory.mktemp("history") / "lashbench.db"
+    stocked_history(path)
+    return path
+
+
+@pytest.mark.parametrize("page", pages(), ids=name_of)
+def test_everything_that_a_page_prints_can_be_run(page, history, tmp_path, monkeypatch):
+    printed = list(pieces(page))
+    if name_of(page) in ELSEWHERE:
+        printed = [piece for piece in printed if piece[0] == "command"]
+    if not printed:
+        return
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
+    (tmp_path / "data" / "lashbench").mkdir(parents=True)
+    if any("--resume 12" in text for _, text in printed):
+        shutil.copy(history, tmp_path / "data" / "lashbench")
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    with Newcomer(folder) as newcomer:
+        for kind, text in printed:
+            newcomer.run(kind, text)
+
+
+@pytest.mark.parametrize("page", pages(), ids=name_of)
+def test_commands_in_running_text_have_these_options(page, capsys):
+    for mention in mentions(page):
+        verb, options = mention.split()[1], re.findall(r" (--[a-z][a-z-]*)", mention)
+        if verb.startswith("--"):
+            continue
+        assert verb in cli.VERBS, mention
+        assert cli.main([verb, "--help"]) == 0
+        known = set(re.findall(r"--[a-z][a-z-]*", capsys.readouterr().out))
+        assert set(options) <= known, mention
+
+
+def test_a_page_that_prints_what_does_not_work_is_found(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    wrong = (
+        "lashbench simulat --unit adss",
+        "lashbench measure --unit adss --instrument sim: --level 99 --start 100 --stop 180 "
+        "--points 3",
+        "lashbench estimate gone.csv --unit adss",
+        "lashbench report 1 --unit adss --output report.html",
+        "lashbench measure --unit adss --instrument prologix: --recipe adss",
+        "make coffee",
+        "python docs/examples/gone.py",
+    )
+    for line in wrong:
+        folder = tmp_path / str(wrong.index(line))
+        folder.mkdir()
+        with Newcomer(folder) as newcomer, pytest.raises(Exception, match="."):
+            newcomer.run("command", line)
+    (tmp_path / "page.md").write_text(
+        "```\nlashbench extract \\\n  x.csv # a\n```\n\n    make test\n"
+    )
+    assert [text for _, text in pieces(tmp_path / "page.md")] == [
+        "lashbench extract x.csv # a",
+        "make test",
+    ]
+
+
+def test_the_page_of_the_interface_is_that_of_the_code():
+    assert api_page.page() == api_page.PAGE.read_text(), "run python tests/api_page.py"
+
+
+def test_everything_public_says_what_it_is():
+    for line in api_page.page().splitlines():
+        assert not line.rstrip().endswith("`:"), line
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_is_short_and_uses_public_names_only(example):
+    text = example.read_text(encoding="utf-8")
+    assert len(text.splitlines()) < 50
+    public = {
+        module.__name__: module.__all__
+        for floor in api_page.FLOORS
+        for module in api_page.public_modules(import_module(floor))
+    }
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.ImportFrom) and node.module.split(".")[0] in api_page.FLOORS:
+            assert {alias.name for alias in node.names} <= set(public[node.module]), node.module
+
+
+def test_the_effect_of_the_page_needs_nothing_but_its_entry(monkeypatch, tmp_path):
+    (code,) = [text for kind, text in pieces(ROOT / "docs/your-own-gimbal.md") if kind == "python"]
+    assert len(code.splitlines()) < 30
+    names = {}
+    exec(code, names)
+    effect = names["tight_bearing"]
+    for module in ("sim.effects", "analysis.causes"):
+        name = f"{module}.CATALOGUE"
+        monkeypatch.setattr(name, {**CATALOGUE, effect.id: effect})
+    unit = load_unit("adss")
+    assert effect.id in [cause.effects[0] for cause in every_single_cause(unit)]
+    words = ["simulate", "--unit", "adss", "--ratio", "0.3", "--level", "2.5", "--start", "110"]
+    words += ["--stop", "150", "--points", "3", "--settle-cycles", "5", "--integrate-cycles", "5"]
+    plain, tight = tmp_path / "plain.csv", tmp_path / "tight.csv"
+    assert cli.main([*words, "--out", str(plain)]) == 0
+    wanted = [*words, "--effect", f"{effect.id}:T_f_g1=0.1", "--out"]
+    assert cli.main([*wanted, str(tight)]) == 0
+    difference = read_response(tight).gain_db - read_response(plain).gain_db
+    assert np.abs(difference).max() > 1.0
+    none = [*words, "--effect", f"{effect.id}:T_f_g1=0", "--out"]
+    assert cli.main([*none, str(tight)]) == 0
+    np.testing.assert_allclose(read_response(tight).gain_db, read_response(plain).gain_db, atol=0.5)
+
+
+SAYS = {
+    "headless": "complete, source confirmed-off",
+    "replay": "13 points, the same to the last bit: True",
+    "own_unit": "contribution ratio 0.9",
+    "own_effect": "with a tight bearing",
+    "fleet": "ADSS SN 7: 3 sessions, b1 0.2000 +- 0.0058 deg",
+}
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_runs(example, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [str(example), *fleet_of_one(example, tmp_path)])
+    runpy.run_path(str(example), run_name="__main__")
+    assert SAYS[example.stem] in capsys.readouterr().out
+
+
+def fleet_of_one(example, folder):
+    """A history with estimates for the one example that wants its path."""
+    if example.stem != "fleet":
+        return []
+    plan = SweepPlan((100.0, 110.0, 120.0), (2.5,))
+    with Store(folder / "lab.db", create=True) as store:
+        for value in (0.19, 0.2, 0.21):
+            number = store.begin(MeasurementHeader("ADSS", "SN 7", plan, "sim:", "test"))
+            store.add_estimate(number, "test", {"b1_deg": {"value": value, "std": 0.01}})
+    return [str(folder / "lab.db")]

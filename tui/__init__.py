@@ -2,3 +2,6 @@
 
 The top floor. It talks to people and computes nothing itself.
 """
+
+__all__ = ["bench", "cli"]
+"""The modules whose names others may rely on; docs/api.md lists them."""

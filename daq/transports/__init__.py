@@ -4,3 +4,6 @@
 kinds there are; `address` and `open` turn a URL into one. A transport moves
 messages and knows nothing of what they mean.
 """
+
+__all__ = ["base", "open", "transcript"]
+"""The modules whose names others may rely on; docs/api.md lists them."""

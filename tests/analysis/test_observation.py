@@ -75,6 +75,11 @@ def test_spoilt_and_overloaded_points_do_not_count():
         observe(response(flags=PointFlag.SPOILT))
 
 
+def test_an_unknown_source_level_is_refused_in_words():
+    with pytest.raises(AnalysisError, match="at which source level"):
+        observe(response(levels=(np.nan,)))
+
+
 def test_noise_is_that_of_the_quietest_points():
     rng = np.random.default_rng(1)
     f = np.linspace(100.0, 200.0, 200)

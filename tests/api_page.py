@@ -1,0 +1,117 @@
+"""The page of the public interface, made from what the packages name in ``__all__``.
+
+A package's ``__all__`` names its public modules, a module's its public names.
+``python tests/api_page.py`` writes docs/api.md; a test says when that is due.
+"""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from collections.abc import Iterator
+from enum import Enum
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "api.md"
+FLOORS = ("daq", "sim", "analysis", "tui")
+
+_HEAD = """\
+# The interface
+
+What scripts may rely on: the modules that each package names in its `__all__`,
+and in them the names of theirs. What stands here is taken away only after a version
+that says so in the [CHANGELOG](../CHANGELOG.md); anything else is the inside of the
+house and may change without a word. `tui` is the
+[command line](index.md#commands) and the screens, whose interface are the verbs;
+only what runs a session without a screen is of use in Python. This page is made by
+`python tests/api_page.py`; whole descriptions, with units, shapes and errors, are in
+the docstrings (`python -m pydoc sim.response`). Scripts that use it:
+[headless](examples/headless.py), [replay](examples/replay.py),
+[own unit](examples/own_unit.py), [own effect](examples/own_effect.py),
+[fleet](examples/fleet.py).
+"""
+
+
+def page() -> str:
+    """The whole page, from what can be imported."""
+    return "\n".join([_HEAD, *(line for floor in FLOORS for line in _floor(floor))])
+
+
+def public_modules(package: ModuleType) -> Iterator[ModuleType]:
+    """The modules that a package names, packages among them gone through likewise."""
+    for name in package.__all__:
+        full = f"{package.__name__}.{name}"
+        if hasattr(package, name) and not inspect.ismodule(getattr(package, name)):
+            continue
+        module = import_module(full)
+        if any(not hasattr(module, inner) for inner in module.__all__):
+            yield from public_modules(module)
+        else:
+            yield module
+
+
+def _floor(name: str) -> Iterator[str]:
+    package = import_module(name)
+    yield f"## {name}\n"
+    yield f"{_summary(package)}\n"
+    for module in public_modules(package):
+        yield f"### {module.__name__}\n"
+        yield f"{_summary(module)}\n"
+        for public in sorted(module.__all__, key=lambda n: (n.isupper(), n)):
+            yield from _entry(public, getattr(module, public))
+        yield ""
+
+
+def _entry(name: str, thing: object) -> Iterator[str]:
+    if not (inspect.isclass(thing) or inspect.isfunction(thing)):
+        yield f"- `{name}`"
+        return
+    if not inspect.isclass(thing):
+        yield f"- `{name}{_parameters(thing)}`: {_summary(thing)}"
+        return
+    if issubclass(thing, Enum):
+        members = ", ".join(f"`{member}`" for member in thing.__members__)
+        yield f"- `{name}`: {_summary(thing)} {members}"
+        return
+    plain = issubclass(thing, Exception) or getattr(thing, "_is_protocol", False)
+    yield f"- `{name}{'' if plain else _parameters(thing)}`: {_summary(thing)}"
+    for member, value in sorted(vars(thing).items()):
+        function = value.__func__ if isinstance(value, classmethod) else value
+        if member.startswith("_"):
+            continue
+        if isinstance(value, property):
+            yield f"  - `.{member}`: {_summary(value)}"
+        elif inspect.isfunction(function):
+            yield f"  - `.{member}{_parameters(function)}`: {_summary(function)}"
+
+
+def _parameters(thing: object) -> str:
+    """Names only: types and defaults stand in the docstrings."""
+    try:
+        signature = inspect.signature(thing)
+    except ValueError:
+        return ""
+    bare = [
+        p.replace(annotation=inspect.Parameter.empty, default=inspect.Parameter.empty)
+        for p in signature.parameters.values()
+        if p.name not in ("self", "cls")
+    ]
+    shown, starred = [], False
+    for parameter in bare:
+        if parameter.kind is parameter.KEYWORD_ONLY and not starred:
+            shown.append("*")
+        starred |= parameter.kind in (parameter.KEYWORD_ONLY, parameter.VAR_POSITIONAL)
+        shown.append(str(parameter))
+    return f"({', '.join(shown)})"
+
+
+def _summary(thing: object) -> str:
+    return " ".join((inspect.getdoc(thing) or "").split("\n\n")[0].split())
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(ROOT))
+    PAGE.write_text(page(), encoding="utf-8")
