@@ -7,6 +7,7 @@ help costs none of the scientific libraries. Nothing here computes.
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 import traceback
@@ -15,8 +16,9 @@ from importlib.metadata import version
 
 from cyclopts import App, CycloptsError, Parameter
 
-from daq.errors import LashbenchError
+from daq.errors import InputError, LashbenchError
 from tui.commands.bench import is_terminal
+from tui.logs import LEVELS, logging_to_file, silence
 from tui.output import Console
 
 __all__ = ["VERBS", "build_app", "main"]
@@ -36,12 +38,18 @@ VERBS = {
     "demo": ("tui.commands.demo:demo", "Do the whole job without hardware."),
     "bench": ("tui.commands.bench:bench", "Open the bench screen; so does no verb at all."),
     "replay": ("tui.commands.replay:replay", "Show a recorded session as it ran."),
+    "doctor": ("tui.commands.doctor:doctor", "Check this installation; say what to mend."),
+    "completion": ("tui.commands.completion:completion", "Print completions for a shell."),
 }
 """Every verb: the function that does it, and its line in the help."""
 
 _SUMMARY = "Bench application for geared servos: how much backlash sits in each gear stage."
-_EPILOGUE = "Every command also takes --quiet (no narration) and --debug (trace of an error)."
+_EPILOGUE = (
+    "Every command also takes --quiet (no narration), --debug (trace of an error) and "
+    "--log-level debug|info|warning|error (write the log file)."
+)
 _USAGE = 2
+_LOG = logging.getLogger("lashbench.command")
 _INTERRUPTED = 130
 
 
@@ -72,8 +80,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     debug, words = _switch("--debug", words)
     quiet, words = _switch("--quiet", words)
     console = Console(quiet)
+    silence()
+    try:
+        level, words = _log_level(words)
+    except LashbenchError as error:
+        console.error(str(error))
+        return error.exit_code
     if not words and is_terminal():
         words = ["bench"]
+    if level is None:
+        return _guarded(words, console, debug)
+    with logging_to_file(level) as path:
+        console.note(f"log: {path or 'cannot be written; going on without'}")
+        _LOG.info("lashbench %s", " ".join(words))
+        code = _guarded(words, console, debug)
+        _LOG.info("exit code %d", code)
+    return code
+
+
+def _guarded(words: list[str], console: Console, debug: bool) -> int:
+    """Run a command; whatever it raises becomes one line and an exit code."""
     try:
         return _run(words, console)
     except BrokenPipeError:
@@ -84,6 +110,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (KeyboardInterrupt, Exception) as error:
         if debug:
             traceback.print_exc()
+        _LOG.debug("ended by", exc_info=error)
         message, code = _verdict(error, words)
         console.error(message)
         return code
@@ -102,6 +129,21 @@ def _run(words: list[str], console: Console) -> int:
 def _switch(name: str, words: list[str]) -> tuple[bool, list[str]]:
     # Taken out before parsing, so that it may stand anywhere on the line.
     return name in words, [word for word in words if word != name]
+
+
+def _log_level(words: list[str]) -> tuple[str | None, list[str]]:
+    """Take ``--log-level LEVEL`` out of the line, wherever it stands."""
+    for place, word in enumerate(words):
+        name, equals, level = word.partition("=")
+        if name != "--log-level":
+            continue
+        rest = words[place + 1 :]
+        if not equals:
+            level, rest = (rest[0], rest[1:]) if rest else ("", [])
+        if level not in LEVELS:
+            raise InputError(f"--log-level {level!r} is not one of {', '.join(LEVELS)}")
+        return level, words[:place] + rest
+    return None, words
 
 
 def _verdict(error: BaseException, words: list[str]) -> tuple[str, int]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import logging
 import math
 import sys
 from collections.abc import Mapping, Sequence
@@ -17,6 +18,8 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 __all__ = ["Console", "Injected", "as_json"]
+
+_LOG = logging.getLogger("lashbench.console")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,17 +52,20 @@ class Console:
 
     def note(self, text: str) -> None:
         """Print a line of narration to stderr."""
+        _LOG.info("%s", text)
         if not self.quiet:
             self._clear()
             print(text, file=sys.stderr, flush=True)  # noqa: T201
 
     def error(self, text: str) -> None:
         """Print an error to stderr, as one line whatever it holds."""
+        _LOG.error("%s", " ".join(text.split()))
         self._clear()
         print(f"error: {' '.join(text.split())}", file=sys.stderr, flush=True)  # noqa: T201
 
     def progress(self, fraction: float, text: str = "") -> None:
         """Show how far the work is, in place; only where somebody watches a terminal."""
+        _LOG.debug("%3.0f %% %s", 100.0 * fraction, text)
         if not self.quiet and sys.stderr.isatty():
             line = f"{100 * min(max(fraction, 0.0), 1.0):3.0f} %  {text}"
             print(f"\r\x1b[K{line[:78]}", end="", file=sys.stderr, flush=True)  # noqa: T201

@@ -7,8 +7,8 @@ from screen import ESTIMATE, operated, quick_analyses, run
 
 from daq.store import Store
 from tui.app.analyses import Analyses
-from tui.app.log_file import logging_to_file
 from tui.cli import main
+from tui.logs import logging_to_file
 from tui.places import log_path
 
 SHORT = ["--settle-cycles", "3", "--integrate-cycles", "3", "--serial", "SN 7"]
@@ -158,4 +158,5 @@ def test_the_log_has_the_trace_that_the_screen_leaves_out(db, tmp_path, monkeypa
     text = path.read_text()
     assert "Traceback" in text
     assert "by design" in text
-    assert logging.getLogger("lashbench").handlers == []
+    handlers = logging.getLogger("lashbench").handlers
+    assert not any(isinstance(handler, logging.FileHandler) for handler in handlers)

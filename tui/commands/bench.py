@@ -25,7 +25,7 @@ def bench(*, db: Path | None = None, console: Injected) -> int:
     """
     require_terminal("bench")
     from tui.app.application import BenchApp
-    from tui.app.log_file import logging_to_file
+    from tui.logs import logging_to_file
 
     with logging_to_file() as log:
         if log is None:

@@ -1,0 +1,295 @@
+"""The doctor: every check with its failing case made to happen, and the remedy it then names."""
+
+import json
+import sys
+from importlib import metadata
+from types import SimpleNamespace
+
+import pytest
+
+from tui.checkup import instruments, self_test, software, surroundings
+from tui.checkup.finding import Finding, examine, failed, noted, passed
+from tui.cli import main
+from tui.commands import doctor as verb
+
+
+def only(findings):
+    (finding,) = findings
+    return finding
+
+
+def named(findings):
+    return {finding.name: finding for finding in findings}
+
+
+@pytest.fixture
+def told(monkeypatch):
+    """The verb with these findings in place of the checks'."""
+
+    def install(*findings):
+        monkeypatch.setattr(verb, "CHECKS", (("all", lambda: findings),))
+
+    return install
+
+
+def test_the_exit_code_tells_a_failure_from_a_note(told, capsys):
+    told(passed("a", "there"), noted("b", "missing", "get b"))
+    assert main(["doctor"]) == 0
+    assert capsys.readouterr().out == (
+        "ok    a: there\nnote  b: missing\n      -> get b\n\nall that is needed is there\n"
+    )
+    told(passed("a", "there"), failed("c", "broken", "mend c"), failed("d", "gone", "get d"))
+    assert main(["doctor"]) == 1
+    out = capsys.readouterr().out
+    assert "FAIL  c: broken\n      -> mend c\n" in out
+    assert out.endswith("\n2 to mend\n")
+
+
+def test_json_is_one_document_with_every_remedy(told, capsys):
+    told(passed("a", "there"), failed("c", "broken", "mend c"))
+    assert main(["doctor", "--json"]) == 1
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert json.loads(out) == {
+        "ok": False,
+        "failed": 1,
+        "checks": [
+            {"name": "a", "state": "ok", "found": "there", "remedy": ""},
+            {"name": "c", "state": "failed", "found": "broken", "remedy": "mend c"},
+        ],
+    }
+
+
+def test_this_installation_is_well(capsys):
+    assert main(["doctor", "--json"]) == 0, capsys.readouterr()
+    checks = {line["name"]: line for line in json.loads(capsys.readouterr().out)["checks"]}
+    assert checks["self-test"]["state"] == "ok"
+    assert f"numpy {metadata.version('numpy')}" in checks["packages"]["found"]
+    assert {"Python", "compiled engine", "terminal", "history", "VISA on a LAN"} <= set(checks)
+
+
+def test_a_finding_that_is_not_well_must_say_what_to_do():
+    for state in ("note", "failed"):
+        with pytest.raises(ValueError, match="what to do"):
+            Finding("x", state, "is wrong")
+
+
+def test_a_check_that_breaks_does_not_end_the_others():
+    def breaks():
+        yield passed("first half", "fine")
+        raise RuntimeError("the bus\nis on fire")
+
+    found = list(examine((("bus", breaks), ("next", lambda: [passed("next", "fine")]))))
+    assert [(one.name, one.state) for one in found] == [
+        ("first half", "ok"),
+        ("bus", "failed"),
+        ("next", "ok"),
+    ]
+    assert "RuntimeError: the bus is on fire" in found[1].found
+    assert "--debug doctor" in found[1].remedy
+
+
+def test_an_old_python(monkeypatch):
+    assert only(software.check_python()).state == "ok"
+    monkeypatch.setattr(software.platform, "python_version", lambda: "3.9.18")
+    finding = only(software.check_python())
+    assert finding.state == "failed"
+    assert "3.9.18" in finding.found
+    assert finding.remedy.startswith("install Python >=3.11")
+
+
+def test_packages_that_are_missing_old_or_broken(monkeypatch, tmp_path):
+    (tmp_path / "broken_here.py").write_text("raise OSError('libfoo.so: cannot open')")
+    monkeypatch.syspath_prepend(tmp_path)
+    lines = ["numpy<2.5,>=99", "no-such-package>=1", "broken_here>=1", "pytest", 'x>=1; extra=="y"']
+    monkeypatch.setattr(software.metadata, "requires", lambda _: lines)
+    version = metadata.version
+    monkeypatch.setattr(
+        software.metadata, "version", lambda name: "1.2" if name == "broken_here" else version(name)
+    )
+    found = named(software.check_packages())
+    assert set(found) == {"package numpy", "package no-such-package", "package broken_here"}
+    assert all(finding.state == "failed" for finding in found.values())
+    assert found["package no-such-package"].found == "is not installed"
+    assert found["package no-such-package"].remedy.endswith("-m pip install 'no-such-package>=1'")
+    assert ">=99 is needed" in found["package numpy"].found
+    assert "libfoo.so" in found["package broken_here"].found
+
+
+@pytest.mark.parametrize(
+    ("version", "specifiers", "good"),
+    [
+        ("2.4.6", ">=2.0,<2.5", True),
+        ("2.5", "<2.5,>=2.0", False),
+        ("2.5.0", ">=2.5", True),
+        ("2.10", ">=2.9", True),
+        ("2", ">=2.0.0", True),
+        ("2.0rc1", ">=2", True),
+        ("3.5", "", True),
+        ("3.5", "!=3.5", True),
+    ],
+)
+def test_versions_are_numbers_not_text(version, specifiers, good):
+    assert software.satisfies(version, specifiers) is good
+
+
+def test_an_engine_that_is_not_compiled_not_kept_or_not_there(monkeypatch, tmp_path):
+    from numba import config
+
+    import sim.kernel
+
+    with monkeypatch.context() as patch:
+        patch.setattr(config, "DISABLE_JIT", 1)
+        assert only(software.check_engine()).remedy == "unset NUMBA_DISABLE_JIT"
+    with monkeypatch.context() as patch:
+        (tmp_path / "file").write_text("")
+        shut = SimpleNamespace(stats=SimpleNamespace(cache_path=str(tmp_path / "file" / "cache")))
+        patch.setattr(sim.kernel, "step_cycles", shut)
+        finding = only(software.check_engine())
+        assert finding.state == "note"
+        assert "NUMBA_CACHE_DIR" in finding.remedy
+    with monkeypatch.context() as patch:
+        patch.setitem(sys.modules, "sim.kernel", None)
+        finding = only(software.check_engine())
+        assert finding.state == "failed"
+        assert "cannot be loaded" in finding.found
+    assert only(software.check_engine()).state == "ok"
+
+
+@pytest.fixture
+def terminal(monkeypatch):
+    """A terminal of a given kind on both streams."""
+
+    def install(term="xterm-256color", size=(100, 40), encoding="utf-8"):
+        stream = SimpleNamespace(isatty=lambda: True, encoding=encoding)
+        monkeypatch.setattr(surroundings, "sys", SimpleNamespace(stdin=stream, stdout=stream))
+        monkeypatch.setenv("TERM", term)
+        monkeypatch.setenv("COLUMNS", str(size[0]))
+        monkeypatch.setenv("LINES", str(size[1]))
+
+    return install
+
+
+def test_terminals_good_and_bad(terminal):
+    terminal()
+    assert only(surroundings.check_terminal()).state == "ok"
+    terminal(term="dumb")
+    assert "set TERM" in only(surroundings.check_terminal()).remedy
+    terminal(size=(60, 40))
+    assert "at least 80 x 24" in only(surroundings.check_terminal()).remedy
+    terminal(encoding="ANSI_X3.4-1968")
+    assert "UTF-8 locale" in only(surroundings.check_terminal()).remedy
+
+
+def test_folders_that_cannot_be_written(monkeypatch, tmp_path):
+    for variable in ("XDG_DATA_HOME", "XDG_CACHE_HOME", "XDG_STATE_HOME"):
+        monkeypatch.setenv(variable, str(tmp_path / "not" / "yet"))
+    assert all(finding.state == "ok" for finding in surroundings.check_folders())
+    assert not (tmp_path / "not").exists()
+    (tmp_path / "file").write_text("")
+    for variable in ("XDG_DATA_HOME", "XDG_CACHE_HOME", "XDG_STATE_HOME"):
+        monkeypatch.setenv(variable, str(tmp_path / "file"))
+    found = named(surroundings.check_folders())
+    assert {name: finding.state for name, finding in found.items()} == {
+        "history": "failed",
+        "cache": "note",
+        "log": "note",
+    }
+    assert "XDG_DATA_HOME" in found["history"].remedy
+    assert "XDG_CACHE_HOME" in found["cache"].remedy
+    assert "XDG_STATE_HOME" in found["log"].remedy
+
+
+def test_no_serial_port_is_a_note(monkeypatch):
+    from serial.tools import list_ports
+
+    monkeypatch.setattr(list_ports, "comports", list)
+    finding = only(instruments.check_serial_ports())
+    assert finding.state == "note"
+    assert "plug" in finding.remedy
+
+
+@pytest.mark.parametrize(
+    ("members", "joined", "remedy"),
+    [
+        ([], [], "sudo usermod -aG dialout kim, then log out and in again"),
+        (["kim"], [], "log out and in again: you joined group dialout after this log-in"),
+        (["kim"], [20], "sudo chmod g+rw /dev/ttyUSB7; its group dialout, which you are in"),
+    ],
+)
+def test_a_serial_port_of_another_group(monkeypatch, members, joined, remedy):
+    grp, pwd = pytest.importorskip("grp"), pytest.importorskip("pwd")
+    from serial.tools import list_ports
+
+    monkeypatch.setattr(list_ports, "comports", lambda: [SimpleNamespace(device="/dev/ttyUSB7")])
+    monkeypatch.setattr(instruments, "_user", lambda: "kim")
+    monkeypatch.setattr(
+        grp, "getgrnam", lambda name: SimpleNamespace(gr_name=name, gr_gid=20, gr_mem=members)
+    )
+    monkeypatch.setattr(pwd, "getpwnam", lambda name: SimpleNamespace(pw_gid=1000))
+    monkeypatch.setattr(instruments.os, "access", lambda path, mode: False)
+    monkeypatch.setattr(instruments.os, "getgroups", lambda: joined)
+    finding = only(instruments.check_serial_ports())
+    assert (finding.name, finding.state) == ("serial port /dev/ttyUSB7", "note")
+    assert finding.found == "kim may not open it"
+    assert finding.remedy.startswith(remedy)
+
+
+def test_a_port_on_windows_needs_no_group(monkeypatch):
+    from serial.tools import list_ports
+
+    monkeypatch.setattr(list_ports, "comports", lambda: [SimpleNamespace(device="COM3")])
+    monkeypatch.setattr(instruments, "sys", SimpleNamespace(platform="win32"))
+    monkeypatch.setitem(sys.modules, "grp", None)
+    monkeypatch.setitem(sys.modules, "pwd", None)
+    finding = only(instruments.check_serial_ports())
+    assert finding.state == "ok"
+    assert "prologix:COM3?addr=11" in finding.found
+
+
+def test_visa_without_a_back_end_and_with_a_makers_library(monkeypatch):
+    import pyvisa
+    from pyvisa.ctwrapper import IVIVisaLibrary
+
+    def no_back_end(name):
+        raise ValueError("Could not locate\na VISA implementation")
+
+    monkeypatch.setattr(IVIVisaLibrary, "get_library_paths", staticmethod(tuple))
+    monkeypatch.setattr(instruments.importlib.util, "find_spec", lambda name: None)
+    with monkeypatch.context() as patch:
+        patch.setattr(pyvisa, "ResourceManager", no_back_end)
+        found = named(instruments.check_visa())
+    assert found["VISA on a LAN"].state == "failed"
+    assert "locate a VISA" in found["VISA on a LAN"].found
+    assert found["VISA on a LAN"].remedy.endswith("--force-reinstall pyvisa-py")
+    assert found["VISA for GPIB cards"].state == "note"
+    assert "linux-gpib" in found["VISA for GPIB cards"].remedy
+    monkeypatch.setattr(IVIVisaLibrary, "get_library_paths", staticmethod(lambda: ("/lib/visa",)))
+    assert "/lib/visa" in named(instruments.check_visa())["VISA for GPIB cards"].found
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ("&effect=load-inertia:J_L=0.006", "40 Hz reads -1.0"),
+        ("&fault=dropped-connection", "the session failed"),
+        ("&options=AY6", "the session failed"),
+    ],
+)
+def test_a_self_test_that_reads_wrong_or_cannot_run(monkeypatch, changed, said):
+    monkeypatch.setattr(self_test, "_SERVED", f"sim:?ratio=0.3&seed=1{changed}")
+    finding = only(self_test.check_itself())
+    assert finding.state == "failed"
+    assert said in finding.found
+    assert "report this line" in finding.remedy
+
+
+def test_a_self_test_that_leaves_the_source_on(monkeypatch):
+    monkeypatch.setattr(self_test, "_measured_db", lambda: ("unconfirmed", self_test.KNOWN_DB))
+    assert "left unconfirmed" in only(self_test.check_itself()).found
+
+
+@pytest.mark.parametrize("seed", [2, 3, 4])
+def test_the_self_test_does_not_hang_on_one_seed(monkeypatch, seed):
+    monkeypatch.setattr(self_test, "_SERVED", f"sim:?ratio=0.3&seed={seed}")
+    assert only(self_test.check_itself()).state == "ok"

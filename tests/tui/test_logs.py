@@ -1,0 +1,81 @@
+"""The log that a user can turn on: what goes into it, and that it is never in the way."""
+
+import logging
+
+import pytest
+
+from tui.cli import main
+from tui.logs import logging_to_file, silence
+from tui.places import log_path
+
+
+@pytest.fixture(autouse=True)
+def _own_state(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+
+
+def test_nothing_is_written_unless_asked_for(capsys):
+    assert main(["extract", "nowhere.csv"]) == 2
+    assert not log_path().exists()
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.parametrize("words", [["--log-level", "info"], ["--log-level=info"]])
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_a_command_its_error_and_its_end_are_written(words, place, capsys):
+    line = ["extract", "nowhere.csv"]
+    assert main([*line[:place], *words, *line[place:]]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert f"log: {log_path()}" in err
+    text = log_path().read_text()
+    assert "INFO lashbench.command: lashbench extract nowhere.csv" in text
+    assert "ERROR lashbench.console: nowhere.csv" in text
+    assert "exit code 2" in text
+    assert "Traceback" not in text
+
+
+def test_debug_keeps_the_trace_and_error_keeps_little(capsys):
+    main(["extract", "nowhere.csv", "--log-level", "error"])
+    assert "INFO" not in log_path().read_text()
+    main(["extract", "nowhere.csv", "--log-level", "debug"])
+    assert "Traceback" in log_path().read_text()
+    assert "Traceback" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", [["--log-level", "loud"], ["--log-level"], ["--log-level="]])
+def test_a_level_that_is_none_is_refused(words, capsys):
+    assert main(["extract", "x.csv", *words]) == 2
+    err = capsys.readouterr().err
+    assert "debug, info, warning, error" in err
+    assert err.count("\n") == 1
+    assert not log_path().exists()
+
+
+def test_a_log_that_cannot_be_written_stops_nothing(monkeypatch, tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "file"))
+    assert main(["--log-level", "info", "completion", "bash"]) == 0
+    out, err = capsys.readouterr()
+    assert "cannot be written" in err
+    assert "_lashbench" in out
+
+
+def test_a_block_inside_of_another_leaves_the_outer_ones_level():
+    logger = logging.getLogger("lashbench")
+    silence()
+    before = (logger.level, list(logger.handlers))
+    with logging_to_file("debug") as outer, logging_to_file("error") as inner:
+        assert inner == outer == log_path()
+        logger.debug("still heard")
+    assert log_path().read_text().count("still heard") == 1
+    assert (logger.level, logger.handlers) == before
+
+
+def test_a_long_log_is_turned_over(monkeypatch):
+    monkeypatch.setattr("tui.logs._BYTES", 2000)
+    with logging_to_file():
+        for number in range(100):
+            logging.getLogger("lashbench").info("line %d of many", number)
+    assert log_path().stat().st_size <= 2000
+    assert log_path().with_name("lashbench.log.1").exists()

@@ -1,0 +1,56 @@
+"""The log file, where everything goes that no operator should have to see.
+
+Owns the handler that writes it, and that there is one only.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from logging.handlers import RotatingFileHandler
+from pathlib import Path
+
+from tui.places import log_path
+
+__all__ = ["LEVELS", "logging_to_file", "silence"]
+
+LEVELS = ("debug", "info", "warning", "error")
+"""What ``--log-level`` takes, from most to least that is written."""
+
+_BYTES = 1_000_000
+
+
+def silence() -> None:
+    """Let nothing of the log reach stderr where no file is written."""
+    logger = logging.getLogger("lashbench")
+    if not logger.handlers:
+        logger.addHandler(logging.NullHandler())
+
+
+@contextmanager
+def logging_to_file(level: str = "info") -> Iterator[Path | None]:
+    """Write the log to its file until the block ends; yields None where it cannot be written.
+
+    Inside of another such block nothing changes: the outer one knows its level.
+    """
+    path, logger = log_path(), logging.getLogger("lashbench")
+    if any(isinstance(handler, RotatingFileHandler) for handler in logger.handlers):
+        yield path
+        return
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handler = RotatingFileHandler(path, maxBytes=_BYTES, backupCount=1, encoding="utf-8")
+    except OSError:
+        yield None
+        return
+    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
+    logger.addHandler(handler)
+    before = logger.level
+    logger.setLevel(level.upper())
+    try:
+        yield path
+    finally:
+        logger.setLevel(before)
+        logger.removeHandler(handler)
+        handler.close()
