@@ -29,13 +29,16 @@ from daq.errors import LashbenchError
 from daq.frf import PointFlag
 from daq.store import Store
 
-END_S = 30.0
+END_S = 60.0
 """Bound of a session, time limits shortened as in `fault_child.shorten_waits`."""
-LASTING_END_S = 120.0
+LASTING_END_S = 240.0
 """The same where the fault strikes at every reply: each is waited for, and none for ever."""
-OFF_S = 30.0
+OFF_S = 60.0
 """Bound from the end of a killed program to the source off and the bench free again."""
 SPOILS = int(PointFlag.OVERLOAD | PointFlag.SPOILT)
+_RESUMES = 3
+"""Sessions within which a measurement must be complete once everything is mended; a starved
+machine may lose one to a time-out."""
 _TOTAL = len(LEVELS_VPK) * POINTS
 
 
@@ -53,6 +56,8 @@ class Outcome:
     fault_struck: bool = False
     disturbed: bool = False
     """Whether the moment of the disturbance came before the end."""
+    resumes: int = 0
+    """Further sessions that it took to complete the measurement."""
     elapsed_s: float = 0.0
     off_after_s: float | None = None
     """From the end of the program to the source off; None if it was cut off from it."""
@@ -240,25 +245,35 @@ class Run:
         if self._served is not None:
             self._served.unplug()
             self._served = Served(self.instrument, self._case.wire)
-        child = self._start(first.measurement, plain=True)
+        measurement, told = first.measurement, list(first.told)
+        for number in range(1, _RESUMES + 1):
+            self.outcome.resumes = number
+            child = self._go_on(measurement)
+            measurement = child.measurement or measurement
+            told += child.told
+            verdict = child.verdict or {"code": None, "said": "nothing", "source": ""}
+            if verdict["code"] == 0:
+                break
+        else:
+            self.wrong(f"going on ended with {verdict['code']}: {verdict['said']}")
+        if verdict["code"] == 0 and verdict["source"] != "confirmed-off":
+            self.wrong(f"after going on the source is {verdict['source']}")
+        if self._served is not None and self._drives():
+            self.wrong("the source drives after the next session")
+        self.judge_points(measurement, told)
+        with Store(self._db) as store:
+            if measurement and len(store.points(measurement)) != _TOTAL:
+                self.wrong(f"{len(store.points(measurement))} of {_TOTAL} points after going on")
+
+    def _go_on(self, measurement: int) -> Child:
+        child = self._start(measurement, plain=True)
         began = time.monotonic()
         while child.verdict is None and child.listen(0.1):
             if time.monotonic() - began > 2 * END_S:
                 self.wrong(f"going on did not end within {2 * END_S:g} s")
                 break
         child.end()
-        verdict = child.verdict or {"code": None, "said": "nothing", "source": ""}
-        if verdict["code"] != 0:
-            self.wrong(f"going on ended with {verdict['code']}: {verdict['said']}")
-        elif verdict["source"] != "confirmed-off":
-            self.wrong(f"after going on the source is {verdict['source']}")
-        if self._served is not None and self._drives():
-            self.wrong("the source drives after the next session")
-        measurement = child.measurement or first.measurement
-        self.judge_points(measurement, [*first.told, *child.told])
-        with Store(self._db) as store:
-            if measurement and len(store.points(measurement)) != _TOTAL:
-                self.wrong(f"{len(store.points(measurement))} of {_TOTAL} points after going on")
+        return child
 
 
 def _same(one: complex, other: complex) -> bool:

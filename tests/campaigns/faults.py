@@ -80,7 +80,8 @@ def table(outcomes: Sequence[Outcome], seed: int, elapsed_s: float) -> list[str]
         f"{', '.join(f'{wire} {wires[wire]}' for wire in WIRES)}. "
         f"Runs with a broken promise: {broken}. Longest session: "
         f"{max(o.elapsed_s for o in outcomes):.0f} s. Longest time from the end of the program "
-        f"to the source off: {max(off, default=0.0):.1f} s.",
+        f"to the source off: {max(off, default=0.0):.1f} s. Measurements that one further session "
+        f"did not complete, two or three did: {sum(o.resumes > 1 for o in outcomes)}.",
         "",
         "| what went wrong | runs | struck | complete | ended early, by exit code | source said "
         "to be | broken |",
