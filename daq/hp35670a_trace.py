@@ -122,11 +122,15 @@ def read_picture(dialogue: Dialogue, axis_hz: NDArray[np.float64]) -> Picture:
 
 
 def nearest_row(axis_hz: NDArray[np.float64], frequency_hz: float) -> int | None:
-    """The displayed point that stands for a frequency, None if none is as near as one step."""
+    """The displayed point that stands for a frequency, None if none is as near as one step.
+
+    The axis may end one whole step before the stop, which is then a point like
+    any other; the frequency's own grid is added, so that no rounding decides.
+    """
     row = int(np.argmin(np.abs(axis_hz - frequency_hz)))
     low, high = axis_hz[max(row - 1, 0)], axis_hz[min(row + 1, len(axis_hz) - 1)]
     reach = max(high - axis_hz[row], axis_hz[row] - low, GRID_HZ)
-    return row if abs(axis_hz[row] - frequency_hz) <= reach else None
+    return row if abs(axis_hz[row] - frequency_hz) <= reach + GRID_HZ else None
 
 
 def _response(pairs: NDArray[np.float64]) -> NDArray[np.complex128]:

@@ -564,3 +564,16 @@ def test_what_cannot_be_exported(run, tmp_path, monkeypatch, words, said):
     code, _, err = run("export", *words)
     assert code == 2
     assert said in err
+
+
+@pytest.mark.parametrize("band", [(110, 175, 40), (115, 165, 26), (33, 47, 3), (100.1, 180.3, 7)])
+@pytest.mark.parametrize("direction", ["up", "down"])
+def test_no_end_of_a_band_is_lost(run, db, band, direction):
+    start, stop, points = band
+    plan = ["--level", "2.5", "--start", start, "--stop", stop, "--points", points]
+    code, _, _ = run(*measuring("--direction", direction, plan=plan))
+    assert code == 0
+    with Store(db, read_only=True) as store:
+        response = store.response(1)
+    assert len(response) == points
+    assert np.all(np.isfinite(response.gain_db))
