@@ -36,12 +36,20 @@ def pages(root: Path = ROOT) -> list[Path]:
 
 
 def pieces(page: Path) -> Iterator[tuple[str, str]]:
-    """What a page asks to be run, in its order: ("command", line) or ("python", code)."""
+    """What a page asks to be run, in its order: ("command", line) or ("python", code).
+
+    What a block of text right after a piece of Python says is what that must
+    print: ("printed", text).
+    """
+    before = ""
     for block in MarkdownIt().parse(page.read_text(encoding="utf-8")):
         if block.type not in ("fence", "code_block"):
             continue
+        before, info = block.info, before
         if block.info == "python":
             yield "python", block.content
+        elif block.info == "text" and info == "python":
+            yield "printed", block.content
         elif (lines := _lines(block.content)) and lines[0].split()[0] in PROGRAMS:
             yield from (("command", line) for line in lines)
 
