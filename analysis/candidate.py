@@ -26,7 +26,9 @@ Effects = tuple[str, ...]
 """Identifiers of a hypothesis's effects, sorted."""
 
 _WIDTH_RATIO, _WIDTH_SIZE = 0.08, 0.06
-"""Distances over which responses change smoothly, in coordinates, near the answer."""
+_WIDTHS = {"f_p": 0.02, "zeta_p": 0.15}
+"""Distances over which responses change smoothly, in coordinates, near the answer: a resonance
+is narrow, and what damps it matters little."""
 
 _SIGMAS = np.array([TOLERANCES[symbol] for symbol in DEVIATING])
 
@@ -48,7 +50,10 @@ def form_candidates(
     starts: Mapping[Effects, NDArray[np.float64]],
 ) -> dict[Effects, Candidate]:
     """Candidates from the runs of several hypotheses, each climbing from its start."""
-    raw = {key: _surface(observation, population) for key, population in fine.items()}
+    raw = {
+        key: _surface(observation, population, Hypothesis(unit, key))
+        for key, population in fine.items()
+    }
     slopes = _pooled_slopes(observation, fine, raw)
     found = {}
     for key, population in fine.items():
@@ -58,9 +63,9 @@ def form_candidates(
     return found
 
 
-def _surface(observation: Observation, population: Population) -> Surface:
-    d = population.places.shape[1]
-    width = np.array([_WIDTH_RATIO] + [_WIDTH_SIZE] * (d - 1))
+def _surface(observation: Observation, population: Population, hypothesis: Hypothesis) -> Surface:
+    names = [parameter.name for _, parameter in hypothesis.parameters]
+    width = np.array([_WIDTH_RATIO, *(_WIDTHS.get(name, _WIDTH_SIZE) for name in names)])
     none = np.empty((0, 3, len(observation)))
     return Surface(
         observation,

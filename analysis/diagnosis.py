@@ -9,7 +9,7 @@ elsewhere; this module puts them together and words them.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,9 @@ from analysis.calibration import Calibrated
 from analysis.misfit import Departure, describe_departures, find_departures
 from analysis.next_measurement import NextMeasurement, propose_measurement
 from analysis.observation import Observation, observe
+from analysis.progress import Progress, part_of
 from analysis.search import search_causes
+from analysis.sharpening import sharpen_candidate
 from analysis.sizing import size_candidate
 from analysis.verdict import Judged, Verdict, judge_candidates
 from daq.errors import AnalysisError
@@ -29,8 +31,6 @@ from sim.catalogue import CATALOGUE
 from sim.unit import Unit
 
 __all__ = ["Cause", "Diagnosis", "Size", "diagnose_response"]
-
-Progress = Callable[[float, str], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,7 +218,7 @@ def diagnose_response(
 
     def early(share: float, text: str) -> None:
         if progress is not None:
-            progress(0.9 * share, text)
+            progress(0.8 * share, text)
 
     candidates = search_causes(
         unit, observation, without=without, cache=cache, seed=seed, progress=early
@@ -227,7 +227,10 @@ def diagnose_response(
     verdict = judge_candidates(candidates, observation, rng)
     named = verdict.best if verdict.word in ("explained", "ambiguous") else None
     base = size_candidate(verdict.baseline.candidate, observation, rng)
-    best = base if named is None else size_candidate(named.candidate, observation, rng)
+    best = base
+    if verdict.word != "unexplained":
+        late = part_of(progress, 0.8, 0.9, "sizing it")
+        best = sharpen_candidate(unit, verdict.best.candidate, observation, rng, late)
     departures = find_departures(verdict.baseline.candidate, observation)
     proposal = _proposal(unit, verdict, observation, seed, progress)
     if progress is not None:
@@ -236,7 +239,7 @@ def diagnose_response(
         unit=unit.name,
         verdict=verdict,
         causes=() if named is None else _causes(named, best),
-        ratio_baseline=_ratio(base),
+        ratio_baseline=_ratio(base if named is not None else best),
         ratio_extended=_ratio(best),
         departures=departures,
         left=find_departures(verdict.best.candidate, observation),
@@ -280,10 +283,7 @@ def _proposal(
     else:
         return None
 
-    def late(share: float) -> None:
-        if progress is not None:
-            progress(0.9 + 0.1 * share, "choosing the next measurement")
-
+    late = part_of(progress, 0.9, 1.0, "choosing the next measurement")
     return propose_measurement(
         unit, verdict.best.candidate, rival.candidate, observation, seed=seed, progress=late
     )

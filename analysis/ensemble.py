@@ -7,14 +7,12 @@ a bench would have read from each. Every draw is one run, as a measurement is.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.observation import Observation, channels_of_cycles
-from daq.errors import AnalysisError
 from daq.plan import SweepPlan
 from sim.effects import EffectSetting
 from sim.response import START_SPREAD, Servo, simulate_cycles
@@ -97,7 +95,9 @@ def run_machines(
     return Draws(tuple(machines), channels, simulated)
 
 
-def safe_cycles(servos: Sequence[Servo], plan: SweepPlan) -> list[NDArray[np.complex128]]:
+def safe_cycles(
+    servos: Sequence[Servo], plan: SweepPlan, workers: int | None = None
+) -> list[NDArray[np.complex128]]:
     """`sim.response.simulate_cycles` at the longest step that shows the same distribution.
 
     Readings at 10 us scatter about the same means as those at 5 us, by the same amounts, at half
@@ -108,10 +108,10 @@ def safe_cycles(servos: Sequence[Servo], plan: SweepPlan) -> list[NDArray[np.com
     AnalysisError
         If a motion grew without bound even at the shortest step.
     """
-    for step in _STEPS_S[:-1]:
-        with suppress(AnalysisError):
-            return simulate_cycles(servos, plan, longest_step_s=step)
-    return simulate_cycles(servos, plan, longest_step_s=_STEPS_S[-1])
+    longest, *shorter = _STEPS_S
+    return simulate_cycles(
+        servos, plan, longest_step_s=longest, shorter_steps_s=shorter, workers=workers
+    )
 
 
 def _lots(count: int) -> list[range]:

@@ -21,13 +21,12 @@ from analysis.holdout import hold_out
 from analysis.observation import Observation
 from analysis.placement import groups_about, groups_along, groups_around
 from analysis.population import Group, Population, simulate_groups
+from analysis.progress import Progress, part_of
 from analysis.screening import screen_pairs, screen_singles
 from analysis.sizing import size_candidate
 from sim.unit import Unit
 
 __all__ = ["search_causes"]
-
-Progress = Callable[[float, str], None]
 
 _FIRST, _FIRST_GROUPS = 9, 2
 _SECOND, _SECOND_GROUPS = 5, 4
@@ -35,14 +34,18 @@ _PARENTS, _PAIRS, _PAIR_GROUPS = 8, 5, 4
 _THIRD, _THIRD_GROUPS = 4, 4
 """How many hypotheses are looked at in each round, and in how many groups of runs each."""
 
-_LAST_ROUNDS, _LAST_GROUPS, _RIVAL_GROUPS = 2, 4, 4
-"""Further groups of the leading candidate and of the baseline, and of the closest rival."""
+_LAST_ROUNDS, _LAST_GROUPS, _RIVALS = 2, 4, 1
+"""Further groups of the leading candidate and of its closest rivals, and how many these are."""
+
+_PHOTO_FINISHES, _CLOSE = 2, 30.0
+"""Further rounds where others are as close behind the leader as this log-likelihood."""
 
 _CHANCES = 4
-"""Pairs that are looked at once more where none fits yet."""
+"""Hypotheses that are looked at once more where none fits yet."""
 
-_FAR, _TOO_FAR = 60.0, 300.0
-"""Log-likelihood behind the leader from which the last and the earlier rounds leave one out."""
+_FAR, _TOO_FAR, _HOPELESS = 60.0, 200.0, 300.0
+"""Log-likelihood behind the leader from which the last and the third round leave one out, and
+from which there is no second chance."""
 
 _DOUBT = 2.0
 """Misfit of the best single cause, in standard deviations, from which pairs are tried; and the
@@ -75,17 +78,20 @@ def search_causes(
         If a motion grew without bound.
     """
     coarse = observation.thinned(coarse_stride(observation))
-    report = _part(progress, 0.0, 0.4, "simulating every cause")
+    report = part_of(progress, 0.0, 0.4, "simulating every cause")
     atlas = make_atlas(unit, coarse, cache, report)
     atlas = {k: v for k, v in atlas.items() if not set(k) & set(without)}
     rng = np.random.default_rng(seed)
-    rough = _Hunt(unit, coarse, rng, _part(progress, 0.4, 0.6, "narrowing down"))
+    rough = _Hunt(unit, coarse, rng, part_of(progress, 0.4, 0.6, "narrowing down"))
     rough.start(_singles(coarse, atlas), _FIRST_GROUPS)
     rough.look_closer(_with_baseline(rough.leading(_SECOND)), _SECOND_GROUPS)
+    if _is_doubtful(rough.best, rng):
+        # A cause with several parameters may only want a closer look.
+        rough.settle([rough.best.hypothesis.effects], _LAST_GROUPS)
     doubted = _is_doubtful(rough.best, rng)
     if doubted:
         rough.start(_pairs(coarse, atlas, rough), _PAIR_GROUPS)
-    fine = _Hunt(unit, observation, rng, _part(progress, 0.6, 1.0, "looking closer"))
+    fine = _Hunt(unit, observation, rng, part_of(progress, 0.6, 1.0, "looking closer"))
     third = _third(rough)
     fine.take_over([rough.found[key] for key in third], _THIRD_GROUPS)
     if not doubted and _is_doubtful(fine.best, rng):
@@ -94,16 +100,22 @@ def search_causes(
         pairs = [key for key in _third(rough) if key not in fine.found]
         fine.take_over([rough.found[key] for key in pairs], _THIRD_GROUPS)
         third += pairs
-    if any(len(key) > 1 for key in fine.found) and _is_doubtful(fine.best, rng):
-        # Pairs trade off in ways that evenly placed runs miss: each gets a second chance.
-        pairs = [key for key in fine.leading(len(third), _TOO_FAR) if len(key) > 1]
-        fine.settle(pairs[:_CHANCES], _LAST_GROUPS)
+    if _is_doubtful(fine.best, rng):
+        # Parameters trade off in ways that evenly placed runs miss: a second chance.
+        leading = [key for key in fine.leading(len(third), _HOPELESS) if key]
+        fine.settle(leading[:_CHANCES], _LAST_GROUPS)
     leader, *near = fine.leading(len(third), _FAR)
+    parts = _parts(leader, fine.found)
+    rivals = [key for key in near if key and key not in parts][:_RIVALS]
     # Whoever is compared with the leader is given as many runs: more runs fit better.
-    equals = [leader, *_parts(leader, fine.found), *(key for key in near if not key)]
+    equals = [leader, *parts, *rivals, *(key for key in near if not key)]
     for _ in range(_LAST_ROUNDS):
-        fine.settle(list(dict.fromkeys(equals)), _LAST_GROUPS)
-    fine.look_closer([key for key in near if key not in equals][:1], _RIVAL_GROUPS)
+        fine.settle(equals, _LAST_GROUPS)
+    for _ in range(_PHOTO_FINISHES):
+        leader, *close = fine.leading(_RIVALS + 2, _CLOSE)
+        if not close:
+            break
+        fine.settle([leader, *close], _LAST_GROUPS)
     return sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
 
 
@@ -145,14 +157,6 @@ def _parts(key: Effects, found: Mapping[Effects, Candidate]) -> list[Effects]:
 
 def _with_baseline(keys: Sequence[Effects]) -> list[Effects]:
     return list(dict.fromkeys([*keys, ()]))
-
-
-def _part(
-    progress: Progress | None, low: float, high: float, text: str
-) -> Callable[[float], None] | None:
-    if progress is None:
-        return None
-    return lambda share: progress(low + (high - low) * share, text)
 
 
 class _Hunt:

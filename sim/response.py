@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 
@@ -129,9 +130,16 @@ def simulate_cycles(
     plan: SweepPlan,
     *,
     longest_step_s: float = LONGEST_STEP_S,
+    shorter_steps_s: Sequence[float] = (),
     workers: int | None = None,
 ) -> list[NDArray[np.complex128]]:
     """Fourier coefficients of every integrated cycle, for many servos at once.
+
+    Parameters
+    ----------
+    shorter_steps_s
+        Longest steps that are tried in turn where a motion grows without bound; servos that
+        share their linear part with it go along, all others keep theirs.
 
     Returns
     -------
@@ -142,13 +150,20 @@ def simulate_cycles(
     Raises
     ------
     AnalysisError
-        If a motion grew without bound.
+        If a motion grew without bound, at the last of the steps.
     """
     levels = len(plan.levels_vpk)
     groups = list(_groups(servos, levels, workers or _cores()))
+
+    def sweep(group: Sequence[int]) -> NDArray[np.complex128]:
+        *steps, last = longest_step_s, *shorter_steps_s
+        for step in steps:
+            with suppress(AnalysisError):
+                return _sweep([servos[i] for i in group], plan, step)
+        return _sweep([servos[i] for i in group], plan, last)
+
     with ThreadPoolExecutor(workers or _cores()) as pool:
-        done = list(pool.map(lambda group: _sweep([servos[i] for i in group], plan,
-                                                  longest_step_s), groups))  # fmt: skip
+        done = list(pool.map(sweep, groups))
     results: list[NDArray[np.complex128]] = [np.empty(0, complex)] * len(servos)
     for group, cycles in zip(groups, done, strict=True):
         for position, index in enumerate(group):

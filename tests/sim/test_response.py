@@ -248,3 +248,31 @@ def test_provenance_tells_how_to_do_it_again():
 def test_a_ratio_that_is_no_share_is_refused():
     with pytest.raises(ConfigurationError, match="outside 0 to 1"):
         simulate(ADSS, 1.5, PLAN)
+
+
+def test_only_servos_that_need_a_shorter_step_take_it(monkeypatch):
+    from sim import response
+
+    stiff = [parse_effect("shaft-stiffness:k_s1=90")]
+    servos = [Servo.of(ADSS, 0.3), Servo.of(ADSS, 0.3, stiff), Servo.of(ADSS, 0.6)]
+    plain, swept = response._sweep, []
+
+    def sweep(group, plan, step):
+        for servo in group:
+            swept.append((servos.index(servo), step))
+            if servo is servos[1] and step > 4e-6:
+                raise AnalysisError("grew without bound")
+        return plain(group, plan, step)
+
+    monkeypatch.setattr(response, "_sweep", sweep)
+    steps = {"longest_step_s": 1e-5, "shorter_steps_s": (5e-6, 2.5e-6)}
+    tried = simulate_cycles(servos, PLAN, **steps)
+    assert sorted(swept) == [(0, 1e-5), (1, 2.5e-6), (1, 5e-6), (1, 1e-5), (2, 1e-5)]
+    apart = [
+        simulate_cycles([servos[i]], PLAN, longest_step_s=step)[0]
+        for i, step in ((0, 1e-5), (1, 2.5e-6), (2, 1e-5))
+    ]
+    for one, other in zip(tried, apart, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9)
+    with pytest.raises(AnalysisError, match="without bound"):
+        simulate_cycles(servos, PLAN, longest_step_s=1e-5, shorter_steps_s=(5e-6,))

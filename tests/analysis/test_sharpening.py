@@ -1,0 +1,107 @@
+"""How long a named candidate is looked at, in a world whose answers are known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import synthetic
+
+from analysis import sharpening
+from analysis.calibration import Calibrated
+from analysis.population import Population
+
+TRUE = ("load-inertia",)
+
+
+def population_of(groups, rng):
+    """Runs of synthetic machines at the places that were asked for."""
+    places = np.concatenate([group.places for group in groups])
+    off = np.repeat([rng.normal(0.0, synthetic.SIGMAS) for _ in groups], 10, axis=0)
+    runs = np.array([synthetic.read(TRUE, p, rng, d) for p, d in zip(places, off, strict=True)])
+    mean = np.exp(runs[:, 0] + 1j * runs[:, 1])
+    return Population(places, off, mean, np.full(mean.shape, 1e-4))
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """How many groups were simulated in each round."""
+    rounds = []
+
+    def simulate(unit, groups, observation, rng, progress=None):
+        rounds.append(len(groups))
+        return {TRUE: population_of(groups, rng)}
+
+    monkeypatch.setattr(sharpening, "simulate_groups", simulate)
+    return rounds
+
+
+def sized(stds):
+    """A stand-in for the sizing: what it says of the error, call by call."""
+    told = iter(stds)
+
+    def size(candidate, observation, rng):
+        return Calibrated(np.array([0.5, 0.5]), np.diag([next(told) ** 2, 0.001**2]))
+
+    return size
+
+
+def found(observed, seed):
+    candidate = synthetic.candidate(observed, TRUE, seed)
+    runs = population_of([group_at(p) for p in candidate.population.places[::10]],
+                         np.random.default_rng(seed))  # fmt: skip
+    return replace(candidate, population=runs)
+
+
+def group_at(place):
+    from analysis.causes import Hypothesis
+    from analysis.population import Group
+
+    return Group(Hypothesis(synthetic.ADSS, TRUE), np.linspace(0.0, 1.0, 10), place[1:])
+
+
+def observed_at(seed):
+    rng = np.random.default_rng(seed)
+    return synthetic.observation(synthetic.read(TRUE, np.array([0.5, 0.5]), rng))
+
+
+def test_what_is_sharp_costs_nothing_more(monkeypatch, asked):
+    observed = observed_at(0)
+    monkeypatch.setattr(sharpening, "size_candidate", sized([0.01]))
+    rng = np.random.default_rng(0)
+    sharpening.sharpen_candidate(synthetic.ADSS, found(observed, 0), observed, rng)
+    assert asked == []
+
+
+def test_it_stops_as_soon_as_the_answer_is_sharp(monkeypatch, asked):
+    observed = observed_at(0)
+    monkeypatch.setattr(sharpening, "size_candidate", sized([0.2, 0.1, 0.01]))
+    rng, told = np.random.default_rng(0), []
+    answer = sharpening.sharpen_candidate(
+        synthetic.ADSS, found(observed, 0), observed, rng, told.append
+    )
+    assert len(asked) == 2
+    assert answer.covariance[0, 0] == pytest.approx(0.01**2)
+    assert told == sorted(told)
+
+
+def test_it_ends_where_the_data_tell_no_more(monkeypatch, asked):
+    observed = observed_at(0)
+    monkeypatch.setattr(sharpening, "size_candidate", sized([0.2] * 50))
+    rng = np.random.default_rng(0)
+    answer = sharpening.sharpen_candidate(synthetic.ADSS, found(observed, 0), observed, rng)
+    assert 2 < len(asked) < 10
+    assert answer.covariance[0, 0] == pytest.approx(0.2**2)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_further_runs_bring_the_answer_no_farther_from_the_truth(asked, seed):
+    observed = observed_at(seed)
+    candidate = found(observed, seed)
+    before = sharpening.size_candidate(candidate, observed, np.random.default_rng(0))
+    after = sharpening.sharpen_candidate(
+        synthetic.ADSS, candidate, observed, np.random.default_rng(0)
+    )
+    error = np.abs(after.mean - 0.5) / np.sqrt(np.diag(after.covariance))
+    # Four draws of two numbers: one beyond 3.5 sigma in 250 runs of this test.
+    assert np.all(error < 3.5)
+    assert np.all(np.diag(after.covariance) <= 1.5 * np.diag(before.covariance))
