@@ -259,7 +259,7 @@ def test_only_servos_that_need_a_shorter_step_take_it(monkeypatch):
 
     def sweep(group, plan, step):
         for servo in group:
-            swept.append((servos.index(servo), step))
+            swept.append((next(i for i, one in enumerate(servos) if one is servo), step))
             if servo is servos[1] and step > 4e-6:
                 raise AnalysisError("grew without bound")
         return plain(group, plan, step)
