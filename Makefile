@@ -5,7 +5,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: help demo test check bench blind faults lock clean
+.PHONY: help demo test check bench blind faults docs lock clean
 
 help:
 	@echo "make demo    the whole job without hardware; results in demo/"
@@ -14,6 +14,7 @@ help:
 	@echo "make bench   benchmarks"
 	@echo "make blind   hide effects and have the diagnosis find them; an hour or more"
 	@echo "make faults  hundreds of sessions with something going wrong in each; half an hour"
+	@echo "make docs    everything that the documentation prints, in full; half an hour"
 	@echo "make lock    write down the installed versions in requirements.lock"
 	@echo "make clean   remove what the other targets left, except .venv"
 
@@ -41,6 +42,9 @@ blind: $(READY)
 
 faults: $(READY)
 	@$(BIN)/python tests/campaigns/faults.py
+
+docs: $(READY)
+	@$(BIN)/python tests/campaigns/printed_commands.py
 
 lock: $(READY)
 	@$(BIN)/python -m pip freeze --exclude-editable > requirements.lock

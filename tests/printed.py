@@ -27,7 +27,7 @@ SLOW = {"estimate", "diagnose", "report", "reproduce", "demo"}
 SCREENS = {"bench", "replay"}
 _STORED = 6
 """Points that the interrupted measurement has."""
-PROGRAMS = {"lashbench", "make", "python", "uv", "pipx", "git", "cd"}
+PROGRAMS = {"lashbench", "make", "python", ".venv/bin/pytest", "uv", "pipx", "git", "cd"}
 
 
 def pages(root: Path = ROOT) -> list[Path]:
@@ -105,7 +105,7 @@ class Newcomer:
         if words[0] == "make":
             known = re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
             assert set(words[1:]) <= set(known), f"{text}: no such target"
-        elif words[0] == "python":
+        elif words[0] in ("python", ".venv/bin/pytest"):
             assert (ROOT / words[1]).is_file(), f"{text}: no such script"
         else:
             assert words[0] in PROGRAMS, f"{text}: {words[0]} is unknown to the newcomer"

@@ -149,6 +149,38 @@ def test_an_example_is_short_and_uses_public_names_only(example):
             assert {alias.name for alias in node.names} <= set(public[node.module]), node.module
 
 
+@pytest.mark.parametrize("page", pages(), ids=name_of)
+def test_files_that_a_page_names_are_there(page):
+    for path in re.findall(r"`((?:daq|sim|analysis|tui|tests)/[\w./*]+)`", page.read_text()):
+        assert list(ROOT.glob(path.rstrip("/"))), path
+
+
+def test_the_table_of_verbs_is_whole():
+    page = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    table = page[page.index("## Commands") : page.index("| exit code |")]
+    assert sorted(re.findall(r"^\| `([a-z-]+)`", table, re.MULTILINE)) == sorted(cli.VERBS)
+
+
+def test_every_page_can_be_reached_from_the_index():
+    reached, waiting = set(), [ROOT / "docs" / "index.md"]
+    while waiting:
+        page = waiting.pop()
+        if page in reached or page.suffix != ".md":
+            continue
+        reached.add(page)
+        targets = re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8"))
+        waiting += [(page.parent / target).resolve() for target in targets]
+    assert set(pages()) - {ROOT / "README.md"} <= reached
+
+
+def test_the_citation_is_of_this_version():
+    from importlib.metadata import version
+
+    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {version('lashbench')}\n" in text
+    assert "Apache License" in (ROOT / "LICENSE").read_text(encoding="utf-8")
+
+
 def test_the_physics_tells_of_every_effect():
     page = (ROOT / "docs" / "physics.md").read_text(encoding="utf-8")
     table = page[page.index("| effect |") : page.index("## Symbols")]
