@@ -5,7 +5,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: help demo test check bench blind faults docs lock clean
+.PHONY: help demo test check bench blind faults fuzz soak docs lock clean
 
 help:
 	@echo "make demo    the whole job without hardware; results in demo/"
@@ -14,6 +14,8 @@ help:
 	@echo "make bench   benchmarks"
 	@echo "make blind   hide effects and have the diagnosis find them; an hour or more"
 	@echo "make faults  hundreds of sessions with something going wrong in each; half an hour"
+	@echo "make fuzz    a million damaged inputs to everything that reads; an hour or two"
+	@echo "make soak    measure back to back for an hour and watch what is held on to"
 	@echo "make docs    everything that the documentation prints, in full; half an hour"
 	@echo "make lock    write down the installed versions in requirements.lock"
 	@echo "make clean   remove what the other targets left, except .venv"
@@ -42,6 +44,13 @@ blind: $(READY)
 
 faults: $(READY)
 	@$(BIN)/python tests/campaigns/faults.py
+
+fuzz: $(READY)
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[fuzz]'
+	@$(BIN)/python tests/campaigns/fuzz.py
+
+soak: $(READY)
+	@$(BIN)/python tests/campaigns/soak.py
 
 docs: $(READY)
 	@$(BIN)/python tests/campaigns/printed_commands.py

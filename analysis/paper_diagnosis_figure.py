@@ -16,7 +16,7 @@ from matplotlib.patches import Ellipse
 
 from analysis.paper_belief import Belief, Judged
 from analysis.paper_diagnosis import PaperDiagnosis
-from analysis.paper_pairs import VISCOUS
+from daq.formats.atomic import file_stem
 
 __all__ = ["draw", "paper_diagnosis_figure"]
 
@@ -29,7 +29,7 @@ _BARS = 8
 def draw(diagnosis: PaperDiagnosis, directory: Path) -> list[Path]:
     """Write the figure of one unit as PNG into a directory, made if missing."""
     directory.mkdir(parents=True, exist_ok=True)
-    path = directory / f"{diagnosis.unit.lower()}-paper-diagnosis.png"
+    path = directory / f"{file_stem(diagnosis.unit)}-paper-diagnosis.png"
     paper_diagnosis_figure([diagnosis]).savefig(path, dpi=130)
     return [path]
 
@@ -56,7 +56,7 @@ def paper_diagnosis_figure(diagnoses: Sequence[PaperDiagnosis]) -> Figure:
 
 def _draw_features(axes: Axes, belief: Belief) -> None:
     reading = belief.best.agreement.reading
-    alone = belief.best_of(VISCOUS)
+    alone = belief.damping_alone
     shown: list[tuple[Judged, str, str]] = [(belief.baseline, _PLAIN, "plain model")]
     if alone is not None and alone is not belief.best:
         shown.append((alone, _DAMPED, f"damping alone: {_name(alone)}"))

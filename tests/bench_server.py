@@ -66,4 +66,4 @@ def serving(*words: str):
             yield {name: url(name, place) for name, place in places.items()}
         finally:
             process.terminate()
-            process.wait(10)
+            process.wait(60)  # a starved machine takes its time

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from daq.errors import InputError, LashbenchError
 
-__all__ = ["checked_target", "replacing", "write_text"]
+__all__ = ["checked_target", "file_stem", "replacing", "write_text"]
 
 
 @contextmanager
@@ -53,6 +53,12 @@ def write_text(path: Path, text: str) -> None:
     """Write a UTF-8 text file whole or not at all; raises as `replacing` does."""
     with replacing(path) as partial:
         partial.write_text(text, encoding="utf-8", newline="")
+
+
+def file_stem(name: str) -> str:
+    """A name that others chose, as a part of a file's name: it leads into no other folder."""
+    kept = "".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in name)
+    return kept.strip("-").lower() or "unnamed"
 
 
 def checked_target(path: Path) -> Path:

@@ -196,6 +196,18 @@ def draw(samples: list[Sample], path: Path) -> None:
     figure.savefig(path, dpi=110)
 
 
+def report(samples: list[Sample], *, write: bool) -> list[str]:
+    """Print, and perhaps write, the result; what grew."""
+    lines, found = table(samples), grown(samples)
+    print("\n".join([*lines, *found]), flush=True)
+    if write:
+        draw(samples, PICTURE)
+        text = PAGE.read_text(encoding="utf-8")
+        before, after = text[: text.index(BEGIN)], text[text.index(END) :]
+        PAGE.write_text(f"{before}{BEGIN}\n\n" + "\n".join(lines) + f"\n\n{after}", "utf-8")
+    return found
+
+
 def main() -> int:
     """Run, print, and perhaps write."""
     words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -212,15 +224,7 @@ def main() -> int:
             samples.append(sample)
             if len(samples) % 100 == 1:
                 print(sample, flush=True)
-    lines = table(samples)
-    print("\n".join(lines))
-    for what in (found := grown(samples)):
-        print(what)
-    if given.write:
-        draw(samples, PICTURE)
-        text = PAGE.read_text(encoding="utf-8")
-        before, after = text[: text.index(BEGIN)], text[text.index(END) :]
-        PAGE.write_text(f"{before}{BEGIN}\n\n" + "\n".join(lines) + f"\n\n{after}", "utf-8")
+        found = report(samples, write=given.write)
     return 1 if found else 0
 
 

@@ -226,3 +226,28 @@ def test_a_record_that_cannot_be_read_is_told(whole, tmp_path, script, reads):
     with Store(path) as store, pytest.raises(FileFormatError) as caught:
         getattr(store, reads)(1)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "script",
+    [
+        "CREATE TRIGGER t AFTER INSERT ON events BEGIN DELETE FROM points; END",
+        "DROP TABLE estimates; CREATE VIEW estimates AS WITH RECURSIVE n(id) AS "
+        "(SELECT 1 UNION ALL SELECT id + 1 FROM n) SELECT id FROM n",
+    ],
+)
+def test_a_history_with_a_program_in_it_is_refused(whole, tmp_path, script):
+    path = tmp_path / "trap.db"
+    path.write_bytes(whole)
+    run_sql(path, script)
+    for read_only in (True, False):
+        with pytest.raises(FileFormatError, match="views or triggers"):
+            Store(path, read_only=read_only)
+
+
+def test_a_record_nested_beyond_all_bounds_is_told(whole, tmp_path):
+    path = tmp_path / "deep.db"
+    path.write_bytes(whole)
+    run_sql(path, f"UPDATE points SET detail = '{'[' * 100_000}'")
+    with Store(path) as store, pytest.raises(FileFormatError, match="nested too deeply"):
+        store.points(1)

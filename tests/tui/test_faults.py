@@ -36,10 +36,11 @@ def test_every_end_is_one_of_those_that_are_documented(outcomes):
         assert outcome.elapsed_s < 40.0, (name, wire)
 
 
-def test_the_tests_that_the_page_names_exist():
-    page = (ROOT / "docs" / "faults.md").read_text()
+@pytest.mark.parametrize("name", ["faults.md", "reliability.md"])
+def test_the_tests_that_the_page_names_exist(name):
+    page = (ROOT / "docs" / name).read_text()
     sources = "".join(path.read_text() for path in (ROOT / "tests").rglob("test_*.py"))
     named = set(re.findall(r"`(test_\w+)`", page))
     assert len(named) > 15
-    for name in named:
-        assert f"def {name}(" in sources, name
+    for test in named:
+        assert f"def {test}(" in sources, test

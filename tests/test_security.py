@@ -1,0 +1,88 @@
+"""What keeps strangers' text from doing anything: no code is run from data, no path escapes."""
+
+import ast
+import socket
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from analysis import diagnosis_figures
+from daq.formats.atomic import file_stem
+from sim.analyser35670a import Analyser35670A, Choices
+from sim.analyser35670a.plant import LinearPlant
+from sim.serve import Server
+
+ROOT = Path(__file__).parents[1]
+SOURCES = sorted(path for floor in ("daq", "sim", "analysis", "tui") for path in
+                 (ROOT / floor).rglob("*.py"))  # fmt: skip
+MODULES = {"pickle", "shelve", "marshal", "dill", "joblib", "cloudpickle", "yaml"}
+"""Modules whose files can hold code."""
+CALLS = {"eval", "exec", "compile", "__import__", "os.system", "os.popen"}
+
+
+def dangers(source: str) -> list[str]:
+    """What in a program could run what it reads."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            found += [name.name for name in node.names if name.name.split(".")[0] in MODULES]
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] in MODULES:
+            found.append(node.module)
+        elif isinstance(node, ast.Call):
+            name = ast.unparse(node.func)
+            words = {word.arg: ast.unparse(word.value) for word in node.keywords}
+            if name in CALLS or words.get("shell", "False") != "False":
+                found.append(name)
+            if name in ("np.load", "numpy.load") and words.get("allow_pickle") != "False":
+                found.append(name)
+            if words.get("allow_pickle", "False") != "False":
+                found.append(name)
+    return found
+
+
+def test_nothing_in_the_package_can_run_what_it_reads():
+    assert len(SOURCES) > 150
+    assert {str(path): dangers(path.read_text()) for path in SOURCES
+            if dangers(path.read_text())} == {}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "source",
+    ["import pickle", "from pickle import loads", "eval(x)", "np.load(f)", "os.system(x)",
+     "subprocess.run(x, shell=True)", "np.load(f, allow_pickle=True)"],
+)  # fmt: skip
+def test_what_could_is_found(source):
+    assert dangers(source)
+
+
+def test_the_simulated_analyser_is_not_to_be_had_from_outside():
+    instrument = Analyser35670A(LinearPlant(lambda hz: 0.1), Choices())
+    with Server(instrument, tcp=0, prologix_tcp=0) as server:
+        for name in ("tcp", "prologix_tcp"):
+            host, port = server.addresses[name].split(":")
+            assert host == "127.0.0.1"
+            for outside in {place[4][0] for place in socket.getaddrinfo(socket.gethostname(), 0)}:
+                if not outside.startswith("127.") and ":" not in outside:
+                    with pytest.raises(OSError):
+                        socket.create_connection((outside, int(port)), timeout=1.0)
+
+
+@pytest.mark.parametrize("name", ["../../etc/x", "/etc/x", "a/b", "..", "", "\0", "C:\\x", "ADSS"])
+def test_a_name_leads_into_no_other_folder(name, tmp_path, monkeypatch):
+    class Figure:
+        def savefig(self, path, dpi):
+            Path(path).write_bytes(b"")
+
+    for made in ("residual_figure", "probability_figure"):
+        monkeypatch.setattr(diagnosis_figures, made, lambda _: Figure())
+    folder = tmp_path / "plots"
+    for path in diagnosis_figures.draw_diagnosis(SimpleNamespace(unit=name), folder):
+        assert path.resolve().parent == folder
+    assert len(list(folder.iterdir())) == 2
+    assert [place.name for place in tmp_path.iterdir()] == ["plots"]
+
+
+def test_plain_names_stay_as_they_are():
+    assert file_stem("ADSS") == "adss"
+    assert file_stem("My gimbal 2") == "my-gimbal-2"
