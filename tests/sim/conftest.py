@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from known_device import known_answer
 
 from sim.analyser35670a import Analyser35670A, Choices, LinearPlant, TalkState
 from sim.faults import FaultBoard, parse_fault
@@ -23,11 +24,6 @@ SWEPT_SINE = (
     "SOUR:VOLT 1 VPK",
     "FORM REAL,64",
 )
-
-
-def known_answer(hz: float) -> complex:
-    """The gain of the device behind the inputs: a tenth, turning with frequency."""
-    return 0.1 * (1.0 + 1j * hz / 100.0)
 
 
 class Controller:

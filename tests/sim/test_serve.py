@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
-import signal
 import socket
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -16,23 +12,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from known_device import known_answer
 
 from daq.analyser import PointSettings
-from daq.errors import BenchTimeout, ConfigurationError, LinkError, ProtocolError
+from daq.errors import BenchTimeout, LinkError
 from daq.hp35670a import HP35670A
-from daq.transports.base import Deadline
 from daq.transports.open import open_transport
 from sim.analyser35670a import Analyser35670A, Choices, LinearPlant
 from sim.faults import FaultBoard, parse_fault
-from sim.loopback import Loopback, open_loopback, read_loopback_settings
+from sim.loopback import Loopback
 from sim.serve import HOST, Server
-from sim.unit import load_unit
 
+BUSY_S = 10.0
+"""What a busy machine may add to a time."""
 IDENTITY = "HEWLETT-PACKARD,35670A,LASHSIM001,A.01.11"
-
-
-def known_answer(hz: float) -> complex:
-    return 0.1 * (1.0 + 1j * hz / 100.0)
 
 
 def instrument(*faults: str, **choices: Any) -> Analyser35670A:
@@ -141,10 +134,14 @@ def test_a_script_that_only_sleeps_finds_the_sweep_done():
             b"*RST;*CLS\nINST:SEL SINE\nFREQ:RES:AUTO OFF\nFREQ:STAR 100;STOP 200;RES 51 PNT/SWP\n"
             b"SOUR:VOLT 1 VPK\nABOR;:INIT\n"
         )
-        time.sleep(0.5)
-        wire.sendall(b"STAT:OPER:COND?\nSYST:ERR?\n")
-        assert line(wire) == b"+0\n"
-        assert line(wire) == b'+0,"No error"\n'
+        for pause_s in (0.5, 5.0, 30.0):  # the later ones only where the machine is busy
+            time.sleep(pause_s)
+            wire.sendall(b"STAT:OPER:COND?\nSYST:ERR?\n")
+            condition, error = line(wire), line(wire)
+            assert error == b'+0,"No error"\n'
+            if condition == b"+0\n":
+                break
+        assert condition == b"+0\n"
 
 
 def test_realtime_takes_its_time():
@@ -152,7 +149,7 @@ def test_realtime_takes_its_time():
         begin = time.monotonic()
         wire.sendall(b"*RST\n*OPC?\n")
         assert line(wire) == b"+1\n"
-        assert 0.4 < time.monotonic() - begin < 1.5
+        assert 0.4 < time.monotonic() - begin < 1.5 + BUSY_S
         wire.sendall(
             b"INST:SEL SINE\nFREQ:RES:AUTO OFF\nFREQ:STAR 100;STOP 200;RES 3 PNT/SWP\n"
             b"VOLT1:RANG 2 VPK\nVOLT2:RANG 2 VPK\nSOUR:VOLT 1 VPK\nABOR;:INIT;*OPC?\n"
@@ -160,7 +157,7 @@ def test_realtime_takes_its_time():
         begin = time.monotonic()
         assert line(wire) == b"+1\n"
         expected = sum(10 / hz + 0.5 for hz in (100, 133.33, 166.67))
-        assert time.monotonic() - begin == pytest.approx(expected, abs=0.4)
+        assert -0.4 < time.monotonic() - begin - expected < 0.4 + BUSY_S
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -325,126 +322,3 @@ def test_an_ar488_on_a_terminal_starts_anew_when_it_is_opened():
             port.read_until(b"\n")
             port.write(b"++addr\n")
             assert port.read_until(b"\n") == b"1\r\n"
-
-
-# The loopback
-
-
-def test_the_loopback_reports_what_other_wires_report():
-    soon = Deadline.after(0.2)
-    wire = Loopback(instrument())
-    wire.write("*IDN?", soon)
-    assert wire.read(soon) == IDENTITY
-    wire.write("*CLS", soon)
-    with pytest.raises(BenchTimeout, match="CLS"):
-        wire.read(Deadline.after(0.05))
-    with pytest.raises(ProtocolError, match="bytes"):
-        wire.write("X" * 200, soon)
-    wire.write("*IDN?", soon)
-    with pytest.raises(ProtocolError, match="block"):
-        wire.read_block(soon)
-    wire.close()
-    with pytest.raises(LinkError, match="closed"):
-        wire.write("*IDN?", soon)
-
-
-@pytest.mark.parametrize(
-    ("fault", "error"),
-    [("truncated-block:phase=prepare", ProtocolError),
-     ("wrong-length:phase=prepare", ProtocolError),
-     ("dropped-connection:phase=prepare", LinkError), ("silence:phase=prepare", BenchTimeout)],
-)  # fmt: skip
-def test_faults_on_the_loopback(fault, error):
-    wire = Loopback(instrument(fault))
-
-    def read() -> bytes:
-        wire.write("SYST:SET?", Deadline.after(0.1))
-        return wire.read_block(Deadline.after(0.1))
-
-    with pytest.raises(error):
-        read()
-
-
-def test_what_may_follow_sim():
-    wanted = read_loopback_settings(
-        "?ratio=0.5&seed=3&noise=0&speed=realtime&options=1D2,UFF"
-        "&fault=silence:point=4&effect=load-inertia:J_L=0.003"
-    )
-    assert (wanted.ratio, wanted.seed, wanted.noise_v, wanted.realtime) == (0.5, 3, 0.0, True)
-    assert wanted.options == "1D2,UFF"
-    assert wanted.faults[0].point == 4
-    assert wanted.effects[0].id == "load-inertia"
-    assert read_loopback_settings("") == read_loopback_settings("?")
-
-
-@pytest.mark.parametrize(
-    "rest", ["ratio=1", "?ratio=2", "?ratio=x", "?seed=1.5", "?speed=slow", "?colour=red", "?seed",
-             "?seed=1&seed=2", "?noise=-1"],
-)  # fmt: skip
-def test_bad_settings_of_sim_are_refused(rest):
-    with pytest.raises(ConfigurationError):
-        read_loopback_settings(rest)
-
-
-def test_sim_opens_with_the_gimbal_behind_it():
-    wire = open_transport("sim:?seed=1", {"sim": open_loopback(load_unit("adss"), 0.25)})
-    analyser = HP35670A(wire)
-    analyser.prepare(120.0, 160.0, PointSettings(2.5, 10, 10))
-    (point,) = analyser.sweep([150.0])
-    assert 0.01 < abs(point.gain) < 10
-    assert str(analyser.make_safe()) == "confirmed-off"
-
-
-# The verb
-
-
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_the_verb_prints_one_ready_line_and_ends_on_a_signal(number):
-    process = subprocess.Popen(
-        [sys.executable, "-m", "tui.cli", "serve", "--unit", "adss", "--ratio", "0.25",
-         "--tcp", "0", "--prologix-tcp", "0", "--prologix-pty", "--speed", "fast",
-         "--fault", "slow-reply:seconds=0.1", "--seed", "3"],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    try:
-        assert process.stdout is not None
-        addresses = json.loads(process.stdout.readline())
-        assert set(addresses) == {"tcp", "prologix_tcp", "prologix_pty"}
-        host, port = addresses["tcp"].split(":")
-        with socket.create_connection((host, int(port)), timeout=5.0) as wire:
-            wire.sendall(b"*IDN?\n")
-            assert line(wire) == IDENTITY.encode() + b"\n"
-        assert os.path.exists(addresses["prologix_pty"])
-        process.send_signal(number)
-        rest, _notes = process.communicate(timeout=10)
-        assert process.returncode == 0
-        assert rest == ""
-        assert not os.path.lexists(addresses["prologix_pty"])
-    finally:
-        process.kill()
-        process.wait()
-
-
-@pytest.mark.parametrize(
-    ("words", "code", "says"),
-    [
-        ([], 2, "--tcp"),
-        (["--tcp", "70000"], 2, "70000"),
-        (["--tcp", "0", "--fault", "nonsense"], 2, "nonsense"),
-        (["--tcp", "0", "--effect", "nonsense"], 2, "nonsense"),
-        (["--tcp", "0", "--noise", "-1"], 2, "noise"),
-        (["--tcp", "0", "--speed", "warp"], 2, "warp"),
-        (["--tcp", "0", "--ratio", "2"], 2, "ratio"),
-        (["--tcp", "0", "--unit", "nobody"], 2, "nobody"),
-    ],
-)
-def test_the_verb_refuses_in_one_line(words, code, says, capsys):
-    from tui.cli import main
-
-    given = dict(zip(words[::2], words[1::2], strict=True))
-    base = {"--unit": "adss", "--ratio": "0.25"} | given
-    assert main(["serve", *(word for pair in base.items() for word in pair)]) == code
-    captured = capsys.readouterr()
-    assert says in captured.err
-    assert len(captured.err.strip().splitlines()) == 1
-    assert captured.out == ""
