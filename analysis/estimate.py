@@ -10,12 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.ensemble import Machine
+from analysis.executor import Executor
 from analysis.fit import RATIO, Axis, Posterior, fit_posterior
 from analysis.observation import observe
 from analysis.paper_estimate import IndexCurve, index_curve_of_response
@@ -95,6 +97,7 @@ class Estimate:
             lines.append(line.rstrip())
         if self.curve is not None:
             lines.append(self.curve.summary())
+        lines.append(f"  motion simulated for this: {self.simulated_s:.0f} s")
         lines += [f"  warning: {warning}" for warning in self.warnings]
         return lines
 
@@ -105,6 +108,8 @@ def estimate_response(
     total_backlash_unknown: bool = False,
     progress: Progress | None = None,
     seed: int = 0,
+    cache: Path | None = None,
+    executor: Executor | None = None,
 ) -> Estimate:
     """Estimate from a whole response at all its source levels.
 
@@ -122,6 +127,10 @@ def estimate_response(
         Told the share done and what is being done.
     seed
         Of the starts and places of the simulations.
+    cache
+        Folder that keeps what was simulated for a unit and a plan.
+    executor
+        Where it is simulated; on this machine's cores if not given.
 
     Raises
     ------
@@ -134,7 +143,9 @@ def estimate_response(
         axes = (_play_axis(unit),)
     elif total_backlash_unknown:
         axes = (replace(RATIO, coarse=17, scale=0.12), _total_axis(unit))
-    posterior = fit_posterior(unit, observation, axes, seed=seed, progress=progress)
+    posterior = fit_posterior(
+        unit, observation, axes, seed=seed, cache=cache, executor=executor, progress=progress
+    )
     curve = index_curve_of_response(response, observation, posterior.draws)
     warnings = []
     misfit = _robust_rms(posterior)

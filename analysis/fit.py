@@ -11,13 +11,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.calibration import Calibrated, calibrate
 from analysis.emulator import Emulator
-from analysis.ensemble import TOLERANCES, Draws, Machine, run_machines
+from analysis.ensemble import TOLERANCES, Draws, Machine
+from analysis.executor import Executor
+from analysis.library import run_families
 from analysis.likelihood import Match, match_prediction
 from analysis.observation import Observation
 from sim.response import START_SPREAD
@@ -30,11 +33,19 @@ Progress = Callable[[float, str], None]
 _SIMULATED = ("R_m", "k_t", "J_L", "k_s1", "k_a")
 """Datasheet values whose spread is simulated; that of k_ts scales the gain alone."""
 
-_FIRST_GROUPS, _GROUPS, _PER_GROUP = 4, 20, 8
-"""Groups of machines that share their deviations, and so are stepped together; machines in each."""
+_WIDE_FAMILIES, _NEAR_FAMILIES = 5, 8
+"""Families of machines that share their deviations, and so are stepped together, per axis."""
+
+_FULL_LANES, _LEAST_KIN, _MOST_KIN = 64, 8, 32
+"""A family at all its levels fills the engine's lanes, or nearly."""
 
 _REACH = 3.5
 """Machines lie up to so many standard deviations from the answer so far."""
+
+_LEAST_STD, _CENTRES, _REACHES = 0.6, 1.25, 1.5
+"""The answer so far is known to so much of an axis's scale at best; it is looked at about places
+so much of the scale apart, over reaches that grow by this factor. Measurements that lie close
+together are thus held against the same machines, which may have been kept."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,9 +94,13 @@ def fit_posterior(
     axes: Sequence[Axis] = (RATIO,),
     *,
     seed: int = 0,
+    cache: Path | None = None,
+    executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Posterior:
     """Fit the free numbers of a unit to an observation.
+
+    `cache` and `executor` are those of `analysis.library.run_families`.
 
     Raises
     ------
@@ -93,23 +108,23 @@ def fit_posterior(
         If a motion grew without bound, or the data leave no likelihood.
     """
 
-    def report(low: float, high: float, text: str) -> Callable[[float], None] | None:
-        if progress is None:
-            return None
-        return lambda part: progress(low + (high - low) * part, text)
+    def runs(families: list[list[Machine]], low: float, high: float, text: str) -> Draws:
+        def tell(part: float) -> None:
+            if progress is not None:
+                progress(low + (high - low) * part, text)
+
+        return run_families(
+            unit, families, observation, cache=cache, executor=executor, progress=tell
+        )
 
     rng = np.random.default_rng(seed)
     axes = tuple(axes)
     scales = np.array([axis.scale for axis in axes])
-    draws = run_machines(
-        unit, _coarse_machines(axes), observation, report(0.0, 0.2, "simulating the range")
-    )
-    # The regression leans towards where its runs are: each round is centred anew.
-    for low, high, groups in ((0.2, 0.4, _FIRST_GROUPS), (0.4, 0.95, _GROUPS)):
-        found = calibrate(observation, _Look(observation, axes, draws, scales).emulator, rng)
-        machines = _fine_machines(axes, found, groups * len(axes), rng)
-        text = "simulating near the answer"
-        draws = draws.joined(run_machines(unit, machines, observation, report(low, high, text)))
+    wide = _wide_families(axes, _kin(observation), seed)
+    draws = runs(wide, 0.0, 0.5, "simulating the range")
+    found = calibrate(observation, _Look(observation, axes, draws, scales).emulator, rng)
+    near = _near_families(axes, found, _kin(observation), seed)
+    draws = draws.joined(runs(near, 0.5, 0.95, "simulating near the answer"))
     look = _Look(observation, axes, draws, 0.6 * scales)
     calibrated = calibrate(observation, look.emulator, rng)
     weight = calibrated.density(_grid(axes))
@@ -171,40 +186,72 @@ def _fine_count(axis: Axis) -> int:
     return 6 * (axis.coarse - 1) // 2 + 1
 
 
-def _coarse_machines(axes: Sequence[Axis]) -> list[Machine]:
+def _kin(observation: Observation) -> int:
+    """Machines in a family: each of them takes a lane per level."""
+    levels = max(len(plan.levels_vpk) for plan, _ in observation.plans)
+    return int(np.clip(_FULL_LANES // levels, _LEAST_KIN, _MOST_KIN))
+
+
+def _wide_families(axes: Sequence[Axis], kin: int, seed: int) -> list[list[Machine]]:
+    """Machines over the whole range: a lattice as the datasheet says, and families that are not."""
     lines = [np.linspace(axis.low, axis.high, axis.coarse) for axis in axes]
     places = np.stack([m.ravel() for m in np.meshgrid(*lines, indexing="ij")], axis=1)
-    return [_machine_at(axes, place, seed) for seed, place in enumerate(places)]
+    lattice = [_machine_at(axes, place, number) for number, place in enumerate(places)]
+    low = np.array([axis.low for axis in axes])
+    high = np.array([axis.high for axis in axes])
+    rng = np.random.default_rng([seed, 1])
+    return [lattice[at : at + kin] for at in range(0, len(lattice), kin)] + _families(
+        axes, low, high, _WIDE_FAMILIES * len(axes), kin, rng
+    )
 
 
-def _fine_machines(
-    axes: Sequence[Axis], found: Calibrated, groups: int, rng: np.random.Generator
-) -> list[Machine]:
-    """Machines evenly about the answer so far, each group of them off its datasheet in its own way.
+def _near_families(
+    axes: Sequence[Axis], found: Calibrated, kin: int, seed: int
+) -> list[list[Machine]]:
+    """Families about the answer so far."""
+    low = np.array([axis.low for axis in axes])
+    high = np.array([axis.high for axis in axes])
+    scale = np.array([axis.scale for axis in axes])
+    least = _LEAST_STD * scale
+    std = np.sqrt(np.diag(found.covariance))
+    growth = np.ceil(np.log(np.maximum(std / least, 1.0)) / np.log(_REACHES)).astype(int)
+    steps = np.round((np.clip(found.mean, low, high) - low) / (_CENTRES * scale)).astype(int)
+    centre = low + _CENTRES * scale * steps
+    reach = _REACH * least * _REACHES**growth
+    bottom, top = np.maximum(centre - reach, low), np.minimum(centre + reach, high)
+    rng = np.random.default_rng([seed, 2, *steps.tolist(), *growth.tolist()])
+    return _families(axes, bottom, top, _NEAR_FAMILIES * len(axes), kin, rng)
+
+
+def _families(
+    axes: Sequence[Axis],
+    bottom: NDArray[np.float64],
+    top: NDArray[np.float64],
+    count: int,
+    kin: int,
+    rng: np.random.Generator,
+) -> list[list[Machine]]:
+    """Machines evenly over a box, each family of them off its datasheet in its own way.
 
     They differ from the datasheet as units do, so that what the regression gets
     wrong about them is what it will get wrong about a unit.
     """
-    low = np.array([axis.low for axis in axes])
-    high = np.array([axis.high for axis in axes])
-    least = np.array([0.5 * axis.scale for axis in axes])
-    reach = _REACH * np.maximum(np.sqrt(np.diag(found.covariance)), least)
-    centre = np.clip(found.mean, low, high)
-    bottom, top = np.maximum(centre - reach, low), np.minimum(centre + reach, high)
-
-    def place() -> NDArray[np.float64]:
-        return rng.uniform(bottom, top)
-
     first = int(rng.integers(2**30))
-    machines = []
-    for g in range(groups):
+    families = []
+    for family in range(count):
         deviations = tuple(
             (symbol, float(rng.normal(0.0, TOLERANCES[symbol]))) for symbol in _SIMULATED
         )
-        for i in range(_PER_GROUP):
-            machine = _machine_at(axes, place(), first + 1000 * g + i)
-            machines.append(replace(machine, deviations=deviations))
-    return machines
+        # Evenly along every axis, in an order of its own along each.
+        strata = np.stack([rng.permutation(kin) for _ in axes], axis=1)
+        places = bottom + (top - bottom) * (strata + rng.uniform(size=strata.shape)) / kin
+        families.append(
+            [
+                replace(_machine_at(axes, place, first + 1000 * family + i), deviations=deviations)
+                for i, place in enumerate(places)
+            ]
+        )
+    return families
 
 
 def _machine_at(axes: Sequence[Axis], place: NDArray[np.float64], seed: int) -> Machine:

@@ -16,7 +16,16 @@ from cyclopts import Parameter, Token
 
 from daq.errors import InputError
 
-__all__ = ["Json", "Plots", "Real", "UnitName", "Whole", "parameter_settings", "prepare_directory"]
+__all__ = [
+    "Cluster",
+    "Json",
+    "Plots",
+    "Real",
+    "UnitName",
+    "Whole",
+    "parameter_settings",
+    "prepare_directory",
+]
 
 _WHOLE = re.compile(r"[+-]?[0-9]+\Z")
 
@@ -61,6 +70,12 @@ UnitName = Annotated[str, Parameter(name="--unit", help="adss, edss or the path 
 
 Json = Annotated[bool, Parameter(name="--json", help="Print one JSON document on stdout.")]
 """Whether the result is for a program."""
+
+Cluster = Annotated[
+    str | None,
+    Parameter(name="--cluster", help="Address of a Dask scheduler whose workers simulate."),
+]
+"""Where ensembles are simulated, in place of this machine."""
 
 Plots = Annotated[Path | None, Parameter(name="--plots", help="Directory for figures (PNG).")]
 """Where figures go, made if it is not there."""

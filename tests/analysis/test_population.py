@@ -76,7 +76,7 @@ def test_a_folder_that_cannot_be_written_costs_nothing_but_time(tmp_path, monkey
 
 
 def test_a_step_too_long_is_halved_before_giving_up(monkeypatch):
-    import analysis.ensemble as module
+    import sim.response as module
 
     steps = []
 
@@ -84,10 +84,12 @@ def test_a_step_too_long_is_halved_before_giving_up(monkeypatch):
         steps.append(longest_step_s)
         raise AnalysisError("grew without bound")
 
-    monkeypatch.setattr(module, "simulate_cycles", fussy)
+    monkeypatch.setattr(module, "_sweep", fussy)
     with pytest.raises(AnalysisError):
         runs([Group(Hypothesis(ADSS), RATIOS, np.empty(0))])
-    assert steps == [1e-5, 5e-6, 2.5e-6]
+    # Lots of one group may be stepped side by side.
+    assert steps[0] == 1e-5
+    assert sorted(set(steps)) == [2.5e-6, 5e-6, 1e-5]
 
 
 def test_the_coarse_look_keeps_about_twenty_frequencies_a_level():

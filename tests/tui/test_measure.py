@@ -513,7 +513,7 @@ def test_missing_estimates_are_made_once_and_kept(run, db, monkeypatch):
             number = {"value": 0.3, "std": 0.1}
             return {"contribution_ratio": number, "b1_deg": number, "b2_deg": number}
 
-    def estimate(response, unit, progress=None):
+    def estimate(response, unit, progress=None, **_):
         calls.append((unit.name, len(response)))
         if len(calls) == 2:
             raise AnalysisError("no resonance in it")

@@ -33,7 +33,7 @@ def calls(monkeypatch):
     """What was estimated and diagnosed, by doubles that take no time."""
     made = {"estimate": [], "diagnose": []}
 
-    def estimate(response, unit, *, progress):
+    def estimate(response, unit, *, cache, progress):
         made["estimate"].append((response, unit))
         return Quick()
 

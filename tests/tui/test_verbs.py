@@ -108,7 +108,9 @@ def test_estimate_hands_the_whole_response_on(calls, capsys):
     check_estimate(result)
     assert result["error_index"]["std_hz"] == [None] * 5
     (((response, unit, unknown), options),) = calls
-    assert (len(response), unit.name, unknown, options) == (183, "ADSS", False, {})
+    assert (len(response), unit.name, unknown) == (183, "ADSS", False)
+    assert options["cache"].name == "lashbench"
+    assert options["executor"] is None
 
 
 def test_estimate_is_told_that_the_total_is_unknown(calls, capsys):

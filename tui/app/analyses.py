@@ -31,8 +31,9 @@ _LOG = logging.getLogger("lashbench.analysis")
 
 def _estimate(response: FrequencyResponse, unit: Unit, progress: Progress) -> Mapping[str, Any]:
     from analysis.estimate import estimate_response
+    from tui.places import cache_folder
 
-    return estimate_response(response, unit, progress=progress).to_json()
+    return estimate_response(response, unit, cache=cache_folder(), progress=progress).to_json()
 
 
 def _diagnose(response: FrequencyResponse, unit: Unit, progress: Progress) -> Any:

@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.errors import InputError
-from tui.options import Json, Real, UnitName
+from tui.executors import executor_at
+from tui.options import Cluster, Json, Real, UnitName
 from tui.output import Injected
+from tui.places import cache_folder
 
 if TYPE_CHECKING:
     from daq.frf import FrequencyResponse
@@ -28,6 +30,7 @@ def estimate(
     arf_hz: Real | None = None,
     rf_hz: Real | None = None,
     total_backlash_unknown: bool = False,
+    cluster: Cluster = None,
     json: Json = False,
     console: Injected,
 ) -> None:
@@ -47,6 +50,8 @@ def estimate(
         Estimate the total backlash too, instead of taking the unit's.
     """
     if file is None:
+        if cluster is not None:
+            raise InputError("--cluster is for responses; two frequencies take a moment here")
         if arf_hz is None or rf_hz is None:
             raise InputError(
                 "nothing to estimate from; give a response, or both --arf-hz and --rf-hz"
@@ -67,9 +72,11 @@ def estimate(
         subject, response = _unit(unit), _response(file)
         from analysis.estimate import estimate_response
 
-        result = estimate_response(
-            response, subject, total_backlash_unknown, progress=console.progress
-        )
+        with executor_at(cluster) as executor:
+            result = estimate_response(
+                response, subject, total_backlash_unknown, progress=console.progress,
+                cache=cache_folder(), executor=executor,
+            )  # fmt: skip
         warnings = _doubts(response, subject)
     if json:
         document = result.to_json()

@@ -14,12 +14,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from daq.errors import ConfigurationError, InputError, LashbenchError
+from tui.executors import executor_at
 from tui.history_rows import estimated_groups, measurement_row, trend_lines, trend_rows
-from tui.options import Json
+from tui.options import Cluster, Json
 from tui.output import Console, Injected
-from tui.places import history_path
+from tui.places import cache_folder, history_path
 
 if TYPE_CHECKING:
+    from analysis.executor import Executor
     from daq.store import Store
     from daq.store_records import Measurement
 
@@ -35,6 +37,7 @@ def history(
     db: Path | None = None,
     unit: Annotated[str | None, Parameter(name="--unit")] = None,
     estimate: Literal["none", "some", "all"] = "some",
+    cluster: Cluster = None,
     json: Json = False,
     console: Injected,
 ) -> None:
@@ -61,7 +64,8 @@ def history(
         known = {key: dict(e.document) for key, e in store.latest_estimates().items()}
     lacking = [m for m in measurements if m.state == "complete" and m.id not in known]
     if estimate != "none" and lacking:
-        known |= _estimates(db, lacking, estimate == "all", console)
+        with executor_at(cluster) as executor:
+            known |= _estimates(db, lacking, estimate == "all", executor, console)
     rows = [
         measurement_row(measurement, known.get(measurement.id, {})) for measurement in measurements
     ]
@@ -91,7 +95,11 @@ def _unit_name(unit: str | None, store: Store) -> str | None:
 
 
 def _estimates(
-    db: Path, lacking: Sequence[Measurement], every: bool, console: Console
+    db: Path,
+    lacking: Sequence[Measurement],
+    every: bool,
+    executor: Executor | None,
+    console: Console,
 ) -> dict[int, dict[str, Any]]:
     """Make estimates and keep them where the history may be written."""
     from importlib.metadata import version
@@ -108,7 +116,7 @@ def _estimates(
             )
             break
         console.note(f"estimating measurement {measurement.id}")
-        made[measurement.id] = _estimate(db, measurement, console)
+        made[measurement.id] = _estimate(db, measurement, executor, console)
         try:
             with Store(db) as store:
                 store.add_estimate(
@@ -119,7 +127,9 @@ def _estimates(
     return made
 
 
-def _estimate(db: Path, measurement: Measurement, console: Console) -> dict[str, Any]:
+def _estimate(
+    db: Path, measurement: Measurement, executor: Executor | None, console: Console
+) -> dict[str, Any]:
     import tomllib
 
     from analysis.estimate import estimate_response
@@ -136,7 +146,9 @@ def _estimate(db: Path, measurement: Measurement, console: Console) -> dict[str,
             if text is None
             else unit_from_mapping(tomllib.loads(text), source=name)
         )
-        result = estimate_response(response, unit, progress=console.progress)
+        result = estimate_response(
+            response, unit, progress=console.progress, cache=cache_folder(), executor=executor
+        )
         content: dict[str, Any] = result.to_json()
     except (LashbenchError, ValueError) as error:
         console.note(f"measurement {measurement.id} gives no estimate: {error}")

@@ -115,7 +115,9 @@ def _estimate(
 
     console.note("estimating")
     try:
-        return estimate_response(response, unit, progress=console.progress).to_json()
+        return estimate_response(
+            response, unit, cache=cache_folder(), progress=console.progress
+        ).to_json()
     except LashbenchError as error:
         remarks["estimate"] = f"No estimate could be made: {error}."
         console.note(remarks["estimate"])

@@ -1,0 +1,72 @@
+"""Where the tasks of an ensemble run: here, or wherever else an executor sends them.
+
+Owns the interface that ensembles are written against, and the executor of this
+machine. A task is a value, its work a function of the module level that takes
+one core and gives the same result wherever it runs; nothing here knows what
+either is about.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from typing import Protocol, TypeVar
+
+__all__ = ["Executor", "LocalExecutor"]
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+class Executor(Protocol):
+    """Runs tasks that do not depend on each other."""
+
+    def each(
+        self,
+        work: Callable[[T], R],
+        tasks: Sequence[T],
+        progress: Callable[[float], None] | None = None,
+    ) -> list[R]:
+        """Results in the order of the tasks, whatever the order in which they were done.
+
+        `progress` is told the share done, from the calling thread. An error in
+        a task, or in `progress`, ends the whole; what has not begun is dropped.
+        """
+        ...
+
+
+class LocalExecutor:
+    """The cores of this machine, a thread each: the engine lets go of the interpreter.
+
+    Parameters
+    ----------
+    cores
+        How many to use; all that the process may run on if not given.
+    """
+
+    def __init__(self, cores: int | None = None) -> None:
+        self._cores = cores or _cores()
+
+    def each(
+        self,
+        work: Callable[[T], R],
+        tasks: Sequence[T],
+        progress: Callable[[float], None] | None = None,
+    ) -> list[R]:
+        """See `Executor`."""
+        with ThreadPoolExecutor(self._cores) as pool:
+            futures = [pool.submit(work, task) for task in tasks]
+            try:
+                for done, future in enumerate(as_completed(futures)):
+                    future.result()
+                    if progress is not None:
+                        progress((done + 1) / len(futures))
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
+        return [future.result() for future in futures]
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
