@@ -17,7 +17,6 @@ from daq.errors import AnalysisError
 __all__ = [
     "HalfPower",
     "frequency_reduction",
-    "half_power_damping",
     "measure_half_power",
     "resonance_damping",
 ]
@@ -26,34 +25,6 @@ HALF_POWER_DB = 10.0 * math.log10(2.0)
 """Half-power points lie this far below a maximum, or above a minimum, dB."""
 GREATEST_ZETA = math.sqrt(0.5)
 """A second-order response with more damping has no resonance, so (24) has no meaning."""
-
-
-def half_power_damping(f_1_hz: float, f_2_hz: float, f_AR_hz: float) -> float:
-    """Damping ratio from the half-power points about a feature, equation (22).
-
-    Parameters
-    ----------
-    f_1_hz, f_2_hz
-        Half-power points below and above, Hz.
-    f_AR_hz
-        Frequency of the feature, Hz.
-
-    Returns
-    -------
-    zeta = (f_2 - f_1) / (2 f_AR).
-
-    Raises
-    ------
-    AnalysisError
-        If the three are not finite, positive and in the order f_1 <= f_AR <= f_2.
-    """
-    finite = all(math.isfinite(f) for f in (f_1_hz, f_2_hz, f_AR_hz))
-    if not finite or not 0.0 < f_1_hz <= f_AR_hz <= f_2_hz:
-        raise AnalysisError(
-            f"half-power points {f_1_hz} and {f_2_hz} Hz do not enclose {f_AR_hz} Hz; "
-            "give them in ascending order"
-        )
-    return (f_2_hz - f_1_hz) / (2.0 * f_AR_hz)
 
 
 def resonance_damping(zeta_AR: float, f_AR_hz: float, f_R_hz: float) -> float:

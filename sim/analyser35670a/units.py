@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from sim.analyser35670a.errors import ScpiError
 
 __all__ = [
-    "ANGLE",
     "CYCLES_OR_SECONDS",
     "DECIBEL",
     "FREQUENCY",
@@ -130,7 +129,6 @@ VOLT = _table("V", V=("K", *_SMALL))
 SLEW = _table(None, V_S=("M",), VPK_S=("M",), VRMS_S=("M",))
 PERCENT = _table("PCT", PCT=())
 DECIBEL = _table("DB", DB=())
-ANGLE = _table("DEG", DEG=(), RAD=())
 RPM = _table("RPM", RPM=())
 
 

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from analysis.damping import (
+    HalfPower,
     frequency_reduction,
-    half_power_damping,
     measure_half_power,
     resonance_damping,
 )
@@ -56,16 +56,9 @@ def test_resonance_damping_refuses_what_is_none(arguments):
         resonance_damping(*arguments)
 
 
-def test_half_power_damping_is_equation_22():
-    assert half_power_damping(118.4, 137.6, 128.0) == pytest.approx(0.075)
-
-
-@pytest.mark.parametrize(
-    "points", [(41.0, 42.0, 40.0), (38.0, 39.0, 40.0), (0.0, 41.0, 40.0), (38.0, np.inf, 40.0)]
-)
-def test_half_power_damping_refuses_points_that_do_not_enclose(points):
-    with pytest.raises(AnalysisError, match="do not enclose"):
-        half_power_damping(*points)
+def test_damping_from_half_power_points_is_equation_22():
+    assert HalfPower(128.0, 118.4, 137.6, 0.0, 0.0).damping_ratio == pytest.approx(0.075)
+    assert np.isnan(HalfPower(128.0, np.nan, 137.6, np.nan, 0.0).damping_ratio)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
