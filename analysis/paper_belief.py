@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.error_index import error_index
-from analysis.paper_evidence import Agreement, RatioPrior
+from analysis.paper_evidence import Agreement, RatioPrior, agree
 from analysis.paper_exploration import Explored
-from analysis.paper_pairs import possible_pairs
-from analysis.paper_search import hold_against
+from analysis.paper_pairs import VISCOUS, possible_pairs
 from analysis.paper_sweeps import Reading
 
 __all__ = ["Belief", "Index", "Judged", "Knowledge", "believe", "index_of"]
@@ -38,6 +37,9 @@ _WORTH_NAMING = 0.02
 
 _EVIDENCE_STD = 1.0
 """Error of a log-evidence from the runs that it rests on; searches of other seeds differ by it."""
+
+_NOT_TOLD_APART = 3.0
+"""Sets whose log-evidence differs by less than this (1 in 20) are not told apart."""
 
 _EVIDENCE_DRAWS = 1000
 _RUNS = 20_000
@@ -135,6 +137,26 @@ class Belief:
         centre = float(weight @ mean)
         return centre, float(np.sqrt(weight @ (std**2 + (mean - centre) ** 2)))
 
+    @property
+    def damping_alone(self) -> Judged | None:
+        """The paper's explanation: viscous dampers and nothing else."""
+        return self.best_of(VISCOUS)
+
+    @property
+    def damping_is_enough(self) -> bool:
+        """Whether viscous dampers alone explain as much as the best set, and look like it."""
+        alone = self.damping_alone
+        return alone is not None and alone.adequate and self.behind(alone) < _NOT_TOLD_APART
+
+    def behind(self, one: Judged) -> float:
+        """By how much the log-evidence of a set lies below the greatest of those that look like it.
+
+        Of all sets, where none does.
+        """
+        others = [other for other in self.judged if other.adequate] or self.judged
+        most = max(other.agreement.log_evidence for other in others)
+        return most - one.agreement.log_evidence
+
     def best_of(self, effects: Collection[str]) -> Judged | None:
         """The set with the greatest evidence among those made of these effects alone."""
         made = [one for one in self.judged if one.effects and set(one.effects) <= set(effects)]
@@ -153,7 +175,7 @@ class Belief:
 def believe(explored: Sequence[Explored], reading: Reading, knowledge: Knowledge) -> Belief:
     """Probabilities of all sets that knowledge allows; those not simulated count as nothing."""
     allowed = [one for one in explored if not set(one.effects) & set(knowledge.excluded)]
-    agreements = [hold_against(one, reading, knowledge.prior) for one in allowed]
+    agreements = [agree(one, reading, knowledge.prior) for one in allowed]
     causes = {one.effects[0] for one in allowed if len(one.effects) == 1}
     counts = (1, max(len(causes), 1), max(len(possible_pairs(causes)), 1))
     score = np.array(

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,14 +19,15 @@ import numpy as np
 from analysis.causes import Hypothesis
 from analysis.next_measurement import NextMeasurement
 from analysis.paper_belief import Belief, Knowledge, believe
-from analysis.paper_evidence import RatioPrior
+from analysis.paper_evidence import Agreement, RatioPrior, agree
 from analysis.paper_exploration import Effort, Explored, Explorer
 from analysis.paper_numbers import UnitName, load_paper
 from analysis.paper_proposal import propose_sweep
 from analysis.paper_search import search_sets
-from analysis.paper_sweeps import Reading, Sweeps
+from analysis.paper_sweeps import Reading, plan_about
 from daq.errors import InputError
-from sim.unit import Unit, load_unit
+from daq.plan import SweepPlan
+from sim.unit import Unit
 
 __all__ = ["PaperDiagnosis", "diagnose_features", "diagnose_paper", "paper_reading"]
 
@@ -45,8 +46,7 @@ _MICROSCOPE_STD = 0.02
 _MEASURED_TOO = ("total-backlash",)
 """What the microscope rules out beside other ratios: it saw both plays, so their sum as well."""
 
-_PROCEDURES: dict[str, dict[str, Any]] = {
-    "from-rest": {},
+_OTHER_PROCEDURES: dict[str, dict[str, Any]] = {
     "swept-up": {"from_rest": False},
     "swept-down": {"from_rest": False, "direction": "down"},
 }
@@ -83,7 +83,7 @@ class PaperDiagnosis:
     reading: Reading
     free: Belief
     known: Belief | None
-    procedures: dict[str, Belief]
+    procedures: dict[str, Agreement]
     next_measurement: NextMeasurement | None
     elapsed_s: float
 
@@ -129,7 +129,7 @@ class PaperDiagnosis:
 
 
 def diagnose_paper(
-    unit: str,
+    unit: Unit,
     *,
     progress: Progress | None = None,
     seed: int = 0,
@@ -141,7 +141,7 @@ def diagnose_paper(
     Parameters
     ----------
     unit
-        ``"ADSS"`` or ``"EDSS"``, in any case.
+        The one of the two that was measured, by its name: ADSS or EDSS.
     progress
         Told the share done and what is being done, from the calling thread.
     seed
@@ -157,13 +157,13 @@ def diagnose_paper(
         If the paper has no such unit.
     """
     names: dict[str, UnitName] = {"ADSS": "ADSS", "EDSS": "EDSS"}
-    name = names.get(unit.upper())
+    name = names.get(unit.name)
     if name is None:
-        raise InputError(f"the paper measured no unit {unit!r}; give adss or edss")
+        raise InputError(f"the paper measured no unit {unit.name!r}; give adss or edss")
     row = load_paper().measured_row(name)
     return diagnose_features(
         paper_reading(name),
-        load_unit(name),
+        unit,
         known_ratio=row.ratio_percent / 100.0,
         without=without,
         progress=progress,
@@ -209,7 +209,7 @@ def diagnose_features(
     states = [Knowledge(RatioPrior())]
     if known_ratio is not None:
         states.append(Knowledge(RatioPrior(known_ratio, _MICROSCOPE_STD), _MEASURED_TOO))
-    explorer = Explorer(unit, _sweeps(reading, effort), effort, known_ratio, rng)
+    explorer = Explorer(unit, _plan(reading, effort), effort, known_ratio, rng)
     tell = _told(progress)
     explored = search_sets(
         explorer,
@@ -239,8 +239,8 @@ def _told(progress: Progress | None) -> Progress:
     return (lambda share, text: None) if progress is None else progress
 
 
-def _sweeps(reading: Reading, effort: Effort, **procedure: Any) -> Sweeps:
-    return Sweeps.about(
+def _plan(reading: Reading, effort: Effort, **procedure: Any) -> SweepPlan:
+    return plan_about(
         reading,
         points=effort.points,
         settle_cycles=effort.settle_cycles,
@@ -251,22 +251,13 @@ def _sweeps(reading: Reading, effort: Effort, **procedure: Any) -> Sweeps:
 
 def _other_procedures(
     explorer: Explorer, plain: Explored, reading: Reading, state: Knowledge
-) -> dict[str, Belief]:
+) -> dict[str, Agreement]:
     """The plain model alone, as the bench may have swept it."""
-    found = {}
-    for name, procedure in _PROCEDURES.items():
-        explored = plain
-        if procedure:
-            other = Explorer(
-                explorer.unit,
-                _sweeps(reading, explorer.effort, **procedure),
-                explorer.effort,
-                explorer.known_ratio,
-                explorer.rng,
-            )
-            explored = other.explore(Hypothesis(explorer.unit), explorer.effort.baseline)
-        found[name] = believe([explored], reading, state)
-    return found
+    found = {"from-rest": plain}
+    for name, procedure in _OTHER_PROCEDURES.items():
+        other = replace(explorer, plan=_plan(reading, explorer.effort, **procedure))
+        found[name] = other.explore(Hypothesis(explorer.unit), explorer.effort.baseline)
+    return {name: agree(one, reading, state.prior) for name, one in found.items()}
 
 
 def _proposal(explorer: Explorer, belief: Belief, reading: Reading) -> NextMeasurement | None:

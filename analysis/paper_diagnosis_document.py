@@ -14,22 +14,19 @@ from numpy.typing import NDArray
 from analysis.paper_belief import Belief, Judged, index_of
 from analysis.paper_evidence import Agreement
 from analysis.paper_pairs import DISSIPATION, LOADS, VISCOUS
-from analysis.paper_sweeps import PAPER_LEVEL_VPK
 from sim.catalogue import CATALOGUE
+from sim.paper_scheme import PAPER_LEVEL_VPK
 
 if TYPE_CHECKING:
     from analysis.paper_diagnosis import PaperDiagnosis
 
-__all__ = ["damping_is_enough", "document", "held_out", "parameters", "residual"]
+__all__ = ["document", "parameters", "residual"]
 
 _QUANTITIES = ("arf-frequency", "arf-gain", "rf-frequency", "rf-gain", "arf-half-power-width")
 _UNITS = ("Hz", "dB", "Hz", "dB", "Hz")
 _GAINS = [1, 3]
 
 _CHAIN = tuple(effect.id for effect in CATALOGUE.values() if effect.site == "chain")
-
-_NOT_TOLD_APART = 3.0
-"""Sets whose log-evidence differs by less than this (1 in 20) are not told apart."""
 
 
 def document(diagnosis: PaperDiagnosis) -> dict[str, Any]:
@@ -43,11 +40,11 @@ def document(diagnosis: PaperDiagnosis) -> dict[str, Any]:
         "ratio_as_measured": None if diagnosis.known is None else _section(diagnosis.known),
         "procedures": {
             name: {
-                "error_index": _index(belief.baseline.agreement),
-                "probability_of_worse": belief.baseline.probability_of_worse,
-                "log_evidence": belief.baseline.agreement.log_evidence,
+                "error_index": _index(agreement),
+                "probability_of_worse": agreement.probability_of_worse(),
+                "log_evidence": agreement.log_evidence,
             }
-            for name, belief in diagnosis.procedures.items()
+            for name, agreement in diagnosis.procedures.items()
         },
         "next_measurement": None if proposal is None else proposal.to_json(),
         "warnings": list(diagnosis.warnings),
@@ -58,7 +55,7 @@ def document(diagnosis: PaperDiagnosis) -> dict[str, Any]:
 def _section(belief: Belief) -> dict[str, Any]:
     """What is believed under one state of knowledge."""
     plain, best = belief.baseline.agreement, belief.best.agreement
-    (base_sigma, base_db), (best_sigma, best_db) = held_out(plain, best), held_out(best, best)
+    (base_sigma, base_db), (best_sigma, best_db) = _held_out(plain, best), _held_out(best, best)
     return {
         "verdict": belief.word,
         "causes": _causes(belief),
@@ -110,7 +107,7 @@ def parameters(agreement: Agreement) -> dict[str, dict[str, dict[str, Any]]]:
     return found
 
 
-def held_out(agreement: Agreement, yardstick: Agreement) -> tuple[float, float]:
+def _held_out(agreement: Agreement, yardstick: Agreement) -> tuple[float, float]:
     """Rms of each number's prediction from the others, in a yardstick's sigma and in dB.
 
     One drive level leaves nothing else to hold out. The plain model is measured in the extended
@@ -141,19 +138,6 @@ def residual(agreement: Agreement) -> list[dict[str, Any]]:
         for k, name in enumerate(_QUANTITIES)
         if np.isfinite(values[k])
     ]
-
-
-def damping_is_enough(belief: Belief) -> bool:
-    """Whether viscous dampers alone explain as much as the best set, and look like it."""
-    alone = belief.best_of(VISCOUS)
-    if alone is None or not alone.adequate:
-        return False
-    return _behind(alone, belief) < _NOT_TOLD_APART
-
-
-def _behind(one: Judged, belief: Belief) -> float:
-    most = max(other.agreement.log_evidence for other in belief.judged if other.adequate)
-    return most - one.agreement.log_evidence
 
 
 def _causes(belief: Belief) -> list[dict[str, Any]]:
@@ -215,18 +199,18 @@ def _index(agreement: Agreement) -> dict[str, Any]:
 
 
 def _damping_alone(belief: Belief) -> dict[str, Any] | None:
-    alone = belief.best_of(VISCOUS)
+    alone = belief.damping_alone
     if alone is None:
         return None
     only = [one for one in belief.judged if one.effects and set(one.effects) <= set(VISCOUS)]
     return {
-        "enough": damping_is_enough(belief),
+        "enough": belief.damping_is_enough,
         "causes": list(alone.effects),
         "parameters": parameters(alone.agreement),
         "contribution_ratio": _ratio(alone.agreement),
         "probability": float(sum(one.probability for one in only)),
         "probability_of_worse": alone.probability_of_worse,
-        "log_evidence_behind_best": _behind(alone, belief),
+        "log_evidence_behind_best": belief.behind(alone),
         "error_index": _index(alone.agreement),
         "residual": residual(alone.agreement),
     }

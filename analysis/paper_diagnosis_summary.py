@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.paper_belief import Belief, Judged, index_of
-from analysis.paper_diagnosis_document import damping_is_enough, parameters, residual
-from analysis.paper_pairs import DISSIPATION, LOADS, VISCOUS
+from analysis.paper_diagnosis_document import parameters, residual
+from analysis.paper_pairs import DISSIPATION, LOADS
 from sim.catalogue import CATALOGUE
 
 if TYPE_CHECKING:
@@ -37,8 +37,8 @@ def summarise(diagnosis: PaperDiagnosis) -> list[str]:
         lines += ["", f"{_TITLES[name]}: {belief.word}. {_sentence(belief)}"]
         lines += _wrong(belief) + _index(belief) + _damping(belief) + _sets(belief)
     lines += ["", "the plain model, swept otherwise (error index of a single run, Hz)"]
-    for name, belief in diagnosis.procedures.items():
-        index = index_of(belief.baseline.agreement)
+    for name, agreement in diagnosis.procedures.items():
+        index = index_of(agreement)
         lines.append(f"  {name:<12}{index.expected:6.1f} +- {index.expected_std:.1f}")
     if diagnosis.next_measurement is not None:
         proposal = diagnosis.next_measurement
@@ -93,12 +93,12 @@ def _index(belief: Belief) -> list[str]:
 
 
 def _damping(belief: Belief) -> list[str]:
-    alone = belief.best_of(VISCOUS)
+    alone = belief.damping_alone
     if alone is None:
         return []
     mean, std = alone.agreement.moments()
     index = index_of(alone.agreement)
-    word = "cannot be ruled out" if damping_is_enough(belief) else "is not enough"
+    word = "cannot be ruled out" if belief.damping_is_enough else "is not enough"
     return [
         f"  missing damping alone {word}: {_name(alone)} at ratio {mean[0]:.2f} +- {std[0]:.2f}, "
         f"error index {index.expected:.1f} +- {index.expected_std:.1f} Hz, "

@@ -17,7 +17,8 @@ from scipy.stats import f as fisher
 from scipy.stats import qmc, truncnorm
 
 from analysis.causes import Hypothesis
-from analysis.paper_surface import FREEDOM, Surface
+from analysis.paper_exploration import Explored
+from analysis.paper_surface import FREEDOM
 from analysis.paper_sweeps import Reading
 
 __all__ = ["Agreement", "RatioPrior", "agree", "reading_error", "weighted_box"]
@@ -205,18 +206,12 @@ class Agreement:
         return weighted_box(self.places, weight, margin)
 
 
-def agree(
-    hypothesis: Hypothesis,
-    surface: Surface,
-    box: NDArray[np.float64],
-    reading: Reading,
-    prior: RatioPrior,
-) -> Agreement:
+def agree(explored: Explored, reading: Reading, prior: RatioPrior) -> Agreement:
     """Hold a set of causes against a reading all over the part of its prior that was explored.
 
-    Sizes are equally likely beforehand in every octave of their plausible range; `box` (d, 2)
-    holds its part of it.
+    Sizes are equally likely beforehand in every octave of their plausible range.
     """
+    surface, box = explored.surface, explored.box
     dimension = len(box)
     count = _PLACES.get(dimension, _MOST_PLACES)
     places = qmc.Sobol(dimension, rng=np.random.default_rng(0)).random(count)
@@ -227,7 +222,9 @@ def agree(
     covariance = scatter[:, :, None] * surface.correlation * scatter[:, None, :]
     covariance = covariance + np.diag(reading_error(reading) ** 2)
     log_volume = float(np.sum(np.log(high - low)))
-    return Agreement(hypothesis, places, log_volume, mean, covariance, np.log(shown), reading)
+    return Agreement(
+        explored.hypothesis, places, log_volume, mean, covariance, np.log(shown), reading
+    )
 
 
 def weighted_box(

@@ -14,7 +14,8 @@ from scipy.stats import qmc
 
 from analysis.causes import Hypothesis
 from analysis.paper_surface import Surface
-from analysis.paper_sweeps import Sweeps, feature_sweeps
+from analysis.paper_sweeps import feature_sweeps
+from daq.plan import SweepPlan
 from sim.unit import Unit
 
 __all__ = ["Effort", "Explored", "Explorer"]
@@ -95,7 +96,7 @@ class Explorer:
     """Simulates sets of causes on one unit by one procedure."""
 
     unit: Unit
-    sweeps: Sweeps
+    plan: SweepPlan
     effort: Effort
     known_ratio: float | None
     rng: np.random.Generator
@@ -118,7 +119,7 @@ class Explorer:
         """Features (n, 5) of one run at each of the places (n, d)."""
         seeds = self.rng.integers(1 << 31, size=len(places))
         machines = [hypothesis.machine(p, int(s)) for p, s in zip(places, seeds, strict=True)]
-        return feature_sweeps(self.unit, machines, self.sweeps)
+        return feature_sweeps(self.unit, machines, self.plan)
 
     def _places(
         self, hypothesis: Hypothesis, groups: int, box: NDArray[np.float64]

@@ -11,23 +11,18 @@ from collections.abc import Callable, Collection, Sequence
 import numpy as np
 
 from analysis.causes import Hypothesis, every_single_cause
-from analysis.paper_evidence import Agreement, RatioPrior, agree
+from analysis.paper_evidence import RatioPrior, agree
 from analysis.paper_exploration import Explored, Explorer
 from analysis.paper_pairs import VISCOUS, GuessedPair, guess_pairs, possible_pairs
 from analysis.paper_sweeps import Reading
 
-__all__ = ["hold_against", "search_sets"]
+__all__ = ["search_sets"]
 
 Progress = Callable[[float, str], None]
 
 _HEAT, _MARGIN = 2.0, 0.05
 _SINGLES_SHARE = 0.6
 """Share of the work that goes into single causes."""
-
-
-def hold_against(explored: Explored, reading: Reading, prior: RatioPrior) -> Agreement:
-    """How a simulated set agrees with a reading."""
-    return agree(explored.hypothesis, explored.surface, explored.box, reading, prior)
 
 
 def search_sets(
@@ -74,7 +69,7 @@ def _refine(
     progress: Progress,
 ) -> list[Explored]:
     """The causes that agree best under any of the priors, with further runs where they do."""
-    held = [[hold_against(one, reading, prior) for one in found[1:]] for prior in priors]
+    held = [[agree(one, reading, prior) for one in found[1:]] for prior in priors]
     wanted: list[int] = []
     for agreements in held:
         order = np.argsort([-one.log_evidence for one in agreements])

@@ -16,19 +16,17 @@ from numpy.typing import NDArray
 from analysis.damping import measure_half_power
 from analysis.ensemble import Machine
 from daq.plan import Direction, SweepPlan
+from sim.paper_scheme import PAPER_LEVEL_VPK
 from sim.response import simulate_cycles
 from sim.unit import Unit
 
-__all__ = ["FEATURES", "Reading", "Sweeps", "feature_sweeps", "read_feature_sweep"]
+__all__ = ["FEATURES", "Reading", "feature_sweeps", "plan_about", "read_feature_sweep"]
 
 FEATURES = ("arf_hz", "arf_db", "rf_hz", "rf_db", "width_hz")
 """The numbers of one sweep, in the order of every array here: Hz, dB, Hz, dB, Hz.
 
 ``width_hz`` is the distance of the half-power points about ARF.
 """
-
-PAPER_LEVEL_VPK = 2.5
-"""Source level of the paper's sweeps."""
 
 LONGEST_STEP_S = 1e-5
 """Features read off runs at this step scatter as those at half of it do."""
@@ -54,38 +52,28 @@ class Reading:
     std: NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class Sweeps:
-    """The procedure by which every machine is taken through the band."""
-
-    plan: SweepPlan
-
-    @classmethod
-    def about(
-        cls,
-        reading: Reading,
-        *,
-        points: int = 40,
-        settle_cycles: int = 40,
-        integrate_cycles: int = 20,
-        from_rest: bool = True,
-        direction: Direction = "up",
-    ) -> Sweeps:
-        """Sweeps over the band about measured features; by default every point from rest."""
-        arf, rf = float(reading.values[0]), float(reading.values[2])
-        return cls(
-            SweepPlan(
-                tuple(np.geomspace(_BELOW * arf, _ABOVE * rf, points).tolist()),
-                (PAPER_LEVEL_VPK,),
-                direction=direction,
-                settle_cycles=settle_cycles,
-                integrate_cycles=integrate_cycles,
-                from_rest=from_rest,
-            )
-        )
+def plan_about(
+    reading: Reading,
+    *,
+    points: int,
+    settle_cycles: int,
+    integrate_cycles: int,
+    from_rest: bool = True,
+    direction: Direction = "up",
+) -> SweepPlan:
+    """A sweep over the band about measured features; by default every point from rest."""
+    arf, rf = float(reading.values[0]), float(reading.values[2])
+    return SweepPlan(
+        tuple(np.geomspace(_BELOW * arf, _ABOVE * rf, points).tolist()),
+        (PAPER_LEVEL_VPK,),
+        direction=direction,
+        settle_cycles=settle_cycles,
+        integrate_cycles=integrate_cycles,
+        from_rest=from_rest,
+    )
 
 
-def feature_sweeps(unit: Unit, machines: Sequence[Machine], sweeps: Sweeps) -> NDArray[np.float64]:
+def feature_sweeps(unit: Unit, machines: Sequence[Machine], plan: SweepPlan) -> NDArray[np.float64]:
     """Features of one run of each machine, shape (machines, 5); NaN where there is none.
 
     Raises
@@ -94,8 +82,8 @@ def feature_sweeps(unit: Unit, machines: Sequence[Machine], sweeps: Sweeps) -> N
         If a motion grew without bound.
     """
     servos = [machine.servo(unit) for machine in machines]
-    runs = simulate_cycles(servos, sweeps.plan, longest_step_s=LONGEST_STEP_S)
-    frequency_hz = np.asarray(sweeps.plan.frequencies_hz)
+    runs = simulate_cycles(servos, plan, longest_step_s=LONGEST_STEP_S)
+    frequency_hz = np.asarray(plan.frequencies_hz)
     gains = np.array([run[0, :, :, 1].mean(axis=-1) for run in runs])
     with np.errstate(divide="ignore"):
         gain_db = 20.0 * np.log10(np.abs(gains))

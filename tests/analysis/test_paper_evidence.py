@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import multivariate_t
@@ -98,7 +100,7 @@ def test_a_surface_finds_slope_scatter_and_correlation() -> None:
 def test_a_feature_that_no_run_shows_speaks_against_a_set() -> None:
     shown, hidden = made(("load-inertia",)), made(("load-inertia",))
     hidden.surface.features[:, 2:4] = np.nan
-    a, b = (agree(x.hypothesis, x.surface, x.box, READING, RatioPrior()) for x in (shown, hidden))
+    a, b = (agree(x, READING, RatioPrior()) for x in (shown, hidden))
     assert np.isfinite(b.log_evidence)
     assert b.log_evidence < a.log_evidence - 5.0
 
@@ -116,7 +118,7 @@ def test_size_and_error_of_a_known_cause() -> None:
     """ARF falls by 20 Hz over the range, 10 Hz are seen: the size is a half."""
     one = made(("load-inertia",))
     reading = Reading(np.array([50.0, -30.0, 80.0, -5.0, 8.0]), np.full(5, 0.5))
-    agreement = agree(one.hypothesis, one.surface, one.box, reading, RatioPrior())
+    agreement = agree(one, reading, RatioPrior())
     mean, std = agreement.moments()
     assert mean[1] == pytest.approx(0.5, abs=0.06)
     # Scatter of 0.8, reading and tolerance of 0.5 Hz over a slope of 20 Hz.
@@ -128,9 +130,7 @@ def test_size_and_error_of_a_known_cause() -> None:
 def test_a_parameter_without_effect_costs_nothing_and_a_box_costs_its_share() -> None:
     one = made(("load-inertia",))
     small = np.array([[0.0, 1.0], [0.25, 0.75]])
-    whole, part = (
-        agree(one.hypothesis, one.surface, box, READING, RatioPrior()) for box in (one.box, small)
-    )
+    whole, part = (agree(replace(one, box=box), READING, RatioPrior()) for box in (one.box, small))
     # All that agrees lies in the smaller box: the integral is the same, however it is taken.
     assert part.log_evidence == pytest.approx(whole.log_evidence, abs=0.25)
     assert part.log_volume == pytest.approx(np.log(0.5))
@@ -142,7 +142,7 @@ def test_a_number_that_was_not_measured_says_nothing() -> None:
     values[4] = np.nan
     blind = Reading(values, READING.std)
     wide = Reading(np.where(np.isnan(values), 500.0, values), READING.std)
-    a, b = (agree(one.hypothesis, one.surface, one.box, r, RatioPrior()) for r in (blind, wide))
+    a, b = (agree(one, r, RatioPrior()) for r in (blind, wide))
     assert b.log_evidence < a.log_evidence - 3.0
     assert np.isnan(a.held_out()[0][4])
     assert np.isfinite(a.held_out()[0][:4]).all()
@@ -153,7 +153,7 @@ def test_a_number_that_was_not_measured_says_nothing() -> None:
 def test_held_out_uses_only_the_other_numbers() -> None:
     """ARF alone tells the size, so without it ARF is known no better than its range."""
     one = made(("load-inertia",))
-    agreement = agree(one.hypothesis, one.surface, one.box, READING, RatioPrior())
+    agreement = agree(one, READING, RatioPrior())
     mean, std = agreement.held_out()
     assert std[0] > 4.0
     assert std[2] < 1.5
@@ -164,7 +164,7 @@ def test_held_out_uses_only_the_other_numbers() -> None:
 def test_a_known_ratio_is_kept(seed: int) -> None:
     one = made(("load-inertia",), seed=seed)
     prior = RatioPrior(0.04, 0.02)
-    mean, std = agree(one.hypothesis, one.surface, one.box, READING, prior).moments()
+    mean, std = agree(one, READING, prior).moments()
     assert mean[0] == pytest.approx(0.04, abs=0.015)
     assert std[0] < 0.03
     drawn = prior.draw(np.linspace(0.001, 0.999, 99))
@@ -174,7 +174,7 @@ def test_a_known_ratio_is_kept(seed: int) -> None:
 def test_adequacy_is_calibrated() -> None:
     """Readings drawn from the likeliest place agree worse than one another evenly often."""
     one = made(("load-inertia",))
-    agreement = agree(one.hypothesis, one.surface, one.box, READING, RatioPrior())
+    agreement = agree(one, READING, RatioPrior())
     rng = np.random.default_rng(11)
     drawn = agreement.draw_runs(400, rng, at_best=True)
     mean, _ = agreement.at_best
@@ -223,5 +223,9 @@ def test_every_further_cause_must_pay() -> None:
 
 def test_what_nothing_gives_is_unexplained() -> None:
     strange = Reading(np.array([60.0, -30.0, 80.0, -25.0, 8.0]), np.full(5, 0.5))
-    belief = believe([made(()), made(("load-inertia",))], strange, Knowledge(RatioPrior()))
+    sets = [made(()), made(("load-inertia",)), made(("load-viscous-damping",))]
+    belief = believe(sets, strange, Knowledge(RatioPrior()))
     assert belief.word == "unexplained"
+    assert belief.damping_alone is not None
+    assert not belief.damping_is_enough
+    assert np.isfinite(belief.behind(belief.damping_alone))

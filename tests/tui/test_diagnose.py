@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from daq.configs import config_path
 from tui.cli import main
 
 PRACTICE = Path(__file__).parents[1] / "data" / "practice"
@@ -19,7 +20,6 @@ SWEEP = str(PRACTICE / "practice-09.csv")
         ([SWEEP, "--unit", "nosuch"], "nosuch"),
         ([str(PRACTICE), "--unit", "adss"], "practice"),
         (["missing.csv", "--unit", "adss"], "missing.csv"),
-        (["--unit", "adss", "--paper", "--plots", "out"], "--plots goes with a response"),
     ],
 )
 def test_what_cannot_be_diagnosed_is_refused_in_one_line(
@@ -31,6 +31,13 @@ def test_what_cannot_be_diagnosed_is_refused_in_one_line(
     assert caught.out == ""
     (line,) = caught.err.strip().splitlines()
     assert said in line
+
+
+def test_the_papers_rows_are_not_put_to_a_unit_of_ones_own(capsys, tmp_path):
+    own = tmp_path / "own.toml"
+    own.write_text(config_path("units", "adss").read_text().replace('"ADSS"', '"OWN"'))
+    assert main(["diagnose", "--unit", str(own), "--paper"]) == 2
+    assert "the paper measured no unit 'OWN'" in capsys.readouterr().err
 
 
 class Told:
@@ -78,6 +85,27 @@ def test_figures_go_where_they_are_asked_for(calls, capsys, monkeypatch, tmp_pat
     assert main(["diagnose", SWEEP, "--unit", "adss", "--plots", str(tmp_path / "out")]) == 0
     assert (tmp_path / "out").is_dir()
     assert "a.png" in capsys.readouterr().err
+
+
+def test_the_papers_row_is_answered_with_json_and_a_picture(capsys, monkeypatch, tmp_path):
+    import analysis.paper_diagnosis
+
+    class Drawn(Told):
+        def plot(self, folder):
+            return [folder / "adss.png"]
+
+    asked = []
+    monkeypatch.setattr(
+        analysis.paper_diagnosis, "diagnose_paper",
+        lambda unit, *, progress: asked.append(unit.name) or Drawn(),
+    )  # fmt: skip
+    words = ["diagnose", "--unit", "adss", "--paper", "--json", "--plots", str(tmp_path / "out")]
+    assert main(words) == 0
+    told = capsys.readouterr()
+    assert json.loads(told.out) == {"verdict": "consistent"}
+    assert "adss.png" in told.err
+    assert asked == ["ADSS"]
+    assert (tmp_path / "out").is_dir()
 
 
 def test_an_effect_hidden_behind_the_simulated_analyser_is_found(tmp_path, monkeypatch, capsys):

@@ -71,11 +71,12 @@ def diagnose(
 
 
 def _diagnose_paper(unit: Unit, plots: Path | None, json: bool, console: Console) -> None:
-    if plots is not None:
-        raise InputError("--plots goes with a response; the paper's rows make no curves")
     from analysis.paper_diagnosis import diagnose_paper
 
-    result = diagnose_paper(unit.name, progress=console.progress)
+    result = diagnose_paper(unit, progress=console.progress)
+    if plots is not None:
+        for path in result.plot(plots):
+            console.note(f"wrote {path}")
     if json:
         console.document(result.to_json())
     else:
