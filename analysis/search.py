@@ -34,18 +34,18 @@ _PARENTS, _PAIRS, _PAIR_GROUPS = 8, 5, 4
 _THIRD, _THIRD_GROUPS = 4, 4
 """How many hypotheses are looked at in each round, and in how many groups of runs each."""
 
-_LAST_ROUNDS, _LAST_GROUPS, _RIVALS = 2, 4, 1
-"""Further groups of the leading candidate and of its closest rivals, and how many these are."""
-
-_PHOTO_FINISHES, _CLOSE = 2, 30.0
-"""Further rounds where others are as close behind the leader as this log-likelihood."""
+_CLOSE = 30.0
+_LAST_ROUNDS, _LAST_GROUPS = ((4, 120.0), (3, 60.0), (3, _CLOSE), (3, _CLOSE)), 4
+"""Rounds in which the leader and those as close behind it as that log-likelihood are looked at
+once more: at most so many, in so many groups each. Where none is close the last two are spared.
+"""
 
 _CHANCES = 4
 """Hypotheses that are looked at once more where none fits yet."""
 
-_FAR, _TOO_FAR, _HOPELESS = 60.0, 200.0, 300.0
-"""Log-likelihood behind the leader from which the last and the third round leave one out, and
-from which there is no second chance."""
+_TOO_FAR, _HOPELESS = 200.0, 300.0
+"""Log-likelihood behind the leader from which the third round leaves one out, and from which
+there is no second chance."""
 
 _DOUBT = 2.0
 """Misfit of the best single cause, in standard deviations, from which pairs are tried; and the
@@ -104,18 +104,12 @@ def search_causes(
         # Parameters trade off in ways that evenly placed runs miss: a second chance.
         leading = [key for key in fine.leading(len(third), _HOPELESS) if key]
         fine.settle(leading[:_CHANCES], _LAST_GROUPS)
-    leader, *near = fine.leading(len(third), _FAR)
-    parts = _parts(leader, fine.found)
-    rivals = [key for key in near if key and key not in parts][:_RIVALS]
     # Whoever is compared with the leader is given as many runs: more runs fit better.
-    equals = [leader, *parts, *rivals, *(key for key in near if not key)]
-    for _ in range(_LAST_ROUNDS):
-        fine.settle(equals, _LAST_GROUPS)
-    for _ in range(_PHOTO_FINISHES):
-        leader, *close = fine.leading(_RIVALS + 2, _CLOSE)
-        if not close:
+    for most, behind in _LAST_ROUNDS:
+        leader, *near = fine.leading(most, behind)
+        if behind == _CLOSE and not near:
             break
-        fine.settle([leader, *close], _LAST_GROUPS)
+        fine.settle(list(dict.fromkeys([leader, *_parts(leader, fine.found), *near])), _LAST_GROUPS)
     return sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
 
 
