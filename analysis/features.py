@@ -7,7 +7,7 @@ out of a response (`analysis.resonance` does) and prints nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -114,10 +114,9 @@ def _pair(value: float | None, std: float | None) -> dict[str, float | None] | N
 
 
 def summary(features: Sequence[LevelFeatures]) -> list[str]:
-    """The levels as lines of an aligned table, each level's flags below it."""
-    head = ("level", "ARF", "", "", "RF", "", "", "RF - ARF")
-    unit = ("V pk", "Hz", "dB", "damping", "Hz", "dB", "damping", "Hz")
-    rows = [head, unit, *(_row(level) for level in features)]
+    """The levels as lines of an aligned table of 80 columns, each level's flags below it."""
+    head = ("V pk", "", "Hz", "dB", "damping", "RF - ARF, Hz")
+    rows = [head, *(row for level in features for row in _rows(level))]
     widths = [max(len(row[k]) for row in rows) for k in range(len(head))]
     lines = [
         "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
@@ -132,18 +131,20 @@ def _level_name(level: LevelFeatures) -> str:
     return f"{level.source_vpk:g}" if math.isfinite(level.source_vpk) else "?"
 
 
-def _row(level: LevelFeatures) -> tuple[str, ...]:
-    cells = [_level_name(level)]
-    for feature in (level.arf, level.rf):
-        if feature is None:
-            cells += ["-", "-", "-"]
-            continue
-        cells += [
-            with_error(feature.frequency_hz, feature.std_hz),
-            with_error(feature.gain_db, feature.gain_std_db),
-            with_error(feature.damping_ratio, feature.damping_std),
-        ]
-    return (*cells, with_error(level.difference_hz, level.difference_std_hz))
+def _rows(level: LevelFeatures) -> Iterator[tuple[str, ...]]:
+    apart = with_error(level.difference_hz, level.difference_std_hz)
+    yield _level_name(level), "ARF", *_cells(level.arf), ""
+    yield "", "RF", *_cells(level.rf), apart
+
+
+def _cells(feature: Feature | None) -> tuple[str, str, str]:
+    if feature is None:
+        return "-", "-", "-"
+    return (
+        with_error(feature.frequency_hz, feature.std_hz),
+        with_error(feature.gain_db, feature.gain_std_db),
+        with_error(feature.damping_ratio, feature.damping_std),
+    )
 
 
 def with_error(value: float | None, std: float | None) -> str:

@@ -33,15 +33,13 @@ def test_summary_is_an_aligned_table_with_the_flags_below():
         ]
     )
     assert lines == [
-        "level               ARF                                               RF"
-        "                           RF - ARF",
-        " V pk                Hz               dB            damping           Hz"
-        "            dB  damping          Hz",
-        "  2.5  39.9662 ± 0.0071  -21.500 ± 0.050  0.03010 ± 0.00030  130.6 ± 2.3"
-        "  -3.21 ± 0.40        -  90.6 ± 2.3",
-        "    4                 -                -                  -            -"
-        "             -        -           -",
+        "V pk                     Hz               dB            damping  RF - ARF, Hz",
+        " 2.5  ARF  39.9662 ± 0.0071  -21.500 ± 0.050  0.03010 ± 0.00030",
+        "       RF       130.6 ± 2.3     -3.21 ± 0.40                  -    90.6 ± 2.3",
+        "   4  ARF                 -                -                  -",
+        "       RF                 -                -                  -             -",
         "2.5 V  rf: nonlinear peak",
         "4 V  arf: none",
         "4 V  rf: none",
     ]
+    assert max(map(len, lines)) <= 80
