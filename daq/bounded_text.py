@@ -9,6 +9,7 @@ caller to say of which file and place.
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -17,8 +18,13 @@ __all__ = ["LEVELS_LIMIT", "parse_json", "parse_toml", "read_bytes", "read_text"
 
 LEVELS_LIMIT = 32
 """Tables and lists inside each other that a document may hold; ours hold less than ten."""
-_LINE_LIMIT = 1 << 20
-"""Characters of one TOML document; its parser takes time in the square of some of them."""
+_LENGTH_LIMIT = 1 << 20
+"""Characters of one TOML document."""
+_KEY_PARTS = 500
+"""Dots between two separators: the parser takes time in the square of the parts of a key."""
+# One that is not closed counts to the end of its line: to fail there would take time in the square.
+_QUOTED = re.compile(r'"(?:[^"\\\n]|\\.)*"?|' r"'[^'\n]*'?")
+_SEPARATOR = re.compile(r"[=,{}\[\]\n]")
 
 
 def read_bytes(path: Path, limit_bytes: int) -> bytes:
@@ -45,8 +51,10 @@ def read_text(path: Path, limit_bytes: int, encoding: str = "utf-8") -> str:
 
 def parse_toml(text: str) -> dict[str, Any]:
     """A TOML document; raises ValueError if it is none, or beyond the bounds."""
-    if len(text) > _LINE_LIMIT:
-        raise ValueError(f"it has more than {_LINE_LIMIT} characters")
+    if len(text) > _LENGTH_LIMIT:
+        raise ValueError(f"it has more than {_LENGTH_LIMIT} characters")
+    if max(piece.count(".") for piece in _SEPARATOR.split(_QUOTED.sub("", text))) > _KEY_PARTS:
+        raise ValueError(f"it holds a key of more than {_KEY_PARTS} parts")
     try:
         document = tomllib.loads(text)
     except RecursionError as error:

@@ -32,7 +32,8 @@ def dangers(source: str) -> list[str]:
         elif isinstance(node, ast.Call):
             name = ast.unparse(node.func)
             words = {word.arg: ast.unparse(word.value) for word in node.keywords}
-            if name in CALLS or words.get("shell", "False") != "False":
+            starts = name.startswith("subprocess.") and words.get("shell", "False") != "False"
+            if name in CALLS or starts:
                 found.append(name)
             if name in ("np.load", "numpy.load") and words.get("allow_pickle") != "False":
                 found.append(name)
