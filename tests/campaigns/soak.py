@@ -173,7 +173,7 @@ def draw(samples: list[Sample], path: Path) -> None:
     """Everything over the number of sweeps."""
     from matplotlib.figure import Figure
 
-    sweeps = np.arange(1, len(samples) + 1) * len(LEVELS_VPK)
+    sweeps = np.array([sample.points for sample in samples]) // POINTS
     figure = Figure(figsize=(9.0, 6.0), layout="constrained")
     panels = (
         ("memory, MiB", ("bench_mib", "server_mib")),
