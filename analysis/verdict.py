@@ -48,7 +48,7 @@ everything differ by about as much, as each has runs of its own."""
 _UNLIKE = 4.0
 """A fit worse than own runs' by more standard deviations than this is no explanation."""
 
-_UNPREDICTED = 1.35
+_UNPREDICTED = 1.5
 """Nor is one that misses levels not fitted by so many standard deviations, root mean square."""
 
 _JUDGED = 6
