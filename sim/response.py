@@ -11,7 +11,7 @@ import os
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
@@ -152,22 +152,31 @@ def simulate_cycles(
     AnalysisError
         If a motion grew without bound, at the last of the steps.
     """
-    levels = len(plan.levels_vpk)
-    groups = list(_groups(servos, levels, workers or _cores()))
+    levels, workers = len(plan.levels_vpk), workers or _cores()
+    # Points that start from rest do not depend on each other: sharing those out among the cores
+    # leaves the lanes full.
+    apart = plan.from_rest and not shorter_steps_s
+    groups = list(_groups(servos, levels, 1 if apart else workers))
+    shares = _shares(plan, workers) if apart and len(groups) < workers else [slice(None)]
+    points = np.asarray(plan.frequencies_hz)
 
-    def sweep(group: Sequence[int]) -> NDArray[np.complex128]:
+    def sweep(task: tuple[Sequence[int], slice]) -> NDArray[np.complex128]:
+        group, share = [servos[i] for i in task[0]], task[1]
+        part = replace(plan, frequencies_hz=tuple(points[share].tolist()))
         *steps, last = longest_step_s, *shorter_steps_s
         for step in steps:
             with suppress(AnalysisError):
-                return _sweep([servos[i] for i in group], plan, step)
-        return _sweep([servos[i] for i in group], plan, last)
+                return _sweep(group, part, step)
+        return _sweep(group, part, last)
 
-    with ThreadPoolExecutor(workers or _cores()) as pool:
-        done = list(pool.map(sweep, groups))
-    results: list[NDArray[np.complex128]] = [np.empty(0, complex)] * len(servos)
-    for group, cycles in zip(groups, done, strict=True):
+    tasks = [(group, share) for group in groups for share in shares]
+    with ThreadPoolExecutor(workers) as pool:
+        done = list(pool.map(sweep, tasks))
+    shape = (levels, len(points), plan.integrate_cycles, HARMONICS)
+    results = [np.empty(shape, dtype=complex) for _ in servos]
+    for (group, share), cycles in zip(tasks, done, strict=True):
         for position, index in enumerate(group):
-            results[index] = cycles[position]
+            results[index][:, share] = cycles[position]
     return results
 
 
@@ -322,6 +331,12 @@ def _groups(servos: Sequence[Servo], levels: int, workers: int) -> Iterable[list
         size = max(min(share, _LANES_PER_LOT // levels), 1)
         for start in range(0, len(members), size):
             yield members[start : start + size]
+
+
+def _shares(plan: SweepPlan, workers: int) -> list[slice]:
+    """Points in turn to each worker: low frequencies take longer than high ones."""
+    count = min(workers, len(plan.frequencies_hz))
+    return [slice(first, None, count) for first in range(count)]
 
 
 def _linear_key(system: PiecewiseLinearSystem) -> bytes:

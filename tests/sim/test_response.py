@@ -114,6 +114,23 @@ def test_company_changes_nothing_to_the_last_bit(workers):
         assert np.array_equal(together[i], alone), i
 
 
+@pytest.mark.parametrize("direction", ["up", "down"])
+def test_points_from_rest_are_the_same_however_many_share_them(direction):
+    plan = plan_with(
+        frequencies_hz=(118.0, 125.0, 131.0, 140.0, 155.0), levels_vpk=(2.5, 1.2),
+        integrate_cycles=2, from_rest=True, direction=direction,
+    )  # fmt: skip
+    servos = [Servo.of(ADSS, ratio, seed=i) for i, ratio in enumerate((0.1, 0.5, 0.8))]
+    one = simulate_cycles(servos, plan, workers=1)
+    for workers in (2, 3, 9):
+        np.testing.assert_array_equal(simulate_cycles(servos, plan, workers=workers), one)
+    point = plan_with(
+        frequencies_hz=(131.0,), levels_vpk=(2.5, 1.2), integrate_cycles=2, from_rest=True
+    )
+    (alone,) = simulate_cycles(servos[1:2], point)
+    np.testing.assert_array_equal(one[1][:, 2:3], alone)
+
+
 def test_the_response_is_what_the_oracle_finds_from_a_settled_motion():
     unit = ADSS.with_parameters(b_t_deg=0.02)
     plan = plan_with(frequencies_hz=(60.0,), settle_cycles=150, integrate_cycles=5)
