@@ -20,7 +20,7 @@ __all__ = ["ClusterExecutor"]
 T = TypeVar("T")
 R = TypeVar("R")
 
-_WAIT_S = 10.0
+_CONNECT_S, _WORKERS_S = 10.0, 10.0
 
 
 class ClusterExecutor:
@@ -48,16 +48,16 @@ class ClusterExecutor:
             ) from error
         self.address = address
         try:
-            self._client: Any = Client(address, timeout=_WAIT_S, set_as_default=False)
+            self._client: Any = Client(address, timeout=_CONNECT_S, set_as_default=False)
         except (OSError, TimeoutError) as error:
             raise LinkError(
-                f"no Dask scheduler answers at {address} within {_WAIT_S:g} s; start one with: "
+                f"no Dask scheduler answers at {address} within {_CONNECT_S:g} s; start one with: "
                 "dask scheduler"
             ) from error
         except ValueError as error:
             raise InputError(f"{address!r} is no address of a Dask scheduler: {error}") from error
         try:
-            self._client.wait_for_workers(1, timeout=_WAIT_S)
+            self._client.wait_for_workers(1, timeout=_WORKERS_S)
         except TimeoutError as error:
             self._client.close()
             raise LinkError(

@@ -29,6 +29,13 @@ BEGIN = "import sys; from distributed.cli.dask_{0} import main; sys.argv[0] = 'd
 QUIET = {"DASK_LOGGING__DISTRIBUTED": "error", "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "0"}
 
 
+@pytest.fixture(autouse=True)
+def patience(monkeypatch):
+    """A machine that is busy with other things answers late."""
+    monkeypatch.setattr(analysis.cluster, "_CONNECT_S", 60.0)
+    monkeypatch.setattr(analysis.cluster, "_WORKERS_S", 60.0)
+
+
 def begin(role, *words):
     return subprocess.Popen(
         [sys.executable, "-c", BEGIN.format(role), *words], env={**os.environ, **QUIET},
@@ -93,7 +100,7 @@ def refuse(task):
 
 
 def test_without_workers_it_says_how_to_start_one(scheduler, monkeypatch):
-    monkeypatch.setattr(analysis.cluster, "_WAIT_S", 0.5)
+    monkeypatch.setattr(analysis.cluster, "_WORKERS_S", 0.5)
     with pytest.raises(LinkError, match="dask worker"):
         ClusterExecutor(scheduler)
 
@@ -156,7 +163,7 @@ def test_another_edition_on_a_worker_is_refused(workers, monkeypatch):
     ("address", "error"), [("127.0.0.1:9", LinkError), ("ftp://nowhere", InputError)]
 )
 def test_an_address_without_a_scheduler_is_refused(address, error, monkeypatch):
-    monkeypatch.setattr(analysis.cluster, "_WAIT_S", 1.0)
+    monkeypatch.setattr(analysis.cluster, "_CONNECT_S", 1.0)
     with pytest.raises(error):
         ClusterExecutor(address)
 
