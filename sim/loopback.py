@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from urllib.parse import parse_qsl
 
 from daq.errors import BenchTimeout, ConfigurationError, LinkError, ProtocolError
-from daq.transports.base import Deadline, checked_line, take_block
+from daq.transports.base import Deadline, block_of, checked_line
 from sim.analyser35670a import Analyser35670A, Choices, TalkState
 from sim.analyser35670a.pace import ByTheClock, Fast, Pace
 from sim.effects import EffectSetting, parse_effect
@@ -66,26 +66,7 @@ class Loopback:
     def read_block(self, deadline: Deadline) -> bytes:
         """The payload of one definite-length block."""
         message = self._message(deadline)
-        taken = 0
-
-        def take(count: int) -> bytes:
-            nonlocal taken
-            part = message[taken : taken + count]
-            if len(part) < count:
-                raise ProtocolError(
-                    f"{self.address}: the block that answers {self._waiting!r} was cut short: "
-                    f"{len(message)} bytes came, {taken + count} were due"
-                )
-            taken += count
-            return part
-
-        payload = take_block(take)
-        if taken < len(message):
-            raise ProtocolError(
-                f"{self.address}: {len(message) - taken} bytes follow the block that answers "
-                f"{self._waiting!r}"
-            )
-        return payload
+        return block_of(message, f"{self.address}: the block that answers {self._waiting!r}")
 
     def serial_poll(self, deadline: Deadline) -> int | None:
         """The status byte."""

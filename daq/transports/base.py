@@ -21,6 +21,7 @@ __all__ = [
     "Transport",
     "ask",
     "ask_block",
+    "block_of",
     "checked_line",
     "take_block",
 ]
@@ -205,4 +206,37 @@ def take_block(take: Callable[[int], bytes]) -> bytes:
     end = take(1)
     if end != b"\n":
         raise ProtocolError(f"a block of {length} bytes is followed by {end!r}, not by a line feed")
+    return payload
+
+
+def block_of(message: bytes, name: str) -> bytes:
+    """The payload of one definite-length block that is a whole message.
+
+    Parameters
+    ----------
+    message
+        As it came, the line feed after the block included.
+    name
+        Of the block, for messages.
+
+    Raises
+    ------
+    ProtocolError
+        If the message is no block, ends within it, or goes on behind it.
+    """
+    taken = 0
+
+    def take(count: int) -> bytes:
+        nonlocal taken
+        part = message[taken : taken + count]
+        if len(part) < count:
+            raise ProtocolError(
+                f"{name} was cut short: {len(message)} bytes came, {taken + count} were due"
+            )
+        taken += count
+        return part
+
+    payload = take_block(take)
+    if taken < len(message):
+        raise ProtocolError(f"{name} is followed by {len(message) - taken} bytes")
     return payload

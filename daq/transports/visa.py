@@ -14,7 +14,7 @@ import time
 from typing import Any
 
 from daq.errors import BenchTimeout, LinkError, ProtocolError
-from daq.transports.base import Deadline, checked_line, take_block
+from daq.transports.base import Deadline, block_of, checked_line, take_block
 
 __all__ = ["VisaTransport", "open_visa"]
 
@@ -100,26 +100,7 @@ class VisaTransport:
             self._first_byte(deadline)
             return take_block(lambda count: self._exactly(count, deadline))
         message = self._message(deadline)
-        taken = 0
-
-        def take(count: int) -> bytes:
-            nonlocal taken
-            part = message[taken : taken + count]
-            if len(part) < count:
-                raise ProtocolError(
-                    f"{self.address}: the block that answers {self._waiting!r} was cut short: "
-                    f"{len(message)} bytes came, {taken + count} were due"
-                )
-            taken += count
-            return part
-
-        payload = take_block(take)
-        if taken < len(message):
-            raise ProtocolError(
-                f"{self.address}: {len(message) - taken} bytes follow the block that answers "
-                f"{self._waiting!r}"
-            )
-        return payload
+        return block_of(message, f"{self.address}: the block that answers {self._waiting!r}")
 
     def serial_poll(self, deadline: Deadline) -> int | None:
         """The status byte; None on a bare socket, which has no such thing."""
