@@ -14,12 +14,12 @@ def with_tight_bearing(drivetrain: Drivetrain, T_f_g1: float) -> Drivetrain:
 
 
 unit, ratio = load_unit("adss"), 0.3
-plan = SweepPlan(spaced_frequencies(100.0, 180.0, 41), levels_vpk=(2.5,))
+plan = SweepPlan(spaced_frequencies(100.0, 180.0, 21), levels_vpk=(2.5,))
 plain = paper_drivetrain(unit, ratio)
 
 for name, drivetrain in (
     ("as in the paper", plain),
-    ("with a tight bearing", with_tight_bearing(plain, T_f_g1=0.05)),
+    ("with a tight bearing", with_tight_bearing(plain, T_f_g1=0.15)),
 ):
     (cycles,) = simulate_cycles([Servo(drivetrain.system())], plan)
     response = response_of_cycles(cycles, plan, unit.name, {"kind": "simulated"})

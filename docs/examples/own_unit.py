@@ -23,7 +23,7 @@ GIMBAL = {
 }  # fmt: skip
 
 unit = unit_from_mapping(GIMBAL, source="own_unit.py")
-plan = SweepPlan(spaced_frequencies(80.0, 180.0, 41), levels_vpk=(2.5,))
-for ratio in (0.1, 0.5, 0.9):
+plan = SweepPlan(spaced_frequencies(80.0, 180.0, 26), levels_vpk=(2.5,))
+for ratio in (0.1, 0.9):
     print(f"contribution ratio {ratio}")
     print("\n".join(summary(extract(simulate(unit, ratio, plan)))))
