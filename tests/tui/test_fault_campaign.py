@@ -6,15 +6,23 @@ from types import SimpleNamespace
 
 import pytest
 from fault_cases import DISTURBANCES, WIRES, Case, can_strike, draw_cases
-from fault_child import true_gain
+from fault_child import drives, instrument_of, options, true_gain
 from fault_runs import Campaign, Run
 
 from daq.analyser import SweepPoint
+from daq.control import SessionControl
+from daq.errors import InstrumentError
 from daq.frf import PointFlag
+from daq.hp35670a import HP35670A
 from daq.plan import SweepPlan
+from daq.session_events import PointStored
 from daq.store import Store
 from daq.store_records import MeasurementHeader
 from sim.faults import CATALOGUE, PHASES, parse_fault
+from sim.loopback import Loopback
+from sim.unit import load_unit
+from tui.bench import bench_session
+from tui.measure_options import session_request
 
 KINDS = (
     ("tcp", None, "sigint"),
@@ -62,6 +70,34 @@ def test_what_was_meant_to_go_wrong_did(outcomes):
     assert by_kind["tcp", None, "read-only"] == 2
     assert by_kind["loopback", None, "held-briefly"] == 0
     assert by_kind["loopback", "hardware-error", None] == 1
+
+
+def test_a_level_that_another_program_set_ends_it_before_a_point_is_stored(tmp_path, monkeypatch):
+    instrument, _ = instrument_of(None)
+    connected = HP35670A(Loopback(instrument))
+    monkeypatch.setattr("tui.bench.connect", lambda *_: connected)
+    db, unit, stored, said = tmp_path / "bench.db", load_unit("adss"), [], []
+    request = session_request(
+        options(), "adss", unit, "sim:", db,
+        recipe=None, bench="default", resume=None, remeasure=None, run_in=None,
+        remarks={"serial": "", "operator": "", "notes": ""},
+    )  # fmt: skip
+
+    def watch():
+        for event in bench_session("sim:", unit, db, request, SessionControl()):
+            said.append(event)
+            if isinstance(event, PointStored):
+                stored.append(event.stored.point)
+                if len(stored) == 2:
+                    instrument.listen(b"SOUR:VOLT 4 VPK\n", end=True)
+
+    with pytest.raises(InstrumentError, match="source level .* reads back 4"):
+        watch()
+    assert len(stored) == 2
+    assert said[-1].source_state == "confirmed-off"
+    assert not drives(instrument)
+    for point in stored:
+        assert point.gain == pytest.approx(true_gain(point.frequency_hz, 1.0), rel=1e-6)
 
 
 def test_the_judge_sees_a_source_that_drives_and_is_called_off(tmp_path):

@@ -1,0 +1,78 @@
+"""The chain from servo to features: what must not matter does not, what must scale does."""
+
+import numpy as np
+import pytest
+from side_by_side import ADSS, FRICTIONLESS, state_space
+
+from analysis.resonance import extract
+from daq.frf import FrequencyResponse
+from daq.plan import SweepPlan
+from sim.effects import parse_effect
+from sim.response import simulate
+
+C_S1 = 0.02
+DAMPED = (parse_effect(f"shaft-damping:c_s1={C_S1}"),)
+BAND = (110.0, 130.0, 150.0)
+LINEAR = ADSS.with_parameters(**FRICTIONLESS, b_t_deg=0.0)
+
+
+def swept(unit=LINEAR, ratio=0.3, levels=(1.0, 2.5), **changes):
+    plan = SweepPlan(BAND, levels, settle_cycles=400, integrate_cycles=4, **changes)
+    return simulate(unit, ratio, plan, effects=DAMPED)
+
+
+@pytest.fixture(scope="module")
+def upward():
+    return swept()
+
+
+def test_a_linear_servo_answers_in_proportion(upward):
+    low, high = (upward.gain[upward.source_vpk == level] for level in (1.0, 2.5))
+    np.testing.assert_allclose(high, low, rtol=1e-6)
+    expected = state_space(LINEAR, c_s1=C_S1)(2j * np.pi * np.array(BAND))
+    np.testing.assert_allclose(low, expected, rtol=1e-4)
+
+
+def test_the_direction_of_the_sweep_does_not_matter_to_a_linear_servo(upward):
+    down = swept(direction="down", levels=(1.0,))
+    np.testing.assert_allclose(down.gain, upward.gain[upward.source_vpk == 1.0], rtol=1e-6)
+
+
+@pytest.mark.parametrize("ratio", [0.0, 1.0])
+def test_without_play_its_split_does_not_matter(ratio, upward):
+    np.testing.assert_allclose(
+        swept(ratio=ratio, levels=(1.0,)).gain, upward.gain[upward.source_vpk == 1.0], rtol=1e-9
+    )
+
+
+def pair(f, seed=0, noise=0.01):
+    """An anti-resonance at 45 and a resonance at 80 in noise."""
+    h = (1 - (f / 45) ** 2 + 0.06j * f / 45) / (1 - (f / 80) ** 2 + 0.08j * f / 80)
+    rng = np.random.default_rng(seed)
+    return h * (1 + noise * (rng.normal(size=f.size) + 1j * rng.normal(size=f.size)))
+
+
+def read(f, gain, direction=None):
+    (level,) = extract(FrequencyResponse.from_arrays(f, 1.0, gain, unit="", direction=direction))
+    return level
+
+
+def test_a_sweep_told_downward_is_read_the_same():
+    f = np.linspace(20, 110, 181)
+    gain = pair(f)
+    up, down = read(f, gain, "up"), read(f[::-1], gain[::-1], "down")
+    for one, other in ((up.arf, down.arf), (up.rf, down.rf)):
+        assert other.frequency_hz == pytest.approx(one.frequency_hz, abs=1e-9)
+        assert other.std_hz == pytest.approx(one.std_hz, rel=1e-6)
+
+
+def test_fewer_readings_are_never_surer():
+    """A quarter of the readings: twice the error bar is due, and no seed may bring it below one."""
+    f = np.linspace(20, 110, 361)
+    ratios = []
+    for seed in range(8):
+        gain = pair(f, seed)
+        whole, part = read(f, gain), read(f[::4], gain[::4])
+        ratios += [part.arf.std_hz / whole.arf.std_hz, part.rf.std_hz / whole.rf.std_hz]
+    assert min(ratios) > 1.0
+    assert 1.5 < np.median(ratios) < 2.7
