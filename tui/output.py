@@ -10,16 +10,27 @@ import io
 import json
 import logging
 import math
+import os
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 from cyclopts import Parameter
 
+from tui.pace import Pace, duration
+
 __all__ = ["Console", "Injected", "as_json"]
 
 _LOG = logging.getLogger("lashbench.console")
+
+
+@dataclass(slots=True)
+class _Live:
+    """What stands on the terminal for a moment only: lines of a picture above the progress."""
+
+    lines: int = 0
+    pace: Pace = field(default_factory=Pace)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +44,7 @@ class Console:
     """
 
     quiet: bool = False
+    _live: _Live = field(default_factory=_Live, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         # A terminal that lacks a character (the ± of a plain C locale) shows
@@ -63,16 +75,63 @@ class Console:
         self._clear()
         print(f"error: {' '.join(text.split())}", file=sys.stderr, flush=True)  # noqa: T201
 
-    def progress(self, fraction: float, text: str = "") -> None:
-        """Show how far the work is, in place; only where somebody watches a terminal."""
+    @property
+    def watched(self) -> bool:
+        """Whether somebody sees what is drawn in place."""
+        return not self.quiet and sys.stderr.isatty()
+
+    def progress(self, fraction: float, text: str = "", remaining_s: float | None = None) -> None:
+        """Show how far the work is, in place; only where somebody watches a terminal.
+
+        Parameters
+        ----------
+        fraction
+            Done so far, 0 to 1; one that is smaller than before begins another job.
+        remaining_s
+            Time left; estimated from the pace so far, if left out.
+        """
         _LOG.debug("%3.0f %% %s", 100.0 * fraction, text)
-        if not self.quiet and sys.stderr.isatty():
-            line = f"{100 * min(max(fraction, 0.0), 1.0):3.0f} %  {text}"
-            print(f"\r\x1b[K{line[:78]}", end="", file=sys.stderr, flush=True)  # noqa: T201
+        if not self.watched:
+            return
+        fraction = min(max(fraction, 0.0), 1.0)
+        if remaining_s is None:
+            remaining_s = self._live.pace.remaining_s(fraction)
+        left = "" if remaining_s is None else f"{duration(remaining_s)} left  "
+        line = f"{100 * fraction:3.0f} %  {left}{text}"
+        print(f"\r\x1b[K{line[:78]}", end="", file=sys.stderr, flush=True)  # noqa: T201
+
+    def picture(self, lines: Sequence[str]) -> None:
+        """Draw lines in place of those drawn before; only where they fit on a terminal."""
+        if not self.watched or self._height() < len(lines) + 2:
+            return
+        drawn = "".join(f"{line}\n" for line in lines)
+        print(f"{self._erasure()}{drawn}", end="", file=sys.stderr, flush=True)  # noqa: T201
+        self._live.lines = len(lines)
+
+    def ask(self, question: str) -> str | None:
+        """What a person answers; None where there is nobody to ask."""
+        if not (self.watched and sys.stdin.isatty()):
+            return None
+        self._clear()
+        print(question, end="", file=sys.stderr, flush=True)  # noqa: T201
+        return sys.stdin.readline().strip()
+
+    def _height(self) -> int:
+        """Lines of the terminal; the usual 24 where it does not say."""
+        try:
+            return os.get_terminal_size(sys.stderr.fileno()).lines or 24
+        except OSError:
+            return 24
 
     def _clear(self) -> None:
-        if not self.quiet and sys.stderr.isatty():
-            print("\r\x1b[K", end="", file=sys.stderr, flush=True)  # noqa: T201
+        if self.watched:
+            print(self._erasure(), end="", file=sys.stderr, flush=True)  # noqa: T201
+            self._live.lines = 0
+
+    def _erasure(self) -> str:
+        """What takes picture and progress off the terminal."""
+        up = f"\x1b[{self._live.lines}A" if self._live.lines else ""
+        return f"\r{up}\x1b[J"
 
 
 Injected = Annotated[Console, Parameter(parse=False, show=False)]

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from daq.formats import read_response
 from tui.cli import main
 
 PRACTICE = Path(__file__).parents[1] / "data" / "practice"
@@ -129,21 +128,6 @@ def test_estimate_warns_where_the_response_is_of_another_unit(capsys):
     result = document(["estimate", SWEEP, "--unit", "edss"], capsys)
     assert result["warnings"] == ["the response is of unit ADSS, not of EDSS", "a warning"]
     assert "of unit ADSS" in text(["estimate", SWEEP, "--unit", "edss"], capsys)
-
-
-@pytest.mark.usefixtures("calls")
-def test_demo_goes_through_every_step(tmp_path, capsys):
-    out = text(["demo", "--out", str(tmp_path / "here" / "demo")], capsys)
-    for heading in ("1. ", "2. ", "3. ", "4. ", "5. "):
-        assert f"\n{heading}" in "\n" + out
-    assert "SIMULATED" in out
-    assert "source confirmed-off" in out
-    assert out.count("contribution ratio") == 3
-    folder = tmp_path / "here" / "demo"
-    for name in ("measured", "sample"):
-        assert (folder / f"{name}.png").read_bytes().startswith(b"\x89PNG")
-    assert len(read_response(folder / "measured.csv")) == 52
-    assert len(read_response(folder / "sample.csv")) == 183
 
 
 @pytest.fixture

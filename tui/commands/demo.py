@@ -1,4 +1,4 @@
-"""``lashbench demo``: the whole job without hardware.
+"""``lashbench demo``: the whole job without hardware, with something hidden to be found.
 
 Owns the order of the steps and what a newcomer is told about each. Every step
 is the one that the other verbs take.
@@ -7,111 +7,187 @@ is the one that the other verbs take.
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
 
-from tui.options import prepare_directory
+from cyclopts import Parameter
+
+from daq.errors import InputError
+from tui.options import Json, Whole, prepare_directory
 from tui.output import Console, Injected
+from tui.places import cache_folder
 
 if TYPE_CHECKING:
     from daq.frf import FrequencyResponse
+    from daq.session_events import Finished
+    from sim.unit import Unit
+    from tui.demonstration.hidden import Hidden
 
 __all__ = ["demo"]
 
+_INTERRUPTED = 130
+_TOLD = 5
+"""Lines that a long job prints where nobody watches a terminal."""
 
-SERVED = "sim:?ratio=0.3&seed=1"
-"""The simulated bench: its unit has 30 % of its backlash in stage 1."""
 
+def demo(
+    *,
+    surprise: bool = False,
+    seed: Annotated[Whole | None, Parameter(help="Hide the same surprise again.")] = None,
+    out: Path = Path("demo"),
+    json: Json = False,
+    console: Injected,
+) -> int:
+    """Measure a simulated bench, tell the backlash, and find what is hidden in its unit.
 
-def demo(*, out: Path = Path("demo"), console: Injected) -> None:
-    """Do the whole job without hardware: measure, features, backlash, figure.
+    A simulated analyser is served on a socket of this computer, with a unit
+    behind it that differs from its datasheet. The real driver measures it.
 
     Parameters
     ----------
+    surprise
+        Hide something drawn at random from the catalogue, and let you guess.
     out
-        Directory for the history, the responses and figures, made if it is not there.
+        Directory for history, response, figures and report, made if it is not there.
     """
+    from sim.unit import load_unit
+    from tui.demonstration.hidden import drawn, standing
+
+    if seed is not None and (seed < 0 or not surprise):
+        raise InputError(f"--seed {seed}: give 0 or more, and --surprise with it")
     began = time.perf_counter()
     prepare_directory(out)
-    console.data("1. A sweep on the simulated bench (SIMULATED: ADSS, 30 % in stage 1)\n")
-    measured = _measure(out / "bench.db", console)
-    console.data("\n2. Its anti-resonance (ARF) and resonance (RF)\n")
-    _show_features(measured, out, "measured", console)
-    console.data("\n3. Its backlash\n")
-    _estimate_response(measured, console)
+    unit = load_unit("adss")
+    hidden = drawn(unit, seed) if surprise else standing()
+    tell = console.note if json else console.data
+    tell("1. A simulated analyser, and a sweep on it (SIMULATED: ADSS)\n")
+    finished = _measure(unit, hidden, out / "bench.db", tell, console)
+    if finished.state != "complete":
+        console.note(f"{finished.state}: {finished.reason}")
+        return _INTERRUPTED
+    response = _features(out, finished.measurement, tell)
+    guess = _guess(console) if surprise else None
+    document = _judge(response, unit, hidden, out, finished.measurement, guess, tell, console)
+    document |= {"seed": hidden.seed, "elapsed_s": time.perf_counter() - began}
+    if json:
+        console.document(document)
+    tell(f"\nThe report is {(out / 'report.html').resolve()}")
+    tell(f"History, response and figures are in {out}/.")
+    if surprise:
+        tell(f"The same once more: lashbench demo --surprise --seed {hidden.seed}")
+    console.note(f"done in {document['elapsed_s']:.0f} s")
+    return 0
 
-    sample = _sample(console)
-    console.data("\n4. A sweep that another program made (true contribution 93.3 %)\n")
-    _show_features(sample, out, "sample", console)
-    console.data("")
-    _estimate_response(sample, console)
-    console.data("\n5. Backlash of the paper's ADSS, from its measured ARF and RF\n")
-    _estimate_paper(console)
-    console.data(f"\nHistory, responses and figures are in {out}/.")
-    console.note(f"done in {time.perf_counter() - began:.0f} s")
 
+def _measure(
+    unit: Unit, hidden: Hidden, history: Path, tell: Callable[[str], None], console: Console
+) -> Finished:
+    from tui.demonstration.served import served
+    from tui.demonstration.sweep import sweep
 
-def _measure(history: Path, console: Console) -> FrequencyResponse:
-    """A session on the simulated analyser, as `measure` runs it."""
-    from daq.store import Store
-    from tui.commands.measure import measure
-
-    measure(
-        unit="adss",
-        instrument=SERVED,
-        level=[1.5, 2.5],
-        start=115.0,
-        stop=165.0,
-        points=26,
-        db=history,
-        operator="demo",
-        console=console,
+    with served(unit, hidden.ratio, hidden.effect, hidden.seed) as address:
+        console.note(f"  --instrument {address}")
+        finished, picture = sweep(address, unit, history, console)
+    tell("\n".join(picture.lines()))
+    tell(
+        f"measurement {finished.measurement}: {finished.points} points, {finished.flagged} "
+        f"flagged; source {finished.source_state.value}"
     )
-    with Store(history, read_only=True) as store:
-        return store.response(store.measurements()[-1].id)
+    return finished
 
 
-def _show_features(response: FrequencyResponse, out: Path, name: str, console: Console) -> None:
+def _features(out: Path, measurement: int, tell: Callable[[str], None]) -> FrequencyResponse:
     from analysis.resonance import extract, summary
     from analysis.response_figure import save_response_figure
     from daq.formats import write_response
+    from daq.store import Store
 
-    write_response(response, out / f"{name}.csv")
+    with Store(out / "bench.db", read_only=True) as store:
+        response = store.response(measurement)
+    write_response(response, out / "measured.csv")
     features = extract(response)
-    console.data("\n".join(summary(features)))
-    save_response_figure(response, features, out / f"{name}.png")
+    tell("\n2. Its anti-resonance (ARF) and resonance (RF)\n")
+    tell("\n".join(summary(features)))
+    save_response_figure(response, features, out / "measured.png")
+    return response
 
 
-def _sample(console: Console) -> FrequencyResponse:
-    """A sweep that comes with lashbench."""
-    from daq.configs import sample_path
-    from daq.formats import read_response
+def _guess(console: Console) -> str | None:
+    """What the person takes it for; None if there is nobody, or nobody who would."""
+    from sim.catalogue import CATALOGUE
 
-    console.note("reading the sample sweep adss-sweep")
-    return read_response(sample_path("adss-sweep"))
+    names = list(CATALOGUE)
+    lines = [f"  {at:2}  {name:<24} {CATALOGUE[name].meaning}" for at, name in enumerate(names, 1)]
+    question = "Which is it? Number or name, or Enter to pass: "
+    answer = console.ask("\n".join(["", "One of these is hidden:", *lines, question]))
+    while answer:
+        if answer.isdecimal() and 1 <= int(answer) <= len(names):
+            return names[int(answer) - 1]
+        if answer in CATALOGUE:
+            return answer
+        answer = console.ask(f"{answer} is none of them; number or name, or Enter to pass: ")
+    return None
 
 
-def _estimate_response(response: FrequencyResponse, console: Console) -> None:
+def _judge(
+    response: FrequencyResponse,
+    unit: Unit,
+    hidden: Hidden,
+    out: Path,
+    measurement: int,
+    guess: str | None,
+    tell: Callable[[str], None],
+    console: Console,
+) -> dict[str, Any]:
+    """Estimate, diagnose, reveal and report."""
+    from analysis.diagnosis import diagnose_response
     from analysis.estimate import estimate_response
-    from sim.unit import load_unit
+    from tui.demonstration.hidden import compare, worded
+    from tui.reports import report_measurement
 
-    console.note("estimating: simulates the unit at many contribution ratios")
-    result = estimate_response(response, load_unit(response.unit), progress=console.progress)
-    console.data("\n".join(result.summary()))
+    cache = cache_folder()
+    tell("\n3. Its backlash by stage, as the plain model has it\n")
+    estimate = estimate_response(response, unit, progress=_progress("estimating", console))
+    tell("\n".join(estimate.summary()))
+    tell("\n4. What the model lacks\n")
+    progress = _progress("diagnosing", console)
+    diagnosis = diagnose_response(response, unit, cache=cache, progress=progress)
+    tell("\n".join(diagnosis.summary()))
+    document = diagnosis.to_json()
+    outcome = compare(hidden, document)
+    tell("\n5. What was hidden\n")
+    tell("\n".join(worded(hidden, outcome, document, guess)))
+    numbers: Mapping[str, Any] = estimate.to_json()
+    report_measurement(
+        out / "report.html", out / "bench.db", measurement, unit,
+        estimate=numbers, diagnosis=diagnosis,
+    )  # fmt: skip
+    return {
+        "hidden": {
+            "effect": hidden.effect.id,
+            "parameters": dict(hidden.effect.values),
+            "contribution_ratio": hidden.ratio,
+        },
+        "outcome": outcome,
+        "guess": guess,
+        "estimate": numbers,
+        "diagnosis": document,
+        "measurement": measurement,
+        "history": str(out / "bench.db"),
+        "report": str(out / "report.html"),
+    }
 
 
-def _estimate_paper(console: Console) -> None:
-    from analysis.estimate import estimate_features
-    from analysis.paper_numbers import load_paper
-    from sim.unit import load_unit
+def _progress(job: str, console: Console) -> Callable[[float, str], None]:
+    """Progress in place on a terminal, else a line now and then."""
+    told = [0]
 
-    row = load_paper().measured_row("ADSS")
-    console.note("estimating once more")
-    result = estimate_features(
-        row.arf_hz, row.rf_hz, load_unit(row.unit), progress=console.progress
-    )
-    console.data(
-        f"measured ARF {row.arf_hz:g} Hz and RF {row.rf_hz:g} Hz; "
-        f"the paper concludes {row.ratio_percent} %"
-    )
-    console.data("\n".join(result.summary()))
+    def show(share: float, text: str = "") -> None:
+        if console.watched:
+            console.progress(share, text)
+        elif int(share * _TOLD) > told[0]:
+            told[0] = int(share * _TOLD)
+            console.note(f"  {job}: {100 * share:.0f} %")
+
+    return show

@@ -236,8 +236,8 @@ def _tell(event: SessionEvent, console: Console) -> None:
             point = event.stored.point
             console.progress(
                 event.done / event.total,
-                f"{event.done}/{event.total}  {point.frequency_hz:.2f} Hz  "
-                f"{_decibels(point.gain)}  {event.remaining_s:.0f} s left",
+                f"{event.done}/{event.total}  {point.frequency_hz:.2f} Hz  {_decibels(point.gain)}",
+                event.remaining_s,
             )
         case kinds.Paused():
             console.note(f"paused; source {event.source_state.value}")

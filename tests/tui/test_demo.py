@@ -1,0 +1,280 @@
+"""The demonstration: the whole way with quick judgements, what it says of right and wrong."""
+
+import json
+import os
+import pty
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from daq.formats import read_response
+from daq.store import Store
+from sim.catalogue import CATALOGUE
+from sim.drawn_effects import draw_effect
+from sim.unit import load_unit
+from tui.bode_text import bode_lines
+from tui.cli import main
+from tui.commands import demo as verb
+from tui.demonstration import hidden as secrets
+from tui.demonstration import sweep
+
+ADSS = load_unit("adss")
+
+
+def document(*causes, verdict="explained", rivals=()):
+    uncertain = {"value": 0.3, "std": 0.02}
+    return {
+        "verdict": verdict,
+        "causes": [
+            {"effect": name, "probability": 0.9, "parameters": {
+                p.name: {"value": 1.0, "std": 0.1, "unit": p.unit_symbol}
+                for p in CATALOGUE[name].parameters
+            }}
+            for name in causes
+        ],
+        "rivals": [{"causes": list(names), "probability": 0.1} for names in rivals],
+        "baseline": {"held_out_rms_sigma": 2.0, "held_out_rms_db": 2.0},
+        "extended": {"held_out_rms_sigma": 1.0, "held_out_rms_db": 1.0},
+        "gain": {"held_out_rms_ratio": 0.5},
+        "contribution_ratio": {"baseline": uncertain, "extended": uncertain},
+        "residual": [],
+        "next_measurement": None,
+        "elapsed_s": 1.0,
+    }  # fmt: skip
+
+
+class Diagnosed:
+    def __init__(self, *causes):
+        self._causes = causes
+
+    def to_json(self):
+        return document(*self._causes)
+
+    def summary(self):
+        return ["the diagnosis in words"]
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Few points, an estimate and a diagnosis at once; what was judged is kept."""
+    from analysis import diagnosis, estimate
+
+    judged = []
+    monkeypatch.setattr(sweep, "POINTS", 9)
+    monkeypatch.setattr(sweep, "SETTLE_CYCLES", 3)
+    monkeypatch.setattr(sweep, "INTEGRATE_CYCLES", 3)
+
+    def estimated(response, unit, progress=None, **options):
+        uncertain = estimate.Uncertain(0.5, 0.1, (0.3, 0.7))
+        total = estimate.Uncertain(0.066, 0.0)
+        return estimate.Estimate("ADSS", uncertain, uncertain, uncertain, total, None, (), 1.0)
+
+    def install(*causes):
+        def diagnosed(response, unit, *, cache, progress):
+            for share in np.linspace(0.0, 1.0, 11):
+                progress(share, "searching")
+            judged.append(response)
+            return Diagnosed(*causes)
+
+        monkeypatch.setattr(estimate, "estimate_response", estimated)
+        monkeypatch.setattr(diagnosis, "diagnose_response", diagnosed)
+        return judged
+
+    return install
+
+
+def test_the_whole_way_over_a_socket(quick, tmp_path, capsys):
+    judged = quick("load-viscous-damping")
+    out = tmp_path / "here" / "demo"
+    assert main(["demo", "--out", str(out)]) == 0
+    text, told = capsys.readouterr()
+    for number in range(1, 6):
+        assert f"\n{number}. " in "\n" + text
+    assert "SIMULATED" in text
+    assert "source confirmed-off" in text
+    assert "The diagnosis named it." in text
+    assert "true 0.300" in text
+    assert str((out / "report.html").resolve()) in text
+    assert "--instrument TCPIP::127.0.0.1::" in told
+    assert "diagnosing: 20 %" in told
+    assert "\x1b" not in text + told
+    assert (out / "measured.png").read_bytes().startswith(b"\x89PNG")
+    page = (out / "report.html").read_text()
+    assert "load-viscous-damping" in page
+    assert len(read_response(out / "measured.csv")) == 27
+    with Store(out / "bench.db", read_only=True) as store:
+        assert store.measurements()[0].header.address.startswith("TCPIP::127.0.0.1::")
+        assert len(judged[0]) == len(store.response(1)) == 27
+
+
+def test_twice_the_same_points_and_one_json_document(quick, tmp_path, capsys):
+    judged = quick("load-inertia")
+    for name in ("a", "b"):
+        assert main(["demo", "--json", "--out", str(tmp_path / name)]) == 0
+        result = json.loads(capsys.readouterr().out)
+    assert np.array_equal(judged[0].gain, judged[1].gain)
+    assert result["hidden"]["effect"] == secrets.standing().effect.id
+    assert result["outcome"] == "missed"
+    assert result["diagnosis"]["causes"][0]["effect"] == "load-inertia"
+    assert result["report"] == str(tmp_path / "b" / "report.html")
+
+
+def test_a_surprise_is_another_one_and_the_same_for_its_seed(quick, tmp_path, capsys):
+    quick("load-inertia")
+    results = []
+    for seed in ("4", "4", "5"):
+        words = ["demo", "--surprise", "--seed", seed, "--json", "--out", str(tmp_path)]
+        assert main(words) == 0
+        results.append(json.loads(capsys.readouterr().out))
+    same, again, other = (result["hidden"] for result in results)
+    assert same == again != other
+    assert results[0]["guess"] is None
+
+
+@pytest.mark.parametrize("words", [["--seed", "1"], ["--surprise", "--seed", "-1"]])
+def test_a_seed_goes_with_a_surprise(words, capsys):
+    assert main(["demo", *words]) == 2
+    assert "--seed" in capsys.readouterr().err
+
+
+def test_interrupted_in_the_sweep_it_ends_safe(quick, tmp_path, capsys, monkeypatch):
+    from daq.control import SessionControl
+
+    quick("load-inertia")
+    monkeypatch.setattr(
+        sweep.Picture, "add", lambda self, *point: CONTROLS[-1].interrupt("interrupted by SIGINT")
+    )
+    CONTROLS = []
+    begin = SessionControl.__init__
+
+    def kept(self):
+        begin(self)
+        CONTROLS.append(self)
+
+    monkeypatch.setattr(SessionControl, "__init__", kept)
+    assert main(["demo", "--out", str(tmp_path)]) == 130
+    out, err = capsys.readouterr()
+    assert "source confirmed-off" in out
+    assert "interrupted by SIGINT" in err
+    assert not (tmp_path / "report.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("found", "outcome"),
+    [
+        (document("cable-stiffness"), "named"),
+        (document("cable-stiffness", verdict="ambiguous"), "not alone"),
+        (document("load-inertia", rivals=[["cable-stiffness"]]), "among the rivals"),
+        (document("cable-stiffness", "load-inertia"), "among the rivals"),
+        (document("load-inertia"), "missed"),
+        (document(verdict="unexplained"), "missed"),
+    ],
+)
+def test_right_and_wrong_are_told_apart(found, outcome):
+    rng = np.random.default_rng(1)
+    hidden = secrets.Hidden(0.4, draw_effect(ADSS, (110, 170), rng, ["cable-stiffness"]), 1)
+    assert secrets.compare(hidden, found) == outcome
+    lines = secrets.worded(hidden, outcome, found, "load-inertia")
+    assert lines[0].startswith("Hidden was cable-stiffness.")
+    assert "true 0.400" in lines[-2]
+    assert lines[-1].endswith("load-inertia: not it")
+    shown = any("found 1 +- 0.1" in line for line in lines)
+    assert shown == any(cause["effect"] == "cable-stiffness" for cause in found["causes"])
+
+
+class Person:
+    """A console with answers."""
+
+    def __init__(self, *answers):
+        self.answers, self.asked = list(answers), []
+
+    def ask(self, question):
+        self.asked.append(question)
+        return self.answers.pop(0)
+
+
+@pytest.mark.parametrize(
+    ("answers", "guess"),
+    [
+        (["1"], "load-viscous-damping"),
+        (["cable-stiffness"], "cable-stiffness"),
+        ([""], None),
+        ([None], None),
+        (["0", "99", "nonsense", "2"], "shaft-damping"),
+        (["nonsense", ""], None),
+    ],
+)
+def test_a_guess_is_a_number_or_a_name(answers, guess):
+    person = Person(*answers)
+    assert verb._guess(person) == guess
+    assert person.answers == []
+    assert all(name in person.asked[0] for name in CATALOGUE)
+
+
+@pytest.mark.parametrize("unit", ["adss", "edss"])
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_what_is_drawn_is_in_its_range_and_differs_from_the_datasheet(unit, name):
+    subject = load_unit(unit)
+    known = {**subject.parameters, "scale": 1.0}
+    for seed in range(30):
+        setting = draw_effect(subject, (40.0, 90.0), np.random.default_rng(seed), [name])
+        for parameter in CATALOGUE[name].parameters:
+            value = setting.values[parameter.name]
+            low, high = parameter.range(subject)
+            assert min(low, 40.0 if parameter.name == "f_p" else low) <= value <= high
+            if parameter.name in known:
+                assert abs(value / known[parameter.name] - 1.0) > 0.1
+
+
+def test_every_effect_is_drawn_at_last():
+    rng = np.random.default_rng(1)
+    seen = {draw_effect(ADSS, (110.0, 170.0), rng).id for _ in range(500)}
+    assert seen == set(CATALOGUE)
+
+
+def points(level):
+    hertz = np.geomspace(100.0, 200.0, 21)
+    return [(f, level * 10 ** (-f / 100) * np.exp(-1j * f / 50)) for f in hertz.tolist()]
+
+
+def test_the_plot_has_every_point_where_it_belongs():
+    lines = bode_lines({1.5: [(100.0, 1.0), (200.0, 0.01j)]}, (100.0, 200.0))
+    assert lines[1] == "     0 |o"
+    assert lines[11] == "   -40 |" + " " * 69 + "o"
+    assert lines[14] == "       |" + " " * 69 + "o"
+    assert lines[15] == "     0 |o"
+    assert lines[-1].split() == ["Hz", "100", "118.9", "141.4", "168.2", "200"]
+
+
+def test_the_plot_keeps_its_size_whatever_is_in_it():
+    nothing = bode_lines({}, (100.0, 200.0))
+    sizes = {len(nothing)}
+    for levels in ({1.5: points(1.0)}, {1.5: points(1.0), 4.0: points(1e-3)},
+                   {1.0: [(150.0, complex("nan")), (150.0, 0j)]}):  # fmt: skip
+        lines = bode_lines(levels, (100.0, 200.0))
+        sizes.add(len(lines))
+        assert max(map(len, lines)) <= 78
+        assert all(line.isascii() for line in lines)
+    assert len(sizes) == 1
+    both = "\n".join(bode_lines({1.5: points(1.0), 4.0: points(1e-3)}, (100.0, 200.0)))
+    assert "o 1.5 V peak   x 4 V peak" in both
+    assert both.count("x") > 15
+
+
+def test_on_a_terminal_the_plot_is_drawn_in_place():
+    program = (
+        "from tui.output import Console; c = Console()\n"
+        "for n in range(3):\n"
+        "    c.picture(['top', f'bottom {n}']); c.progress(n / 3, 'now')\n"
+        "c.note('over')"
+    )
+    main_end, other = pty.openpty()
+    run = subprocess.run([sys.executable, "-c", program], stderr=other, check=True)
+    os.close(other)
+    shown = os.read(main_end, 65536).decode()
+    os.close(main_end)
+    assert run.returncode == 0
+    assert shown.count("\x1b[2A\x1b[J") == 3
+    assert shown.rstrip().endswith("over")
