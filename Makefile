@@ -71,4 +71,7 @@ $(READY): pyproject.toml requirements.lock
 	@$(PYTHON) -m venv .venv
 	@$(BIN)/python -m pip install -qq --no-compile --disable-pip-version-check \
 	  --constraint requirements.lock --editable '.[dev]'
+	@echo "compiling the engine, once" >&2
+	@$(BIN)/python -c "from sim.response import SteppedServo; from sim.unit import load_unit; \
+	  SteppedServo(load_unit('adss'), 0.5).dwell(500.0, 1.0, 0.0, 1, 1)"
 	@touch $@
