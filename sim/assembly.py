@@ -15,7 +15,7 @@ then stepped exactly.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 
@@ -163,49 +163,31 @@ class Assembly:
 
     def build(self, output: Along) -> PiecewiseLinearSystem:
         """Matrices and laws, with `output` as the row of V_o over state names."""
-        coordinates = list(self.inertias)
-        states = [*self.signals, *coordinates, *(f"{q}'" for q in coordinates)]
-        index = {name: i for i, name in enumerate(states)}
-        n = len(states)
-        A = np.zeros((n, n))
-        b = np.zeros(n)
-        f = np.zeros(n)
-        energy = np.zeros((n, n))
-
-        def row(along: Along, prime: str = "") -> NDArray[np.float64]:
-            vector = np.zeros(n)
-            for name, coefficient in along.items():
-                vector[index[name + prime]] += coefficient
-            return vector
-
-        def forcing(along: Along) -> NDArray[np.float64]:
-            vector = np.zeros(n)
-            for name, coefficient in along.items():
-                if name in self.inertias:
-                    vector[index[f"{name}'"]] += coefficient / self.inertias[name]
-                else:
-                    vector[index[name]] += coefficient
-            return vector
-
+        at = _States(self.signals, self.inertias)
+        n = len(at.names)
+        A, energy = np.zeros((n, n)), np.zeros((n, n))
+        b, f = np.zeros(n), np.zeros(n)
         for q, J in self.inertias.items():
-            A[index[q], index[f"{q}'"]] = 1.0
-            energy[index[f"{q}'"], index[f"{q}'"]] = J
+            A[at.index[q], at.index[f"{q}'"]] = 1.0
+            energy[at.index[f"{q}'"], at.index[f"{q}'"]] = J
         for acts, looks, stiffness, damping in self._torques:
-            A -= np.outer(forcing(acts), stiffness * row(looks) + damping * row(looks, "'"))
-            energy += stiffness * np.outer(row(looks), row(looks))
+            A -= np.outer(
+                at.forcing(acts), stiffness * at.row(looks) + damping * at.row(looks, "'")
+            )
+            energy += stiffness * np.outer(at.row(looks), at.row(looks))
         for target, source, coefficient in self._couplings:
-            A += np.outer(forcing({target: coefficient}), row({source: 1.0}))
+            A += np.outer(at.forcing({target: coefficient}), at.row({source: 1.0}))
         for signal, coefficient in self._inputs.items():
-            b += forcing({signal: coefficient})
+            b += at.forcing({signal: coefficient})
         for coordinate, torque in self._constants.items():
-            f += forcing({coordinate: torque})
+            f += at.forcing({coordinate: torque})
 
         nonlinearities = tuple(
             Nonlinearity(
                 name=name,
                 law=law,
-                inlet=forcing(acts),
-                outlet=row(looks),
+                inlet=at.forcing(acts),
+                outlet=at.row(looks),
                 feedthrough=feedthrough,
                 stiffness=stiffness,
                 damping=damping,
@@ -217,8 +199,34 @@ class Assembly:
             A=A,
             b=b,
             f=f,
-            o=row(output),
+            o=at.row(output),
             nonlinearities=nonlinearities,
-            states=tuple(states),
+            states=at.names,
             energy=energy,
         )
+
+
+class _States:
+    """State names in order, and directions over coordinates as rows and columns over them."""
+
+    def __init__(self, signals: Iterable[str], inertias: Mapping[str, float]) -> None:
+        self._inertias = inertias
+        self.names = (*signals, *inertias, *(f"{q}'" for q in inertias))
+        self.index = {name: i for i, name in enumerate(self.names)}
+
+    def row(self, along: Along, prime: str = "") -> NDArray[np.float64]:
+        """Coefficients over states; with a prime those of the rates."""
+        vector = np.zeros(len(self.names))
+        for name, coefficient in along.items():
+            vector[self.index[name + prime]] += coefficient
+        return vector
+
+    def forcing(self, along: Along) -> NDArray[np.float64]:
+        """What a torque along coordinates, or a rate of signals, adds to the rates of states."""
+        vector = np.zeros(len(self.names))
+        for name, coefficient in along.items():
+            if name in self._inertias:
+                vector[self.index[f"{name}'"]] += coefficient / self._inertias[name]
+            else:
+                vector[self.index[name]] += coefficient
+        return vector
