@@ -11,13 +11,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntFlag
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from daq.errors import InputError
 from daq.plan import Direction
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 __all__ = ["DB_PER_NEPER", "GAIN_STD_COMPONENTS", "FrequencyResponse", "PointFlag"]
 
@@ -203,6 +206,28 @@ class FrequencyResponse:
                 f"source level {source_vpk} V is not in the data; it holds {self.levels_vpk} V"
             )
         return self.take(rows[np.argsort(self.frequency_hz[rows], kind="stable")])
+
+    def to_frame(self) -> pd.DataFrame:
+        """The response as a pandas table, for a notebook.
+
+        Returns
+        -------
+        pandas.DataFrame
+            One row per row, in the same order; the columns are `frequency_hz`
+            (Hz), `source_vpk` (V peak), `gain_db` (dB), `phase_deg` (degrees),
+            `gain_std_db` (dB), `phase_std_deg` (degrees), `gain` (complex),
+            `dc_v` (V), `harmonic2`, `harmonic3` (complex) and `flags`. Unit,
+            procedure and provenance are in its `attrs`. For xarray:
+            ``frame.set_index(["source_vpk", "frequency_hz"]).to_xarray()``.
+
+        Raises
+        ------
+        InputError
+            If pandas is not installed; it comes with the extra ``frames``.
+        """
+        from daq.frames import frame_of
+
+        return frame_of(self)
 
 
 _ARRAYS = (

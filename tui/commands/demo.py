@@ -148,7 +148,8 @@ def _judge(
 
     cache = cache_folder()
     tell("\n3. Its backlash by stage, as the plain model has it\n")
-    estimate = estimate_response(response, unit, progress=_progress("estimating", console))
+    progress = _progress("estimating", console)
+    estimate = estimate_response(response, unit, progress=progress, cache=cache)
     tell("\n".join(estimate.summary()))
     tell("\n4. What the model lacks\n")
     progress = _progress("diagnosing", console)
