@@ -1,0 +1,168 @@
+"""The verbs history and export."""
+
+import json
+import math
+import sqlite3
+
+import numpy as np
+import pytest
+from measuring import measuring, stopped
+
+from daq.formats import read_response
+from daq.store import Store
+
+
+def test_an_empty_history_and_one_that_is_not_there(run, db):
+    assert run("history")[0] == 2
+    Store(db, create=True).close()
+    code, out, _ = run("history", "--json")
+    assert code == 0
+    assert json.loads(out)["measurements"] == []
+    assert "no measurements" in run("history")[1]
+
+
+def test_history_lists_states_and_units(run, monkeypatch):
+    stopped(run, monkeypatch)
+    run(
+        *measuring(
+            unit="edss", plan=["--level", "2", "--start", "40", "--stop", "60", "--points", "3"]
+        )
+    )
+    code, out, _ = run("history", "--json", "--estimate", "none")
+    assert code == 0
+    rows = json.loads(out)["measurements"]
+    assert [(r["id"], r["unit"], r["serial"], r["state"], r["points"]) for r in rows] == [
+        (1, "ADSS", "S", "interrupted", 2),
+        (2, "EDSS", "", "complete", 3),
+    ]
+    assert rows[0]["contribution_ratio"] is None
+    assert rows[0]["started"] < rows[1]["started"]
+    for unit in ("adss", "ADSS"):
+        _, out, _ = run("history", "--json", "--unit", unit)
+        assert [r["id"] for r in json.loads(out)["measurements"]] == [1]
+    code, _, err = run("history", "--unit", "zzz")
+    assert code == 2
+    assert "units in this history: adss, edss" in err
+
+
+def estimated(store, measurement, ratio, std=0.05):
+    number = {"value": ratio, "std": std}
+    store.add_estimate(
+        measurement,
+        "t",
+        {"contribution_ratio": number | {"interval95": [0, 1]}, "b1_deg": number, "b2_deg": number},
+    )
+
+
+def test_history_shows_the_trend_with_error_bars(run, db):
+    for _ in range(3):
+        run(*measuring("--serial", "S"))
+    with Store(db) as store:
+        for measurement, ratio in ((1, 0.30), (2, 0.40), (3, 0.55)):
+            estimated(store, measurement, ratio)
+    code, out, _ = run("history", "--json")
+    document = json.loads(out)
+    assert code == 0
+    assert [r["contribution_ratio"]["value"] for r in document["measurements"]] == [0.3, 0.4, 0.55]
+    (trend,) = [t for t in document["trends"] if t["quantity"] == "contribution_ratio"]
+    assert (trend["unit"], trend["serial"], trend["measurements"]) == ("ADSS", "S", 3)
+    assert trend["mean"]["value"] == pytest.approx(1.25 / 3)
+    assert trend["mean"]["std"] == pytest.approx(0.05 / math.sqrt(3))
+    assert trend["per_day"] is None
+    _, out, _ = run("history")
+    assert "0.300 +- 0.050" in out
+    bars = [line for line in out.splitlines() if "-o-" in line]
+    assert len(bars) == 3
+    assert [bar.index("o") for bar in bars] == sorted(bar.index("o") for bar in bars)
+    # Seconds apart, no slope per month is claimed; weeks apart it is.
+    assert "in 30 days" not in out
+    with sqlite3.connect(db) as raw:
+        for day in (1, 8, 15):
+            raw.execute(
+                "UPDATE measurements SET started = ? WHERE id = ?",
+                (f"2026-11-{day:02d}T12:00:00+00:00", (day + 6) // 7),
+            )
+    raw.close()
+    _, out, _ = run("history")
+    # A line through 0.30, 0.40, 0.55 a week apart rises by 0.125 a week.
+    assert "+0.536 +- 0.15 in 30 days" in out
+    assert "differ by more than their errors" not in out
+
+
+def test_values_that_do_not_agree_are_not_passed_off_as_one(run, db):
+    for _ in range(2):
+        run(*measuring("--serial", "S"))
+    with Store(db) as store:
+        for measurement, ratio in ((1, 0.20), (2, 0.60)):
+            estimated(store, measurement, ratio)
+    document = json.loads(run("history", "--json")[1])
+    (trend,) = [t for t in document["trends"] if t["quantity"] == "contribution_ratio"]
+    assert trend["per_day"] is None
+    assert trend["chi2"] == pytest.approx(2 * (0.2 / 0.05) ** 2)
+    assert "differ by more than their errors" in run("history")[1]
+
+
+def test_missing_estimates_are_made_once_and_kept(run, db, monkeypatch):
+    from analysis import estimate as module
+    from daq.errors import AnalysisError
+
+    run(*measuring())
+    run(*measuring())
+    calls = []
+
+    class Result:
+        def to_json(self):
+            number = {"value": 0.3, "std": 0.1}
+            return {"contribution_ratio": number, "b1_deg": number, "b2_deg": number}
+
+    def estimate(response, unit, progress=None, **_):
+        calls.append((unit.name, len(response)))
+        if len(calls) == 2:
+            raise AnalysisError("no resonance in it")
+        return Result()
+
+    monkeypatch.setattr(module, "estimate_response", estimate)
+    code, out, err = run("history", "--json")
+    rows = json.loads(out)["measurements"]
+    assert code == 0
+    assert rows[0]["contribution_ratio"]["value"] == 0.3
+    assert rows[1]["contribution_ratio"] is None
+    assert "measurement 2 gives no estimate: no resonance in it" in err
+    again = run("history", "--json")[1]
+    assert json.loads(again) == json.loads(out)
+    assert calls == [("ADSS", 5), ("ADSS", 5)]
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".h5", ".uff", ".mat"])
+def test_export_gives_back_what_was_stored(run, db, tmp_path, suffix):
+    run(*measuring("--notes", "n", "--serial", "7"))
+    out = tmp_path / f"x{suffix}"
+    assert run("export", 1, "--out", out)[0] == 0
+    read = read_response(out)
+    with Store(db) as store:
+        stored = store.response(1)
+    np.testing.assert_allclose(read.gain, stored.gain, rtol=1e-14)
+    np.testing.assert_array_equal(read.frequency_hz, stored.frequency_hz)
+    np.testing.assert_allclose(read.gain_std_db, stored.gain_std_db, rtol=1e-14)
+    np.testing.assert_array_equal(read.flags, stored.flags)
+    assert read.unit == "ADSS"
+    assert read.provenance["kind"] == "simulated"
+    assert read.provenance["notes"] == "n"
+    assert read.provenance["points"]["taken"] == stored.provenance["points"]["taken"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((9, "--out", "x.csv"), "measurement 9 is not in"),
+        ((1, "--out", "x.xyz"), "cannot write files that end in '.xyz'"),
+        ((1, "--out", "/nowhere/x.csv"), "there is no directory /nowhere"),
+        (("one", "--out", "x.csv"), "not a whole number"),
+    ],
+)
+def test_what_cannot_be_exported(run, tmp_path, monkeypatch, words, said):
+    monkeypatch.chdir(tmp_path)
+    run(*measuring())
+    code, _, err = run("export", *words)
+    assert code == 2
+    assert said in err

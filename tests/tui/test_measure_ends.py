@@ -1,0 +1,176 @@
+"""Ends of a measurement that were asked for, going on with it, and running it again."""
+
+import json
+import os
+import signal
+import threading
+import time
+
+import pytest
+from measuring import STATES, at_point, measuring, stopped
+
+from daq.analyser import SourceState
+from daq.configs import config_path
+from daq.frf import PointFlag
+from daq.store import Store
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR2])
+def test_a_signal_ends_it_safe_and_it_can_be_resumed(run, db, monkeypatch, number):
+    with monkeypatch.context() as patch:
+        at_point(patch, 2, lambda: signal.raise_signal(number))
+        code, out, err = run(*measuring("--json"))
+    assert code == 130
+    document = json.loads(out)
+    assert (document["points"], document["source_state"]) == (2, "confirmed-off")
+    assert document["state"] == "interrupted"
+    assert "--resume 1" not in out
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    code, out, _ = run(*measuring("--json", "--resume", "1"))
+    assert code == 0
+    assert json.loads(out)["points"] == 5
+    with Store(db) as store:
+        assert store.measurement(1).state == "complete"
+
+
+def test_ctrl_backslash_aborts_for_good(run, monkeypatch):
+    with monkeypatch.context() as patch:
+        at_point(patch, 2, lambda: signal.raise_signal(signal.SIGQUIT))
+        code, out, _ = run(*measuring("--json"))
+    assert code == 130
+    assert json.loads(out)["state"] == "aborted"
+    code, _, err = run(*measuring("--resume", "1"))
+    assert code == 2
+    assert "was aborted" in err
+
+
+def test_ctrl_z_does_not_halt_a_program_that_drives(run, monkeypatch):
+    at_point(monkeypatch, 2, lambda: signal.raise_signal(signal.SIGTSTP))
+    assert run(*measuring())[0] == 0
+
+
+def test_a_pause_by_signal_and_on(run, monkeypatch, db):
+    def hold():
+        signal.raise_signal(signal.SIGUSR1)
+        threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGUSR1)).start()
+
+    at_point(monkeypatch, 2, hold)
+    code, _, err = run(*measuring())
+    assert code == 0
+    assert "paused; source confirmed-off" in err
+    assert "going on" in err
+    with Store(db) as store:
+        assert [e.kind for e in store.events(1)].count("pause") == 1
+
+
+def test_key_presses_during_safe_off_do_not_skip_it(run, db, monkeypatch):
+    from daq.hp35670a import HP35670A
+
+    whole, begun = HP35670A.make_safe, []
+
+    def pressed(self):
+        begun.append("safe")
+        for _ in range(3):
+            signal.raise_signal(signal.SIGINT)
+        return whole(self)
+
+    def first():
+        monkeypatch.setattr(HP35670A, "make_safe", pressed)
+        signal.raise_signal(signal.SIGINT)
+
+    at_point(monkeypatch, 2, first)
+    code, out, _ = run(*measuring("--json"))
+    assert code == 130
+    assert begun == ["safe"]
+    assert json.loads(out)["source_state"] == "confirmed-off"
+    with Store(db) as store:
+        assert store.measurement(1).source_state is SourceState.CONFIRMED_OFF
+
+
+def test_a_listener_who_leaves_does_not_end_it(run, db, monkeypatch):
+    def broken():
+        raise BrokenPipeError
+
+    at_point(monkeypatch, 3, broken)
+    assert run(*measuring())[0] == 0
+    with Store(db) as store:
+        assert store.measurement(1).state == "complete"
+
+
+def test_resume_needs_no_plan_and_refuses_another_one(run, monkeypatch):
+    stopped(run, monkeypatch)
+    bare = ["measure", "--unit", "adss", "--instrument", "sim:?ratio=0.3", "--resume", "1"]
+    code, _, err = run(*bare, "--points", "6")
+    assert code == 2
+    assert "points 6 was given and it has 5" in err
+    code, _, err = run(*bare, "--level", "1", "--direction", "down")
+    assert code == 2
+    assert "levels_vpk (1.0,) was given and it has (2.5,)" in err
+    assert "direction 'down' was given and it has 'up'" in err
+    code, _, err = run(*bare[:2], "edss", *bare[3:])
+    assert code == 2
+    assert "unit 'EDSS' was given and it has 'ADSS'" in err
+    assert run(*bare, "--serial", "T")[0] == 2
+    assert run(*bare)[0] == 0
+
+
+def test_resuming_a_complete_measurement_is_no_fault(run):
+    assert run(*measuring())[0] == 0
+    code, out, _ = run(*measuring("--resume", "1", "--json"))
+    assert code == 0
+    assert json.loads(out)["points"] == 5
+
+
+def test_a_long_point_is_ended_at_once_and_retaken(run, db, tmp_path, monkeypatch):
+    monkeypatch.setattr("daq.hp35670a.calibrate", lambda dialogue: None)
+    bench = tmp_path / "bench.toml"
+    text = config_path("benches", "default").read_text()
+    bench.write_text(text + "channel1_range_vpk = 20.0\nchannel2_range_vpk = 20.0\n")
+    words = ["measure", "--unit", "adss", "--instrument", "sim:?ratio=0.3&speed=realtime"]
+    words += ["--bench", str(bench)]
+    words += ["--level", "2.5", "--start", "10", "--stop", "12", "--points", "3"]
+    words += ["--settle-cycles", "1", "--integrate-cycles", "5"]
+    pressed = []
+
+    def later():
+        pressed.append(time.monotonic() + 0.2)
+        threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
+
+    with monkeypatch.context() as patch:
+        at_point(patch, 1, later)
+        code, out, _ = run(*words, "--json")
+    # The point in hand would have taken 0.5 s more; safe-off itself waits for the ramp.
+    assert code == 130
+    assert time.monotonic() - pressed[0] < 2.0
+    document = json.loads(out)
+    assert (document["points"], document["source_state"]) == (1, "confirmed-off")
+    assert run(*words[:4], "sim:?ratio=0.3", "--resume", "1")[0] == 0
+    with Store(db) as store:
+        flags = [p.point.flags & PointFlag.RETAKEN for p in store.points(1)]
+    assert flags == [0, PointFlag.RETAKEN, 0]
+
+
+def test_a_band_is_measured_again(run, db):
+    run(*measuring())
+    code, _, _ = run(*measuring("--resume", "1", "--remeasure", "145:165"))
+    assert code == 0
+    with Store(db) as store:
+        every = store.points(1, superseded=True)
+        assert len(store.points(1)) == 5
+    assert [p.requested_hz for p in every if p.superseded_by] == [150.0, 160.0]
+
+
+def test_a_transcript_runs_the_session_again_without_an_instrument(run, db, tmp_path):
+    tape = tmp_path / "tape.jsonl"
+    assert run(*measuring("--transcript", str(tape)))[0] == 0
+    assert run(*measuring(url=f"replay:{tape}"))[0] == 0
+    with Store(db) as store:
+        first, second = ([p.point for p in store.points(i)] for i in (1, 2))
+    assert first == second
+    # Another plan departs from it, and where is said.
+    other = ["--level", "2.5", "--start", "131", "--stop", "170", "--points", "5"]
+    code, out, err = run(*measuring("--json", url=f"replay:{tape}", plan=other))
+    assert code == 3
+    assert "it departs here" in err
+    assert f"{tape}, line " in err
+    assert json.loads(out)["source_state"] in STATES - {"confirmed-off"}
