@@ -1,7 +1,7 @@
 """ARF and RF of the paper's model when it is swept, beside the paper's procedure from rest.
 
 Run as ``python tests/campaigns/swept_features.py``; prints the rows of the table in
-docs/paper.md. Half a minute of processor time.
+docs/paper.md. Two minutes of processor time.
 """
 
 from __future__ import annotations
