@@ -126,6 +126,11 @@ class Belief:
         """Probability that at least one of these effects is part of the answer."""
         return float(sum(one.probability for one in self.judged if set(one.effects) & set(effects)))
 
+    def probability_of_only(self, effects: Collection[str]) -> float:
+        """Probability that the answer is made of these effects alone, of one at least."""
+        made = [one for one in self.judged if one.effects and set(one.effects) <= set(effects)]
+        return float(sum(one.probability for one in made))
+
     def expected_index(self) -> tuple[float, float]:
         """Error index of a single run, Hz: mean and std over the sets worth naming."""
         named = [one for one in self.judged if one is self.best or one.probability > _WORTH_NAMING]

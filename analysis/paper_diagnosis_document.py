@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from analysis.paper_belief import Belief, Judged, index_of
 from analysis.paper_evidence import Agreement
-from analysis.paper_pairs import DISSIPATION, LOADS, VISCOUS
+from analysis.paper_pairs import CHAIN, DISSIPATION, LOADS, VISCOUS
 from sim.catalogue import CATALOGUE
 from sim.paper_scheme import PAPER_LEVEL_VPK
 
@@ -25,8 +25,6 @@ __all__ = ["document", "parameters", "residual"]
 _QUANTITIES = ("arf-frequency", "arf-gain", "rf-frequency", "rf-gain", "arf-half-power-width")
 _UNITS = ("Hz", "dB", "Hz", "dB", "Hz")
 _GAINS = [1, 3]
-
-_CHAIN = tuple(effect.id for effect in CATALOGUE.values() if effect.site == "chain")
 
 
 def document(diagnosis: PaperDiagnosis) -> dict[str, Any]:
@@ -72,7 +70,7 @@ def _section(belief: Belief) -> dict[str, Any]:
         "kinds": {
             "loses-energy": belief.probability_of_any(DISSIPATION),
             "more-on-the-load": belief.probability_of_any(LOADS),
-            "measuring-chain": belief.probability_of_any(_CHAIN),
+            "measuring-chain": belief.probability_of_any(CHAIN),
         },
         "anything_missing": 1.0 - belief.baseline.probability,
         "baseline": _model(belief.baseline, base_sigma, base_db),
@@ -202,13 +200,12 @@ def _damping_alone(belief: Belief) -> dict[str, Any] | None:
     alone = belief.damping_alone
     if alone is None:
         return None
-    only = [one for one in belief.judged if one.effects and set(one.effects) <= set(VISCOUS)]
     return {
         "enough": belief.damping_is_enough,
         "causes": list(alone.effects),
         "parameters": parameters(alone.agreement),
         "contribution_ratio": _ratio(alone.agreement),
-        "probability": float(sum(one.probability for one in only)),
+        "probability": belief.probability_of_only(VISCOUS),
         "probability_of_worse": alone.probability_of_worse,
         "log_evidence_behind_best": belief.behind(alone),
         "error_index": _index(alone.agreement),

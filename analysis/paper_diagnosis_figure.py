@@ -87,7 +87,7 @@ def _draw_features(axes: Axes, belief: Belief) -> None:
     axes.set_xlabel("frequency (Hz)")
     axes.set_ylabel("gain (dB)")
     axes.grid(alpha=0.3)
-    axes.margins(0.12)
+    axes.margins(0.2)
     axes.legend(fontsize=8)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from analysis.paper_belief import Belief, Judged, index_of
 from analysis.paper_diagnosis_document import parameters, residual
-from analysis.paper_pairs import DISSIPATION, LOADS
+from analysis.paper_pairs import CHAIN, DISSIPATION, LOADS, VISCOUS
 from sim.catalogue import CATALOGUE
 
 if TYPE_CHECKING:
@@ -100,12 +100,14 @@ def _damping(belief: Belief) -> list[str]:
     index = index_of(alone.agreement)
     word = "cannot be ruled out" if belief.damping_is_enough else "is not enough"
     return [
-        f"  missing damping alone {word}: {_name(alone)} at ratio {mean[0]:.2f} +- {std[0]:.2f}, "
+        f"  missing damping alone {word} (probability {belief.probability_of_only(VISCOUS):.2f}): "
+        f"{_name(alone)} at ratio {mean[0]:.2f} +- {std[0]:.2f}, "
         f"error index {index.expected:.1f} +- {index.expected_std:.1f} Hz, "
         f"{100.0 * alone.probability_of_worse:.2g} % of its own runs agree worse",
-        f"  something takes energy out of the motion: probability "
-        f"{belief.probability_of_any(DISSIPATION):.2f}; more hangs on the load than the datasheet "
-        f"says: {belief.probability_of_any(LOADS):.2f}",
+        f"  part of the answer, by probability: something takes energy out of the motion "
+        f"{belief.probability_of_any(DISSIPATION):.2f}; the load is heavier or carries more than "
+        f"the datasheet says {belief.probability_of_any(LOADS):.2f}; the measuring chain is off "
+        f"{belief.probability_of_any(CHAIN):.2f}",
     ]
 
 

@@ -19,8 +19,11 @@ from analysis.paper_evidence import RatioPrior, reading_error, weighted_box
 from analysis.paper_exploration import Explored
 from analysis.paper_surface import FREEDOM
 from analysis.paper_sweeps import Reading
+from sim.catalogue import CATALOGUE
 
-__all__ = ["DISSIPATION", "LOADS", "VISCOUS", "GuessedPair", "guess_pairs", "possible_pairs"]
+__all__ = [
+    "CHAIN", "DISSIPATION", "LOADS", "VISCOUS", "GuessedPair", "guess_pairs", "possible_pairs",
+]  # fmt: skip
 
 VISCOUS = ("load-viscous-damping", "shaft-damping", "mesh1-damping", "mesh2-damping")
 """What the paper calls missing damping: its model has none in the gear train or on the load."""
@@ -36,6 +39,9 @@ DISSIPATION = (
 
 LOADS = ("load-inertia", "payload-flexibility")
 """What the paper may mean by uncertainty of the load."""
+
+CHAIN = tuple(effect.id for effect in CATALOGUE.values() if effect.site == "chain")
+"""What is amiss in the measurement and not in the mechanics."""
 
 _RATIOS, _SIZES = 8, 24
 _HEAT, _MARGIN = 3.0, 0.1
