@@ -89,7 +89,7 @@ def main() -> None:
         regression_s = processor_s(estimate, 3)
         kept = sum(file.stat().st_size for file in cache.iterdir())
     simulated = len(family.machines) * plan.duration_s
-    lattice = 10
+    lattice = 11
     shared = len(wide) + lattice * len(near)
     each = len(wide) + len(near)
     day = DAY_S * BUSY

@@ -180,7 +180,8 @@ def main() -> None:
         draw_growth(curves)
         for curve in curves:
             print(curve.summary())
-        replace_block("growth", [f"- {curve.summary()}" for curve in curves])
+        lines = [f"- {curve.summary()}" for curve in curves]
+        replace_block("growth", [f"Measured on {machine()}.", "", *lines])
 
 
 if __name__ == "__main__":

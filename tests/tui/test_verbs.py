@@ -154,3 +154,32 @@ def test_reproduce_gives_the_fields_that_scripts_use(capsys, tmp_path):
     pictures = list((tmp_path / "plots").glob("*.png"))
     assert pictures
     assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in pictures)
+
+
+def test_estimate_simulates_where_the_cluster_is(calls, capsys, monkeypatch):
+    from analysis import cluster
+
+    class Cluster:
+        """Knows whether it was closed."""
+
+        left = False
+
+        def __init__(self, address):
+            self.address = address
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *error):
+            Cluster.left = True
+
+    monkeypatch.setattr(cluster, "ClusterExecutor", Cluster)
+    document(["estimate", SWEEP, "--unit", "adss", "--cluster", "tcp://here:8786"], capsys)
+    assert calls[0][1]["executor"].address == "tcp://here:8786"
+    assert Cluster.left
+
+
+def test_two_frequencies_need_no_cluster(capsys):
+    words = ["estimate", "--unit", "adss", "--arf-hz", "128", "--rf-hz", "137", "--cluster", "x"]
+    assert main(words) == 2
+    assert "--cluster" in capsys.readouterr().err
