@@ -8,11 +8,12 @@ error bar of every point. It judges nothing.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
+from itertools import count
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,6 +82,7 @@ def simulate(
     effects: Sequence[EffectSetting] = (),
     seed: int = 0,
     longest_step_s: float = LONGEST_STEP_S,
+    progress: Callable[[float], None] | None = None,
 ) -> FrequencyResponse:
     """Simulate a sweep of one unit.
 
@@ -95,6 +97,8 @@ def simulate(
     seed
         Draws where in its play each mesh rests at the start. The same seed
         gives the same response to the last bit on one machine.
+    progress
+        Told the share done after each point, from the thread that simulated it.
 
     Returns
     -------
@@ -110,7 +114,13 @@ def simulate(
         If the motion grew without bound.
     """
     servo = Servo.of(unit, ratio, effects, seed)
-    (cycles,) = simulate_cycles([servo], plan, longest_step_s=longest_step_s)
+    done = count(1)
+
+    def point_done() -> None:
+        if progress is not None:
+            progress(next(done) / len(plan.frequencies_hz))
+
+    (cycles,) = simulate_cycles([servo], plan, longest_step_s=longest_step_s, point_done=point_done)
     provenance = {
         "kind": "simulated",
         GAIN_STD_COMPONENTS: 1,
@@ -132,6 +142,7 @@ def simulate_cycles(
     longest_step_s: float = LONGEST_STEP_S,
     shorter_steps_s: Sequence[float] = (),
     workers: int | None = None,
+    point_done: Callable[[], None] = lambda: None,
 ) -> list[NDArray[np.complex128]]:
     """Fourier coefficients of every integrated cycle, for many servos at once.
 
@@ -140,6 +151,8 @@ def simulate_cycles(
     shorter_steps_s
         Longest steps that are tried in turn where a motion grows without bound; servos that
         share their linear part with it go along, all others keep theirs.
+    point_done
+        Called after each frequency of each group, from the thread that simulated it.
 
     Returns
     -------
@@ -166,8 +179,8 @@ def simulate_cycles(
         *steps, last = longest_step_s, *shorter_steps_s
         for step in steps:
             with suppress(AnalysisError):
-                return _sweep(group, part, step)
-        return _sweep(group, part, last)
+                return _sweep(group, part, step, point_done)
+        return _sweep(group, part, last, point_done)
 
     tasks = [(group, share) for group in groups for share in shares]
     with ThreadPoolExecutor(workers) as pool:
@@ -250,7 +263,10 @@ class SteppedServo:
 
 
 def _sweep(
-    servos: Sequence[Servo], plan: SweepPlan, longest_step_s: float
+    servos: Sequence[Servo],
+    plan: SweepPlan,
+    longest_step_s: float,
+    point_done: Callable[[], None],
 ) -> NDArray[np.complex128]:
     """(servos, levels, points, cycles, 4) of servos that share their linear part."""
     levels = np.asarray(plan.levels_vpk, dtype=float)
@@ -274,6 +290,7 @@ def _sweep(
     for i, motion in enumerate(motions):
         _require_finite(motion.coefficients, visited[i])
         kept[i] = motion.coefficients / amplitude
+        point_done()
     if plan.direction == "down":
         kept = kept[::-1]
     lanes = kept.reshape(*shape[:3], len(servos), len(levels))

@@ -293,3 +293,12 @@ def test_only_servos_that_need_a_shorter_step_take_it(monkeypatch):
         np.testing.assert_allclose(one, other, rtol=1e-9)
     with pytest.raises(AnalysisError, match="without bound"):
         simulate_cycles(servos, PLAN, longest_step_s=1e-5, shorter_steps_s=(5e-6,))
+
+
+@pytest.mark.parametrize("from_rest", [False, True])
+def test_every_point_is_told_once(from_rest):
+    plan = SweepPlan((200.0, 210.0, 220.0, 230.0), (1.5, 2.5), settle_cycles=1,
+                     integrate_cycles=2, from_rest=from_rest)  # fmt: skip
+    told = []
+    simulate(ADSS, 0.5, plan, progress=told.append)
+    assert sorted(told) == [0.25, 0.5, 0.75, 1.0]

@@ -111,6 +111,8 @@ def simulate(
         f"simulating {subject.name}: {plan.points} points, {plan.duration_s:.0f} s of motion"
     )
     began = time.perf_counter()
-    response = simulated(subject, ratio, plan, effects=effects, seed=seed)
+    response = simulated(
+        subject, ratio, plan, effects=effects, seed=seed, progress=console.progress
+    )
     write_response(response, out)
     console.note(f"wrote {out} after {time.perf_counter() - began:.1f} s")
