@@ -35,6 +35,7 @@ def main() -> int:
     words.add_argument("--runs", type=int, default=520)
     words.add_argument("--seed", type=int, default=SEED)
     words.add_argument("--lanes", type=int, default=4, help="runs at the same time")
+    words.add_argument("--minutes", type=float, default=1e6, help="begin no run after that")
     words.add_argument("--only", type=int, help="only the run of that number")
     words.add_argument("--kind", help="only runs with that fault or disturbance")
     words.add_argument("--write", action="store_true", help="write the table into the docs")
@@ -46,7 +47,7 @@ def main() -> int:
         cases = [case for case in cases if given.kind in (case.fault_name, case.disturbance)]
     print(f"{len(cases)} runs, seed {given.seed}", flush=True)
     began = time.monotonic()
-    outcomes = run_all(cases, given.lanes)
+    outcomes = run_all(cases, given.lanes, began + 60.0 * given.minutes)
     elapsed_s = time.monotonic() - began
     lines = table(outcomes, given.seed, elapsed_s)
     print("\n".join(lines))
@@ -55,12 +56,18 @@ def main() -> int:
     return 1 if any(outcome.wrongs for outcome in outcomes) else 0
 
 
-def run_all(cases: Sequence[Case], lanes: int) -> list[Outcome]:
-    """Some at a time: most of a run is waiting."""
+def run_all(cases: Sequence[Case], lanes: int, latest_s: float) -> list[Outcome]:
+    """Some at a time: most of a run is waiting. None is begun after `latest_s`."""
     campaign, done = Campaign(), 0
     outcomes = []
+
+    def run(case: Case) -> Outcome | None:
+        return campaign.run(case) if time.monotonic() < latest_s else None
+
     with ThreadPoolExecutor(lanes) as pool:
-        for outcome in pool.map(campaign.run, cases):
+        for outcome in pool.map(run, cases):
+            if outcome is None:
+                break
             done += 1
             outcomes.append(outcome)
             for wrong in outcome.wrongs:
