@@ -2,7 +2,9 @@
 
 import subprocess
 import sys
+import tomllib
 import zipfile
+from email import message_from_string
 from pathlib import Path
 
 import pytest
@@ -31,9 +33,9 @@ def installed(wheel, tmp_path_factory):
     return folder
 
 
-def run_installed(installed, cwd, program):
+def run_installed(installed, cwd, program, *words):
     return subprocess.run(
-        [sys.executable, "-c", program],
+        [sys.executable, "-c", program, *words],
         cwd=cwd,
         env={"PYTHONPATH": str(installed)},
         capture_output=True,
@@ -51,6 +53,50 @@ def test_it_holds_the_four_floors_and_nothing_beside_them(wheel):
     assert "daq/_configs/units/adss.toml" in names
     sources = {str(path.relative_to(ROOT)) for path in (ROOT / "tui").rglob("*.py")}
     assert sources <= set(names)
+
+
+def test_its_metadata_are_those_that_an_index_shows(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        (place,) = [name for name in archive.namelist() if name.endswith(".dist-info/METADATA")]
+        metadata = message_from_string(archive.read(place).decode())
+        licences = [name for name in archive.namelist() if name.endswith("licenses/LICENSE")]
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert (metadata["Name"], metadata["Version"]) == ("lashbench", project["version"])
+    assert metadata["License-Expression"] == "Apache-2.0"
+    assert licences
+    assert metadata["Description-Content-Type"] == "text/markdown"
+    assert metadata.get_payload() == (ROOT / "README.md").read_text()
+    assert "backlash" in metadata["Keywords"]
+    assert "Programming Language :: Python :: 3.11" in metadata.get_all("Classifier")
+    extras = set(metadata.get_all("Provides-Extra"))
+    assert extras == set(project["optional-dependencies"])
+
+
+def test_the_citation_is_of_this_version():
+    yaml = pytest.importorskip("yaml")
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert {"cff-version", "message", "title", "authors"} <= set(citation)
+    assert citation["cff-version"] == "1.2.0"
+    assert citation["title"] == project["name"]
+    assert str(citation["version"]) == project["version"]
+    assert citation["license"] == project["license"]
+    for author in citation["authors"] + citation["references"][0]["authors"]:
+        assert {"name"} <= set(author) or {"family-names", "given-names"} <= set(author)
+
+
+def test_tests_pass_on_it_away_from_the_checkout(installed, tmp_path):
+    program = (
+        "import sys, pytest, daq, tui; print(daq.__file__, tui.__file__);"
+        "sys.exit(pytest.main(['-p', 'no:cacheprovider', *sys.argv[1:]]))"
+    )
+    words = ("-c", str(ROOT / "pyproject.toml"), "--rootdir", str(ROOT))
+    tests = (str(ROOT / "tests" / name) for name in ("daq/test_csv_columns.py", "tui/test_logs.py"))
+    run = run_installed(installed, tmp_path, program, *words, *tests)
+    assert run.returncode == 0, run.stdout + run.stderr
+    assert all(
+        Path(place).is_relative_to(installed) for place in run.stdout.splitlines()[0].split()
+    )
 
 
 def test_what_comes_with_it_is_found_away_from_the_checkout(installed, tmp_path):
