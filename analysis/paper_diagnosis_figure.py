@@ -88,7 +88,7 @@ def _draw_features(axes: Axes, belief: Belief) -> None:
     axes.set_ylabel("gain (dB)")
     axes.grid(alpha=0.3)
     axes.margins(0.2)
-    axes.legend(fontsize=8)
+    axes.legend(fontsize=8, loc="lower right")  # below and beyond both features
 
 
 def _draw_sets(axes: Axes, belief: Belief) -> None:
