@@ -2,15 +2,18 @@
 
 Draws machines off their datasheet at several contribution ratios, sweeps them
 as a bench would, estimates, and prints a table per unit. Truths, deviations
-and noise are drawn anew with the seed printed; nothing is tuned to them.
+and noise are drawn anew with the seed printed; nothing is tuned to them. The
+machines that are simulated are kept from draw to draw, as on a bench.
 
-    python tests/benchmarks/estimate_coverage.py [draws per ratio] [seed]
+    python tests/benchmarks/estimate_coverage.py [draws per ratio] [seed] [unit]
 """
 
 from __future__ import annotations
 
 import sys
+import tempfile
 import time
+from pathlib import Path
 
 import numpy as np
 
@@ -54,14 +57,22 @@ def reading(response: FrequencyResponse, rng: np.random.Generator) -> FrequencyR
     )
 
 
-def main(draws: int = 4, seed: int | None = None) -> None:
+def main(draws: int = 4, seed: int | None = None, only: str = "") -> None:
     """Print the table."""
+    with tempfile.TemporaryDirectory() as cache:
+        run(draws, seed, only, Path(cache))
+
+
+def run(draws: int, seed: int | None, only: str, cache: Path) -> None:
+    """Draw, sweep, estimate and compare."""
     seed = int(np.random.SeedSequence().entropy % 2**32) if seed is None else seed
     print(f"seed {seed}, {draws} draws per ratio")
     print("unit  ratio  covered  rms error  median std  s each")
     rng = np.random.default_rng(seed)
     total, inside = 0, 0
     for name, band in BANDS_HZ.items():
+        if only and name != only:
+            continue
         unit = load_unit(name)
         plan = SweepPlan(spaced_frequencies(*band, 61), LEVELS_VPK)
         for ratio in RATIOS:
@@ -69,7 +80,7 @@ def main(draws: int = 4, seed: int | None = None) -> None:
             errors, stds, hits = [], [], 0
             for _ in range(draws):
                 swept = simulate(machine(unit, rng), ratio, plan, seed=int(rng.integers(2**31)))
-                found = estimate_response(reading(swept, rng), unit, seed=int(rng.integers(2**31)))
+                found = estimate_response(reading(swept, rng), unit, cache=cache)
                 low, high = found.contribution_ratio.interval95
                 hits += low <= ratio <= high
                 errors.append(found.contribution_ratio.value - ratio)
@@ -86,4 +97,4 @@ def main(draws: int = 4, seed: int | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main(*(int(argument) for argument in sys.argv[1:3]))
+    main(*(int(argument) for argument in sys.argv[1:3]), *sys.argv[3:4])

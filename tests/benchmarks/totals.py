@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -75,7 +76,10 @@ def run(words: list[str], **environment: str) -> Cost:
     if child.returncode:
         raise SystemExit(f"{' '.join(words)} ended with {child.returncode}")
     wall = time.perf_counter() - began
-    return Cost(wall, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024.0)
+    # A child begins as a copy of this process: less than that says nothing about it.
+    own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    peak_mb = used.ru_maxrss / 1024.0 if used.ru_maxrss > own else float("nan")
+    return Cost(wall, used.ru_utime + used.ru_stime, peak_mb)
 
 
 def inside(code: str, **environment: str) -> Cost:
