@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 
 from analysis.causes import Hypothesis
 from analysis.paper_belief import Knowledge, believe
@@ -134,7 +136,7 @@ def test_the_same_seed_gives_the_same_answer() -> None:
     assert documents[0] == documents[1]
 
 
-def test_document_follows_the_contract_and_is_whole() -> None:
+def test_document_follows_the_contract_and_is_whole(tmp_path: Path) -> None:
     calls: list[tuple[float, str]] = []
     found = diagnose_paper(
         load_unit("adss"),
@@ -181,6 +183,9 @@ def test_document_follows_the_contract_and_is_whole() -> None:
     lines = found.summary()
     assert "128 Hz" in lines[0]
     assert any("missing damping alone" in line for line in lines)
+    assert any("the measuring chain is off" in line for line in lines)
+    (picture,) = found.plot(tmp_path / "new")
+    assert imread(picture)[..., :3].std() > 0.05
 
 
 def test_the_papers_rows_are_read_as_printed() -> None:
