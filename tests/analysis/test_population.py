@@ -80,7 +80,7 @@ def test_a_step_too_long_is_halved_before_giving_up(monkeypatch):
 
     steps = []
 
-    def fussy(servos, plan, longest_step_s):
+    def fussy(servos, plan, longest_step_s, *told):
         steps.append(longest_step_s)
         raise AnalysisError("grew without bound")
 
