@@ -47,7 +47,8 @@ def public_modules(package: ModuleType) -> Iterator[ModuleType]:
         if hasattr(package, name) and not inspect.ismodule(getattr(package, name)):
             continue
         module = import_module(full)
-        if any(not hasattr(module, inner) for inner in module.__all__):
+        # What is not imported yet is a module, too.
+        if any(inspect.ismodule(getattr(module, inner, module)) for inner in module.__all__):
             yield from public_modules(module)
         else:
             yield module
