@@ -82,6 +82,7 @@ def test_a_cause_that_is_taken_out_is_not_blamed_with_confidence_on_another(cach
     assert "filter-corner" not in {e for one in found.verdict.judged for e in one.effects}
 
 
+@pytest.mark.study
 def test_two_large_causes_are_named_as_a_pair(cache):
     texts = ["amplifier-lag:tau_a=0.002", "load-inertia:J_L=0.0040"]
     found = diagnose_response(response_hiding(texts, 8, ratio=0.4), ADSS, cache=cache)
