@@ -1,24 +1,23 @@
 """Whether an observation looks like one of a hypothesis's own runs.
 
-Owns the test behind "unexplained". Points of a sweep err together, so that no
-table says how good a good fit is; but the runs of the hypothesis themselves do:
-each is taken as if it had been observed and fitted by the others. It compares
-no hypotheses.
+Owns the test behind "unexplained", and the one behind "consistent": whether
+what a cause explains better is more than it would explain by chance where
+nothing is hidden. Both take a hypothesis's own runs as if they had been
+observed. It ranks no hypotheses.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.candidate import Candidate
+from analysis.own_runs import own_runs
 
-__all__ = ["Adequacy", "judge_adequacy"]
+__all__ = ["Adequacy", "judge_adequacy", "judge_chance"]
 
-_RUNS = 48
-"""Runs that are taken in turn as if they had been observed: the nearest to the best place."""
+_TRIES = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,28 +38,25 @@ def judge_adequacy(candidate: Candidate, rng: np.random.Generator) -> Adequacy:
     The runs are given reading noise; each is fitted without the group that
     shares its deviations.
     """
-    surface, best = candidate.surface, candidate.best
-    noise = surface.observation.noise
-    distance = np.sum(((surface.places - best.place) / surface.width) ** 2, axis=1)
-    near = np.argsort(distance, kind="stable")[:_RUNS]
-    families = candidate.population.deviations[:, 0]
-    own = []
-    for i in near:
-        others = families != families[i]
-        if not np.any(others):
-            continue
-        as_read = surface.difference[i].copy()
-        as_read[:2] += rng.standard_normal((2, len(noise))) * noise
-        moved = _wrapped(surface.difference[others] - as_read)
-        alone = replace(surface, places=surface.places[others], difference=moved)
-        own.append(alone.climb(surface.places[i], tries=1).log_likelihood)
+    own = [run.alone.climb(run.place, tries=1).log_likelihood for run in own_runs(candidate, rng)]
     centre = float(np.median(own))
     below = [centre - value for value in own if value <= centre]
     spread = 1.4826 * float(np.median(below))
-    return Adequacy((centre - best.log_likelihood) / max(spread, 1e-9), tuple(own))
+    return Adequacy((centre - candidate.best.log_likelihood) / max(spread, 1e-9), tuple(own))
 
 
-def _wrapped(difference: NDArray[np.float64]) -> NDArray[np.float64]:
-    difference = difference.copy()
-    difference[:, 1] = np.angle(np.exp(1j * difference[:, 1]))
-    return difference
+def judge_chance(simpler: Candidate, alleged: Candidate, rng: np.random.Generator) -> float:
+    """Share of a hypothesis's own runs that another explains better by as much as it does here.
+
+    A cause with a broad range may imitate one branch of a motion that has
+    several: it then fits better than the hypothesis that is true, whose
+    expectation is blurred over all branches, and does so for its own runs, too
+    (D. R. Cox, "Tests of separate families of hypotheses", 1961).
+    """
+    seen = alleged.best.log_likelihood - simpler.best.log_likelihood
+    gains = [
+        run.seen_by(alleged.surface).climb(alleged.best.place, tries=_TRIES).log_likelihood
+        - run.alone.climb(run.place, tries=_TRIES).log_likelihood
+        for run in own_runs(simpler, rng)
+    ]
+    return float(np.mean(np.array(gains) >= seen))

@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from analysis.adequacy import judge_adequacy
+from analysis.adequacy import judge_adequacy, judge_chance
 from analysis.candidate import Candidate
 from analysis.holdout import HeldOut, hold_out
 from analysis.observation import Observation
@@ -40,6 +40,9 @@ _WITHIN_TOLERANCE = 40.0
 
 _FALSE_ALARM = 20.0
 """By so much must a cause beat the baseline beyond its costs."""
+
+_BY_CHANCE = 0.05
+"""Share of the baseline's own runs, with nothing hidden, that it may explain better by as much."""
 
 _TIE = 20.0
 """Within so much of the best, a set is a rival: the scores of two sets that say the same about
@@ -123,7 +126,11 @@ def judge_candidates(
     judged.sort(key=lambda one: -one.score)
     (baseline,) = (one for one in judged if not one.effects)
     best = _simplest(judged)
-    if not best.effects or best.score < baseline.score + _FALSE_ALARM:
+    if (
+        not best.effects
+        or best.score < baseline.score + _FALSE_ALARM
+        or judge_chance(baseline.candidate, best.candidate, rng) > _BY_CHANCE
+    ):
         word: Word = "consistent" if baseline.adequate else "unexplained"
         return Verdict(word, baseline, tuple(judged), baseline)
     verdict = Verdict("explained", best, tuple(judged), baseline)

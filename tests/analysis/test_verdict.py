@@ -38,6 +38,25 @@ def test_nothing_is_named_where_nothing_is_hidden(seed):
 
 
 @pytest.mark.parametrize("seed", range(5))
+def test_a_cause_that_imitates_one_branch_of_the_plain_motion_is_not_blamed(seed, monkeypatch):
+    import synthetic
+
+    plain, branch = synthetic.read, 0.3 * shape(55)
+
+    def branching(effects, place, rng, deviations=None, scatter=1.0):
+        moved = bool(effects) or rng.uniform() < 0.5
+        return plain((), place, rng, deviations, scatter) + moved * branch
+
+    observed = observation(plain((), np.array([0.5]), np.random.default_rng(seed)) + branch)
+    monkeypatch.setattr(synthetic, "read", branching)
+    sets = [candidate(observed, effects, seed) for effects in ((), WRONG)]
+    without, with_it = (one.best.log_likelihood for one in sets)
+    assert with_it > without + 50.0, "the imitation does not tempt"
+    verdict = judge_candidates(sets[::-1], observed, np.random.default_rng(seed))
+    assert (verdict.word, verdict.best.effects) == ("consistent", ())
+
+
+@pytest.mark.parametrize("seed", range(5))
 def test_a_cause_that_nobody_knows_is_not_blamed_on_another(seed):
     values = read((), np.array([0.5]), np.random.default_rng(seed)) + 0.3 * shape(77)
     verdict = judge(observation(values), seed=10 * seed)

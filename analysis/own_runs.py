@@ -1,0 +1,63 @@
+"""A hypothesis's own runs, each taken as if it had been observed.
+
+Owns that substitution alone: with it a fit can be compared with those that the
+hypothesis would give if it were true, which no table tells, because points of
+a sweep err together. It judges nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.candidate import Candidate
+from analysis.surface import Surface
+
+__all__ = ["OwnRun", "own_runs"]
+
+_RUNS = 48
+"""Runs that are taken in turn: the nearest to the best place."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OwnRun:
+    """A run of a hypothesis in place of the observation.
+
+    `place` (d,): where it was made. `alone`: the hypothesis's surface without
+    the group that shares the run's deviations. `as_read` (3, rows): the run
+    with reading noise, minus the true observation.
+    """
+
+    place: NDArray[np.float64]
+    alone: Surface
+    as_read: NDArray[np.float64]
+
+    def seen_by(self, surface: Surface) -> Surface:
+        """Another hypothesis's surface, relative to this run instead of the observation."""
+        return replace(surface, difference=_wrapped(surface.difference - self.as_read))
+
+
+def own_runs(candidate: Candidate, rng: np.random.Generator) -> Iterator[OwnRun]:
+    """The runs nearest to a candidate's best place, one by one."""
+    surface, best = candidate.surface, candidate.best
+    noise = surface.observation.noise
+    distance = np.sum(((surface.places - best.place) / surface.width) ** 2, axis=1)
+    families = candidate.population.deviations[:, 0]
+    for i in np.argsort(distance, kind="stable")[:_RUNS]:
+        others = families != families[i]
+        if not np.any(others):
+            continue
+        as_read = surface.difference[i].copy()
+        as_read[:2] += rng.standard_normal((2, len(noise))) * noise
+        moved = _wrapped(surface.difference[others] - as_read)
+        alone = replace(surface, places=surface.places[others], difference=moved)
+        yield OwnRun(surface.places[i], alone, as_read)
+
+
+def _wrapped(difference: NDArray[np.float64]) -> NDArray[np.float64]:
+    difference = difference.copy()
+    difference[:, 1] = np.angle(np.exp(1j * difference[:, 1]))
+    return difference
