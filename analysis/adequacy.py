@@ -1,8 +1,9 @@
 """Whether an observation looks like one of a hypothesis's own runs.
 
-Owns the test behind "unexplained", and the one behind "consistent": whether
+Owns the tests behind "unexplained" (does it fit, does it predict levels that
+it was not fitted to, as own runs do) and the one behind "consistent": whether
 what a cause explains better is more than it would explain by chance where
-nothing is hidden. Both take a hypothesis's own runs as if they had been
+nothing is hidden. All take a hypothesis's own runs as if they had been
 observed. It ranks no hypotheses.
 """
 
@@ -13,9 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.candidate import Candidate
+from analysis.holdout import HeldOut, hold_out_surface
 from analysis.own_runs import own_runs
 
-__all__ = ["Adequacy", "judge_adequacy", "judge_chance"]
+__all__ = ["Adequacy", "judge_adequacy", "judge_chance", "judge_misses"]
 
 _TRIES = 2
 
@@ -60,3 +62,13 @@ def judge_chance(simpler: Candidate, alleged: Candidate, rng: np.random.Generato
         for run in own_runs(simpler, rng)
     ]
     return float(np.mean(np.array(gains) >= seen))
+
+
+def judge_misses(candidate: Candidate, held_out: HeldOut, rng: np.random.Generator) -> float:
+    """Share of a hypothesis's own runs whose levels are missed by as much when not fitted."""
+    observation = candidate.surface.observation
+    own = [
+        hold_out_surface(run.alone, run.place, observation).rms_sigma
+        for run in own_runs(candidate, rng)
+    ]
+    return float(np.mean(np.array(own) >= held_out.rms_sigma))

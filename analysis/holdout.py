@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from analysis.candidate import Candidate
 from analysis.observation import Observation
+from analysis.surface import Surface
 from daq.frf import DB_PER_NEPER
 
-__all__ = ["HeldOut", "hold_out"]
+__all__ = ["HeldOut", "hold_out", "hold_out_surface"]
 
 _TRIES = 4
 
@@ -52,13 +53,20 @@ class HeldOut:
 
 def hold_out(candidate: Candidate, observation: Observation) -> HeldOut:
     """Predict every fold from the others."""
+    return hold_out_surface(candidate.surface, candidate.best.place, observation)
+
+
+def hold_out_surface(
+    surface: Surface, start: NDArray[np.float64], observation: Observation
+) -> HeldOut:
+    """Predict every fold from the others, by fits that climb from a place (d,)."""
     shape = (3, len(observation))
     residual, std = np.full(shape, np.nan), np.full(shape, np.nan)
     score = 0.0
     for fold in _folds(observation):
         rows = np.ones(len(observation), dtype=bool)
         rows[fold] = False
-        fit = candidate.surface.climb(candidate.best.place, rows, tries=_TRIES)
+        fit = surface.climb(start, rows, tries=_TRIES)
         residual[:, fold], std[:, fold] = fit.residual[:, fold], fit.std[:, fold]
         score += float(fit.density[:, fold].sum())
     return HeldOut(score, residual, std)

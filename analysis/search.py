@@ -37,7 +37,8 @@ _THIRD, _THIRD_GROUPS = 4, 4
 _CLOSE = 30.0
 _LAST_ROUNDS, _LAST_GROUPS = ((4, 120.0), (3, 60.0), (3, _CLOSE), (3, _CLOSE)), 4
 """Rounds in which the leader and those as close behind it as that log-likelihood are looked at
-once more: at most so many, in so many groups each. Where none is close the last two are spared.
+once more: at most so many, and the baseline, in so many groups each. Where none is close the
+last two are spared.
 """
 
 _CHANCES = 4
@@ -109,6 +110,8 @@ def search_causes(
         leader, *near = fine.leading(most, behind)
         if behind == _CLOSE and not near:
             break
+        if () in fine.leading(len(fine.found), behind):
+            near.append(())
         fine.settle(list(dict.fromkeys([leader, *_parts(leader, fine.found), *near])), _LAST_GROUPS)
     return sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
 

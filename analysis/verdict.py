@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from analysis.adequacy import judge_adequacy, judge_chance
+from analysis.adequacy import judge_adequacy, judge_chance, judge_misses
 from analysis.candidate import Candidate
 from analysis.holdout import HeldOut, hold_out
 from analysis.observation import Observation
@@ -52,7 +52,10 @@ _UNLIKE = 4.0
 """A fit worse than own runs' by more standard deviations than this is no explanation."""
 
 _UNPREDICTED = 1.5
-"""Nor is one that misses levels not fitted by so many standard deviations, root mean square."""
+"""Nor is one that misses levels not fitted by so many standard deviations, root mean square,"""
+
+_NEVER, _SELDOM = 2.0, 0.03
+"""unless a larger share of its own runs does so, too; with this many even then."""
 
 _JUDGED = 6
 
@@ -61,7 +64,8 @@ _JUDGED = 6
 class Judged:
     """A candidate with its score, its probability among those judged and how adequate it is.
 
-    `misfit`: standard deviations by which it is fitted worse than runs of its own.
+    `misfit`: standard deviations by which it is fitted worse than runs of its
+    own. `adequate`: whether the observation looks like one of them.
     """
 
     candidate: Candidate
@@ -69,16 +73,12 @@ class Judged:
     score: float
     misfit: float
     probability: float
+    adequate: bool
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Identifiers of its effects."""
         return self.candidate.hypothesis.effects
-
-    @property
-    def adequate(self) -> bool:
-        """Whether the observation looks like one of its own runs."""
-        return self.misfit <= _UNLIKE and self.held_out.rms_sigma <= _UNPREDICTED
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,11 +117,10 @@ def judge_candidates(
     held = [hold_out(candidate, observation) for candidate in chosen]
     scores = np.array([_score(c, h) for c, h in zip(chosen, held, strict=True)])
     weight = np.exp((scores - scores.max()) / HEAT)
+    misfits = [judge_adequacy(candidate, rng).sigma for candidate in chosen]
     judged = [
-        Judged(candidate, out, float(score), judge_adequacy(candidate, rng).sigma, float(p))
-        for candidate, out, score, p in zip(
-            chosen, held, scores, weight / weight.sum(), strict=True
-        )
+        Judged(c, h, float(s), m, float(p), _is_adequate(c, h, m, rng))
+        for c, h, s, m, p in zip(chosen, held, scores, misfits, weight / weight.sum(), strict=True)
     ]
     judged.sort(key=lambda one: -one.score)
     (baseline,) = (one for one in judged if not one.effects)
@@ -139,6 +138,16 @@ def judge_candidates(
     if verdict.rivals:
         return Verdict("ambiguous", best, verdict.judged, baseline)
     return verdict
+
+
+def _is_adequate(
+    candidate: Candidate, held_out: HeldOut, misfit: float, rng: np.random.Generator
+) -> bool:
+    if misfit > _UNLIKE or held_out.rms_sigma > _NEVER:
+        return False
+    if held_out.rms_sigma <= _UNPREDICTED:
+        return True
+    return judge_misses(candidate, held_out, rng) > _SELDOM
 
 
 def _simplest(judged: Sequence[Judged]) -> Judged:
