@@ -1,7 +1,9 @@
 # Everything runs in .venv, which is made on first use and again when the
-# requirements change. `make` alone lists what there is.
+# requirements change. `make` alone lists what there is. `make test JOBS=4` tests
+# in as many processes.
 
 PYTHON ?= python3
+JOBS ?= 2
 BIN := .venv/bin
 READY := .venv/.ready
 
@@ -24,7 +26,7 @@ demo: $(READY)
 	@$(BIN)/lashbench demo
 
 test: check
-	@$(BIN)/python -m pytest
+	@$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile --no-loadscope-reorder
 
 check: $(READY)
 	@$(BIN)/ruff check --quiet .

@@ -5,6 +5,7 @@ it accepts and how it rounds was written from the manuals by itself.
 """
 
 import math
+import operator
 import re
 
 import pytest
@@ -19,6 +20,7 @@ from sim.analyser35670a import Analyser35670A, LinearPlant
 from sim.loopback import Loopback
 
 IDS = [setting.name for setting in SETTINGS]
+NAME = operator.attrgetter("name")
 
 SAMPLES = {
     "span (Hz)": (50.0, 1000.3),
@@ -72,7 +74,7 @@ def test_the_first_channel_cannot_be_switched_off(dialogue):
 
 
 @pytest.mark.parametrize(
-    "setting", [setting for setting in SETTINGS if isinstance(setting, Number)], ids=str
+    "setting", [setting for setting in SETTINGS if isinstance(setting, Number)], ids=NAME
 )
 def test_every_number_carries_its_unit_and_refuses_what_is_outside(setting):
     beyond = [math.nextafter(setting.low, -math.inf), math.nextafter(setting.high, math.inf)]
@@ -87,7 +89,7 @@ def test_every_number_carries_its_unit_and_refuses_what_is_outside(setting):
 
 
 @pytest.mark.parametrize(
-    "setting", [setting for setting in SETTINGS if isinstance(setting, Number)], ids=str
+    "setting", [setting for setting in SETTINGS if isinstance(setting, Number)], ids=NAME
 )
 def test_no_number_takes_a_read_back_that_is_elsewhere(setting):
     for value in SAMPLES[setting.name]:
@@ -100,7 +102,7 @@ def test_no_number_takes_a_read_back_that_is_elsewhere(setting):
 
 
 @pytest.mark.parametrize(
-    "setting", [setting for setting in SETTINGS if isinstance(setting, Choice)], ids=str
+    "setting", [setting for setting in SETTINGS if isinstance(setting, Choice)], ids=NAME
 )
 def test_every_choice_refuses_other_words(setting):
     for word in ("", "X", setting.words[0].lower() + "x", 1, None):

@@ -115,6 +115,8 @@ class ReplayApp(App[int]):
         self._show()
 
     def _show(self) -> None:
+        if not self.query("#banner"):
+            return  # A last tick while the screen is being taken down.
         seen = [entry for entry in self.recording.entries if entry.at_s <= self.at_s]
         points: dict[tuple[float, float], StoredPoint] = {}
         latest, said = "", ""
