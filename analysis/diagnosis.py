@@ -214,15 +214,16 @@ def diagnose_response(
             "two; estimate tells its backlash"
         )
     started = time.perf_counter()
-    observation = observe(response)
+    observed = observe(response)
 
     def early(share: float, text: str) -> None:
         if progress is not None:
             progress(0.8 * share, text)
 
     candidates = search_causes(
-        unit, observation, without=without, cache=cache, seed=seed, progress=early
+        unit, observed, without=without, cache=cache, seed=seed, progress=early
     )
+    observation = candidates[0].surface.observation
     rng = np.random.default_rng(seed)
     verdict = judge_candidates(candidates, observation, rng)
     named = verdict.best if verdict.word in ("explained", "ambiguous") else None

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.observation import Observation, channels_of_cycles
+from analysis.observation import Observation, channels_of_readings, readings_of_cycles
 from daq.plan import SweepPlan
 from sim.effects import EffectSetting
 from sim.response import START_SPREAD, Servo, simulate_cycles
@@ -51,17 +51,26 @@ class Machine:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Draws:
-    """Channels (draws, 3, rows) read from one run of each machine, and the time simulated."""
+    """One run of each machine, free of any bench's noise, and the time simulated.
+
+    `mean`, `variance` (draws, rows): see `analysis.observation.readings_of_cycles`.
+    """
 
     machines: tuple[Machine, ...]
-    channels: NDArray[np.float64]
+    mean: NDArray[np.complex128]
+    variance: NDArray[np.float64]
     simulated_s: float
+
+    def channels(self, observation: Observation) -> NDArray[np.float64]:
+        """Channels (draws, 3, rows) as the bench of an observation would read them."""
+        return channels_of_readings(self.mean, self.variance, observation.noise)
 
     def joined(self, other: Draws) -> Draws:
         """Both sets of draws."""
         return Draws(
             self.machines + other.machines,
-            np.concatenate([self.channels, other.channels]),
+            np.concatenate([self.mean, other.mean]),
+            np.concatenate([self.variance, other.variance]),
             self.simulated_s + other.simulated_s,
         )
 
@@ -80,7 +89,8 @@ def run_machines(
         If a motion grew without bound.
     """
     servos = [machine.servo(unit) for machine in machines]
-    channels = np.empty((len(servos), 3, len(observation)))
+    mean = np.empty((len(servos), len(observation)), dtype=complex)
+    variance = np.empty((len(servos), len(observation)))
     simulated = 0.0
     lots = _lots(len(servos))
     for done, lot in enumerate(lots):
@@ -88,11 +98,11 @@ def run_machines(
             cycles = safe_cycles([servos[i] for i in lot], plan)
             for i, one in zip(lot, cycles, strict=True):
                 first = one[..., 1].reshape(len(rows), -1)
-                channels[i][:, rows] = channels_of_cycles(first, observation.noise[rows])
+                mean[i, rows], variance[i, rows] = readings_of_cycles(first)
             simulated += plan.duration_s * len(lot)
         if progress is not None:
             progress((done + 1) / len(lots))
-    return Draws(tuple(machines), channels, simulated)
+    return Draws(tuple(machines), mean, variance, simulated)
 
 
 def safe_cycles(

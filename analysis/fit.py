@@ -23,6 +23,8 @@ from analysis.executor import Executor
 from analysis.library import run_families
 from analysis.likelihood import Match, match_prediction
 from analysis.observation import Observation
+from analysis.placement import HEAT
+from analysis.reading_noise import likeliest_noise, possible_noises
 from sim.response import START_SPREAD
 from sim.unit import Unit
 
@@ -118,13 +120,15 @@ def fit_posterior(
         )
 
     rng = np.random.default_rng(seed)
-    axes = tuple(axes)
+    axes, possible = tuple(axes), possible_noises(observation)
     scales = np.array([axis.scale for axis in axes])
     wide = _wide_families(axes, _kin(observation), seed)
     draws = runs(wide, 0.0, 0.5, "simulating the range")
+    observation = _heard(possible, axes, draws, scales, seed)
     found = calibrate(observation, _Look(observation, axes, draws, scales).emulator, rng)
     near = _near_families(axes, found, _kin(observation), seed)
     draws = draws.joined(runs(near, 0.5, 0.95, "simulating near the answer"))
+    observation = _heard(possible, axes, draws, 0.6 * scales, seed)
     look = _Look(observation, axes, draws, 0.6 * scales)
     calibrated = calibrate(observation, look.emulator, rng)
     weight = calibrated.density(_grid(axes))
@@ -139,6 +143,24 @@ def fit_posterior(
         look.match(best),
         draws,
     )
+
+
+def _heard(
+    possible: Sequence[Observation],
+    axes: tuple[Axis, ...],
+    draws: Draws,
+    width: NDArray[np.float64],
+    seed: int,
+) -> Observation:
+    """The observation with the reading noise that its best fit makes likeliest."""
+
+    def likelihood(seen: Observation) -> float:
+        look = _Look(seen, axes, draws, width)
+        found = calibrate(seen, look.emulator, np.random.default_rng([seed, 3]))
+        low, high = [axis.low for axis in axes], [axis.high for axis in axes]
+        return look.match(np.clip(found.mean, low, high)).log_likelihood
+
+    return likeliest_noise(possible, likelihood, HEAT)
 
 
 class _Look:
@@ -161,7 +183,7 @@ class _Look:
         self.emulator = Emulator(
             places,
             deviations[:, used],
-            draws.channels,
+            draws.channels(observation),
             observation.blocks,
             width,
             np.array([TOLERANCES[s] for s in symbols]),

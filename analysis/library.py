@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from analysis.ensemble import Draws, Machine, safe_cycles
 from analysis.executor import Executor, LocalExecutor
-from analysis.observation import Observation, channels_of_readings, readings_of_cycles
+from analysis.observation import Observation, readings_of_cycles
 from daq.plan import SweepPlan
 from sim.unit import Unit
 
@@ -74,7 +74,7 @@ def run_families(
     executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Draws:
-    """Draws of families of machines as the bench of an observation would read them.
+    """Draws of families of machines in the sweep of an observation.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def run_families(
         simulated = len(machines) * sum(plan.duration_s for plan, _ in observation.plans)
         if file is not None:
             _write(file, known)
-    return Draws(machines, channels_of_readings(*known, observation.noise), simulated)
+    return Draws(machines, *known, simulated)
 
 
 def _mark(unit: Unit, machines: Sequence[Machine], observation: Observation) -> str:

@@ -18,6 +18,7 @@ from daq.plan import SweepPlan
 
 __all__ = [
     "CHANNELS",
+    "USUAL_NOISE_V",
     "Observation",
     "channels_of_cycles",
     "channels_of_readings",
@@ -33,7 +34,9 @@ SETTLE_CYCLES, INTEGRATE_CYCLES = 20, 30
 """Assumed where a file does not say."""
 
 _QUIET_SHARE = 0.02
-_DEFAULT_NOISE_V = 5e-4
+
+USUAL_NOISE_V = 5e-4
+"""What a bench adds to each component of a reading, where nothing else is known, V."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,6 +69,10 @@ class Observation:
         """Every `stride`-th frequency of each level only."""
         kept = np.concatenate([np.arange(b.start, b.stop)[::stride] for b in self.blocks])
         return self._taking(kept)
+
+    def with_noise(self, noise_v: float) -> Observation:
+        """The same reading with another noise of its own, V."""
+        return replace(self, noise_v=noise_v, noise=self.noise * (noise_v / self.noise_v))
 
     def _taking(self, kept: NDArray[np.int64]) -> Observation:
         plans = []
@@ -155,11 +162,12 @@ def _components(response: FrequencyResponse) -> int:
 def _reading_noise(volts: NDArray[np.float64]) -> float:
     """Noise per component: what the quietest points show, as there the motion repeats.
 
-    `volts` counts both components, as the scatter of a reading does.
+    Where it repeats nowhere that is too much (see `analysis.reading_noise`). `volts`
+    counts both components, as the scatter of a reading does.
     """
     known = volts[np.isfinite(volts) & (volts > 0)]
     if known.size == 0:
-        return _DEFAULT_NOISE_V
+        return USUAL_NOISE_V
     return float(np.quantile(known, _QUIET_SHARE) / np.sqrt(2.0))
 
 

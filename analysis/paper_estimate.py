@@ -118,8 +118,9 @@ def index_curve_of_response(
     if not picked:
         return None
     sweeps = []
+    read = draws.channels(observation)
     for i in picked:
-        channels = draws.channels[i][:, rows]
+        channels = read[i][:, rows]
         sweeps.append(
             FrequencyResponse.from_arrays(
                 observation.frequency_hz[rows],

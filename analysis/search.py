@@ -19,9 +19,10 @@ from analysis.candidate import Candidate, Effects, form_candidates
 from analysis.causes import Hypothesis
 from analysis.holdout import hold_out
 from analysis.observation import Observation
-from analysis.placement import groups_about, groups_along, groups_around
+from analysis.placement import HEAT, groups_about, groups_along, groups_around
 from analysis.population import Group, Population, simulate_groups
 from analysis.progress import Progress, part_of
+from analysis.reading_noise import likeliest_noise, possible_noises
 from analysis.screening import screen_pairs, screen_singles
 from analysis.sizing import size_candidate
 from sim.unit import Unit
@@ -65,6 +66,8 @@ def search_causes(
 ) -> list[Candidate]:
     """Candidates, the most likely first; the baseline is always among them.
 
+    Their surfaces hold the observation with the reading noise that was found along with them.
+
     Parameters
     ----------
     without
@@ -85,21 +88,27 @@ def search_causes(
     rng = np.random.default_rng(seed)
     rough = _Hunt(unit, coarse, rng, part_of(progress, 0.4, 0.6, "narrowing down"))
     rough.start(_singles(coarse, atlas), _FIRST_GROUPS)
+    rough.hear()
     rough.look_closer(_with_baseline(rough.leading(_SECOND)), _SECOND_GROUPS)
+    rough.hear()
     if _is_doubtful(rough.best, rng):
         # A cause with several parameters may only want a closer look.
         rough.settle([rough.best.hypothesis.effects], _LAST_GROUPS)
     doubted = _is_doubtful(rough.best, rng)
     if doubted:
-        rough.start(_pairs(coarse, atlas, rough), _PAIR_GROUPS)
+        rough.start(_pairs(rough.observation, atlas, rough), _PAIR_GROUPS)
+        rough.hear()
     fine = _Hunt(unit, observation, rng, part_of(progress, 0.6, 1.0, "looking closer"))
+    fine.observation = observation.with_noise(rough.observation.noise_v)
     third = _third(rough)
     fine.take_over([rough.found[key] for key in third], _THIRD_GROUPS)
+    fine.hear()
     if not doubted and _is_doubtful(fine.best, rng):
         # All rows show what the thinned ones did not: a single cause will not do after all.
-        rough.start(_pairs(coarse, atlas, rough), _PAIR_GROUPS)
+        rough.start(_pairs(rough.observation, atlas, rough), _PAIR_GROUPS)
         pairs = [key for key in _third(rough) if key not in fine.found]
         fine.take_over([rough.found[key] for key in pairs], _THIRD_GROUPS)
+        fine.hear()
         third += pairs
     if _is_doubtful(fine.best, rng):
         # Parameters trade off in ways that evenly placed runs miss: a second chance.
@@ -113,6 +122,7 @@ def search_causes(
         if () in fine.leading(len(fine.found), behind):
             near.append(())
         fine.settle(list(dict.fromkeys([leader, *_parts(leader, fine.found), *near])), _LAST_GROUPS)
+    fine.hear()
     return sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
 
 
@@ -166,7 +176,8 @@ class _Hunt:
         rng: np.random.Generator,
         progress: Callable[[float], None] | None,
     ) -> None:
-        self._unit, self._observation, self._rng = unit, observation, rng
+        self._unit, self.observation, self._rng = unit, observation, rng
+        self._noises = possible_noises(observation)
         self._progress, self._left = progress, 1.0
         self._runs: dict[Effects, Population] = {}
         self.found: dict[Effects, Candidate] = {}
@@ -212,25 +223,39 @@ class _Hunt:
                 group
                 for c in found
                 for group in groups_around(
-                    c.hypothesis, size_candidate(c, self._observation, self._rng), groups, self._rng
+                    c.hypothesis, size_candidate(c, self.observation, self._rng), groups, self._rng
                 )
             ]
         )
         self._form({key: self.found[key].best.place for key in chosen})
+
+    def hear(self) -> None:
+        """Take the reading for as noisy as the most likely candidate would have it."""
+        best = self.best
+        key = best.hypothesis.effects
+
+        def likelihood(seen: Observation) -> float:
+            starts, runs = {key: best.best.place}, {key: self._runs[key]}
+            return form_candidates(self._unit, seen, runs, starts)[key].best.log_likelihood
+
+        heard = likeliest_noise(self._noises, likelihood, HEAT)
+        if heard.noise_v != self.observation.noise_v:
+            self.observation = heard
+            self._form({effects: c.best.place for effects, c in self.found.items()})
 
     def look_closer(self, chosen: Sequence[Effects], groups: int) -> None:
         """Simulate more of some candidates, along the places that agree."""
         self.take_over([self.found[key] for key in chosen], groups)
 
     def _simulate(self, groups: Sequence[Group]) -> None:
-        made = simulate_groups(self._unit, groups, self._observation, self._rng, self._report())
+        made = simulate_groups(self._unit, groups, self.observation, self._rng, self._report())
         for key, population in made.items():
             known = self._runs.get(key)
             self._runs[key] = population if known is None else known.joined(population)
 
     def _form(self, starts: _Starts) -> None:
         runs = {key: self._runs[key] for key in starts}
-        self.found |= form_candidates(self._unit, self._observation, runs, starts)
+        self.found |= form_candidates(self._unit, self.observation, runs, starts)
 
     def _report(self) -> Callable[[float], None] | None:
         """Half of what is left of the bar, as nobody knows how many rounds are to come."""

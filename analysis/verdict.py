@@ -52,10 +52,11 @@ _UNLIKE = 4.0
 """A fit worse than own runs' by more standard deviations than this is no explanation."""
 
 _UNPREDICTED = 1.5
-"""Nor is one that misses levels not fitted by so many standard deviations, root mean square,"""
+"""Nor is one that misses levels not fitted by so many standard deviations, root mean square."""
 
 _NEVER, _SELDOM = 2.0, 0.03
-"""unless a larger share of its own runs does so, too; with this many even then."""
+"""The baseline may miss as many as the first of these, where a larger share of its own runs than
+the second does so, too: something missing wants better proof than a cause that does not fit."""
 
 _JUDGED = 6
 
@@ -145,8 +146,8 @@ def _is_adequate(
 ) -> bool:
     if misfit > _UNLIKE or held_out.rms_sigma > _NEVER:
         return False
-    if held_out.rms_sigma <= _UNPREDICTED:
-        return True
+    if held_out.rms_sigma <= _UNPREDICTED or candidate.hypothesis.effects:
+        return held_out.rms_sigma <= _UNPREDICTED
     return judge_misses(candidate, held_out, rng) > _SELDOM
 
 

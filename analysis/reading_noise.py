@@ -1,0 +1,57 @@
+"""How noisy the reading itself is, where no point is quiet enough to show it.
+
+Owns which noises are worth trying and how believable each is. Where the motion
+chatters at every point, the quietest of them show more than the reading's own
+noise, and a noise that is taken for too loud hides chatter: a machine with
+less of it then looks right. Simulations decide between the noises that are
+possible; nothing is simulated here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from analysis.observation import USUAL_NOISE_V, Observation
+
+__all__ = ["likeliest_noise", "possible_noises"]
+
+_NEAR = 1.3
+"""Quietest points this close to the usual noise show it, and leave nothing to be tried."""
+
+_NOISES = 6
+_SPREAD = 0.5
+"""One standard deviation of the logarithm of a bench's noise about the usual one."""
+
+
+def possible_noises(observation: Observation) -> Sequence[Observation]:
+    """The observation with every noise worth trying: from the usual one to what it shows itself."""
+    loudest = observation.noise_v
+    if loudest <= _NEAR * USUAL_NOISE_V:
+        return [observation]
+    noises = np.geomspace(USUAL_NOISE_V, loudest, _NOISES)
+    return [observation.with_noise(float(noise)) for noise in noises]
+
+
+def likeliest_noise(
+    observations: Sequence[Observation],
+    log_likelihood: Callable[[Observation], float],
+    heat: float,
+) -> Observation:
+    """The most probable among observations that differ in their noise.
+
+    Parameters
+    ----------
+    log_likelihood
+        Of the best that simulations do with each.
+    heat
+        How many points a likelihood counts for one, as neighbours err together.
+    """
+    if len(observations) == 1:
+        return observations[0]
+    return max(observations, key=lambda seen: log_likelihood(seen) / heat + _log_prior(seen))
+
+
+def _log_prior(observation: Observation) -> float:
+    return -0.5 * float(np.log(observation.noise_v / USUAL_NOISE_V) / _SPREAD) ** 2

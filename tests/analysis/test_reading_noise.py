@@ -1,0 +1,68 @@
+"""The reading's own noise, where the quietest points show it and where they do not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.observation import USUAL_NOISE_V, channels_of_readings, unread
+from analysis.reading_noise import likeliest_noise, possible_noises
+from daq.plan import SweepPlan
+
+ROWS = 40
+PLAN = SweepPlan(tuple(np.linspace(100.0, 180.0, ROWS)), (1.0,))
+HEAT = 15.0
+
+
+def seen(noise_v):
+    return unread(PLAN, noise_v)
+
+
+def test_a_reading_whose_quiet_points_show_the_usual_noise_leaves_nothing_to_try():
+    for noise in (1e-5, USUAL_NOISE_V, 1.2 * USUAL_NOISE_V):
+        observation = seen(noise)
+        assert possible_noises(observation) == [observation]
+        assert likeliest_noise([observation], lambda _: pytest.fail("asked"), HEAT) is observation
+
+
+def test_noises_are_tried_from_the_usual_one_to_what_the_quietest_points_show():
+    noises = [one.noise_v for one in possible_noises(seen(2e-3))]
+    assert noises[0] == pytest.approx(USUAL_NOISE_V)
+    assert noises[-1] == pytest.approx(2e-3)
+    assert noises == sorted(noises)
+
+
+def test_noise_is_relative_to_the_response_whatever_it_is():
+    observation = seen(2e-3)
+    louder = observation.with_noise(4e-3)
+    np.testing.assert_allclose(louder.noise, 2.0 * observation.noise)
+    assert louder.noise_v == 4e-3
+
+
+def scatter_likelihood(chatter_v, read):
+    """Log-likelihood of scatters (rows,) read where the motion itself scatters by so much."""
+
+    def likelihood(observation):
+        variance = np.full((1, ROWS), 2.0 * chatter_v**2)
+        mean = np.ones((1, ROWS), dtype=complex)
+        expected = channels_of_readings(mean, variance, observation.noise)[0, 2]
+        return float(-0.5 * np.sum(((read - expected) / 0.1) ** 2))
+
+    return likelihood
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(("chatter_v", "noise_v"), [(2e-3, 5e-4), (2e-4, 2e-3)])
+def test_noise_and_chatter_are_told_apart_by_what_simulations_show(chatter_v, noise_v, seed):
+    # Both benches read about 2 mV everywhere: one is noisy, the other's motion chatters.
+    rng = np.random.default_rng(seed)
+    read = np.log(np.sqrt(2.0) * np.hypot(chatter_v, noise_v)) + 0.1 * rng.standard_normal(ROWS)
+    shown = replace(seen(1.0), noise_v=2e-3, noise=np.full(ROWS, 2e-3))
+    heard = likeliest_noise(possible_noises(shown), scatter_likelihood(chatter_v, read), HEAT)
+    assert heard.noise_v == pytest.approx(noise_v, rel=0.35)
+
+
+def test_where_chatter_drowns_it_the_noise_is_taken_for_the_usual_one():
+    shown = replace(seen(1.0), noise_v=5e-3, noise=np.full(ROWS, 5e-3))
+    heard = likeliest_noise(possible_noises(shown), lambda _: 0.0, HEAT)
+    assert heard.noise_v == pytest.approx(USUAL_NOISE_V)
