@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.adequacy import judge_adequacy
+from analysis.adequacy import judge_adequacy, judge_chance
 from analysis.atlas import Atlas, coarse_stride, make_atlas
 from analysis.candidate import Candidate, Effects, form_candidates
 from analysis.causes import Hypothesis
@@ -53,6 +53,10 @@ _DOUBT = 2.0
 """Misfit of the best single cause, in standard deviations, from which pairs are tried; and the
 root mean square of what it misses of levels not fitted, in theirs: where few runs of its own fit
 each other the first is blind, and the second is not."""
+
+_COMMON = 0.2
+"""Share of the baseline's own runs that the leader explains better by as much, from which on there
+is nothing to be found, and nothing more is simulated."""
 
 
 def search_causes(
@@ -116,6 +120,8 @@ def search_causes(
         fine.settle(leading[:_CHANCES], _LAST_GROUPS)
     # Whoever is compared with the leader is given as many runs: more runs fit better.
     for most, behind in _LAST_ROUNDS:
+        if _is_nothing_missing(fine, rng):
+            break
         leader, *near = fine.leading(most, behind)
         if behind == _CLOSE and not near:
             break
@@ -149,6 +155,13 @@ def _is_doubtful(candidate: Candidate, rng: np.random.Generator) -> bool:
     if judge_adequacy(candidate, rng).sigma > _DOUBT:
         return True
     return hold_out(candidate, candidate.surface.observation).rms_sigma > _DOUBT
+
+
+def _is_nothing_missing(fine: _Hunt, rng: np.random.Generator) -> bool:
+    baseline = fine.found[()]
+    if _is_doubtful(baseline, rng):
+        return False
+    return fine.best is baseline or judge_chance(baseline, fine.best, rng) > _COMMON
 
 
 def _third(rough: _Hunt) -> list[Effects]:
