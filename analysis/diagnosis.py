@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ from analysis.verdict import Judged, Verdict, judge_candidates
 from daq.errors import AnalysisError
 from daq.frf import FrequencyResponse
 from sim.catalogue import CATALOGUE
+from sim.effort import counting
 from sim.unit import Unit
 
 __all__ = ["Cause", "Diagnosis", "Size", "diagnose_response"]
@@ -59,6 +60,7 @@ class Diagnosis:
     `ratio_baseline`, `ratio_extended`: contribution ratio and its standard
     deviation under the plain and the extended model. `departures`: of the
     measurement from the plain model; `left`: from the extended one.
+    `simulated_s`: seconds of motion that were simulated for it.
     """
 
     unit: str
@@ -71,8 +73,9 @@ class Diagnosis:
     shape: str
     next_measurement: NextMeasurement | None
     observation: Observation
-    warnings: tuple[str, ...]
-    elapsed_s: float
+    warnings: tuple[str, ...] = ()
+    elapsed_s: float = 0.0
+    simulated_s: float = 0.0
 
     @property
     def sites(self) -> tuple[str, ...]:
@@ -133,6 +136,7 @@ class Diagnosis:
             "next_measurement": None if proposal is None else proposal.to_json(),
             "warnings": list(self.warnings),
             "elapsed_s": self.elapsed_s,
+            "simulated_s": self.simulated_s,
         }
 
     def summary(self) -> list[str]:
@@ -170,6 +174,7 @@ class Diagnosis:
                 f"({proposal.expected_sigma:.1f} sigma expected):"
             )
             lines.append(f"    {proposal.command}")
+        lines.append(f"  motion simulated for this: {self.simulated_s:.0f} s")
         lines += [f"  warning: {text}" for text in self.warnings]
         return lines
 
@@ -214,7 +219,24 @@ def diagnose_response(
             "two; estimate tells its backlash"
         )
     started = time.perf_counter()
-    observed = observe(response)
+    with counting() as effort:
+        found = _diagnose(observe(response), unit, without, cache, seed, progress)
+    return replace(
+        found,
+        warnings=_warnings(response, found.observation),
+        elapsed_s=time.perf_counter() - started,
+        simulated_s=effort.simulated_s,
+    )
+
+
+def _diagnose(
+    observed: Observation,
+    unit: Unit,
+    without: Collection[str],
+    cache: Path | None,
+    seed: int,
+    progress: Progress | None,
+) -> Diagnosis:
 
     def early(share: float, text: str) -> None:
         if progress is not None:
@@ -247,8 +269,6 @@ def diagnose_response(
         shape=describe_departures(departures, observation),
         next_measurement=proposal,
         observation=observation,
-        warnings=_warnings(response, observation),
-        elapsed_s=time.perf_counter() - started,
     )
 
 

@@ -23,6 +23,7 @@ from daq.frf import GAIN_STD_COMPONENTS, FrequencyResponse
 from daq.plan import SweepPlan
 from sim.assembly import Law, PiecewiseLinearSystem
 from sim.effects import EffectSetting, drivetrain_with
+from sim.effort import spend
 from sim.engine import HARMONICS, LONGEST_STEP_S, Motion, Stretch, advance
 from sim.reading import PERIODIC_SCATTER, response_of_cycles, scatter_of_cycles
 from sim.unit import Unit
@@ -185,6 +186,7 @@ def simulate_cycles(
     tasks = [(group, share) for group in groups for share in shares]
     with ThreadPoolExecutor(workers) as pool:
         done = list(pool.map(sweep, tasks))
+    spend(len(servos) * plan.duration_s)
     shape = (levels, len(points), plan.integrate_cycles, HARMONICS)
     results = [np.empty(shape, dtype=complex) for _ in servos]
     for (group, share), cycles in zip(tasks, done, strict=True):

@@ -1,0 +1,39 @@
+"""The count of simulated seconds."""
+
+import pytest
+
+from daq.plan import SweepPlan
+from sim.effort import counting, spend
+from sim.response import Servo, simulate_cycles
+from sim.unit import load_unit
+
+
+def test_every_machine_level_point_and_cycle_counts_its_duration():
+    plan = SweepPlan((100.0, 200.0), (1.5, 2.5), settle_cycles=2, integrate_cycles=3)
+    servos = [Servo.of(load_unit("adss"), ratio) for ratio in (0.2, 0.5, 0.8)]
+    with counting() as effort:
+        simulate_cycles(servos, plan)
+    # Three machines at two levels, five cycles at 100 and at 200 Hz.
+    assert effort.simulated_s == pytest.approx(3 * 2 * 5 * (1 / 100.0 + 1 / 200.0))
+
+
+def test_blocks_count_for_themselves_and_for_those_around_them():
+    with counting() as outer:
+        spend(1.0)
+        with counting() as inner:
+            spend(2.0)
+        spend(4.0)
+    spend(8.0)
+    assert (outer.simulated_s, inner.simulated_s) == (7.0, 2.0)
+
+
+def fail(effort):
+    spend(1.0)
+    raise ValueError(f"stop at {effort.simulated_s}")
+
+
+def test_a_block_that_fails_counts_no_further():
+    with pytest.raises(ValueError, match=r"stop at 1\.0"), counting() as effort:
+        fail(effort)
+    spend(2.0)
+    assert effort.simulated_s == 1.0
