@@ -107,18 +107,25 @@ def search_causes(
     third = _third(rough)
     fine.take_over([rough.found[key] for key in third], _THIRD_GROUPS)
     fine.hear()
-    if not doubted and _is_doubtful(fine.best, rng):
-        # All rows show what the thinned ones did not: a single cause will not do after all.
-        rough.start(_pairs(rough.observation, atlas, rough), _PAIR_GROUPS)
-        pairs = [key for key in _third(rough) if key not in fine.found]
-        fine.take_over([rough.found[key] for key in pairs], _THIRD_GROUPS)
-        fine.hear()
-        third += pairs
-    if _is_doubtful(fine.best, rng):
-        # Parameters trade off in ways that evenly placed runs miss: a second chance.
-        leading = [key for key in fine.leading(len(third), _HOPELESS) if key]
-        fine.settle(leading[:_CHANCES], _LAST_GROUPS)
-    # Whoever is compared with the leader is given as many runs: more runs fit better.
+    while True:
+        if not doubted and _is_doubtful(fine.best, rng):
+            # More rows, or more runs, show that a single cause will not do after all.
+            doubted = True
+            rough.start(_pairs(rough.observation, atlas, rough), _PAIR_GROUPS)
+            pairs = [key for key in _third(rough) if key not in fine.found]
+            fine.take_over([rough.found[key] for key in pairs], _THIRD_GROUPS)
+            fine.hear()
+        if _is_doubtful(fine.best, rng):
+            # Parameters trade off in ways that evenly placed runs miss: a second chance.
+            leading = [key for key in fine.leading(len(fine.found), _HOPELESS) if key]
+            fine.settle(leading[:_CHANCES], _LAST_GROUPS)
+        _compare(fine, rng)
+        if doubted or not _is_doubtful(fine.best, rng):
+            return sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
+
+
+def _compare(fine: _Hunt, rng: np.random.Generator) -> None:
+    """Give whoever is compared with the leader as many runs: more runs fit better."""
     for most, behind in _LAST_ROUNDS:
         if _is_nothing_missing(fine, rng):
             break
@@ -129,7 +136,6 @@ def search_causes(
             near.append(())
         fine.settle(list(dict.fromkeys([leader, *_parts(leader, fine.found), *near])), _LAST_GROUPS)
     fine.hear()
-    return sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
 
 
 _Starts = Mapping[Effects, NDArray[np.float64]]

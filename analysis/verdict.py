@@ -51,12 +51,13 @@ everything differ by about as much, as each has runs of its own."""
 _UNLIKE = 4.0
 """A fit worse than own runs' by more standard deviations than this is no explanation."""
 
-_UNPREDICTED = 1.5
-"""Nor is one that misses levels not fitted by so many standard deviations, root mean square."""
+_UNPREDICTED, _NEVER, _SELDOM = 1.5, 2.0, 0.03
+"""Nor is one that misses levels not fitted by so many standard deviations, root mean square; by up
+to the second it may, where a larger share of its own runs than the third does so, too."""
 
-_NEVER, _SELDOM = 2.0, 0.03
-"""The baseline may miss as many as the first of these, where a larger share of its own runs than
-the second does so, too: something missing wants better proof than a cause that does not fit."""
+_WELL_PREDICTED = 1.0
+"""Several causes together can fit nearly anything: where they miss levels not fitted by more than
+this, some of their own runs must do so, too."""
 
 _JUDGED = 6
 
@@ -144,11 +145,13 @@ def judge_candidates(
 def _is_adequate(
     candidate: Candidate, held_out: HeldOut, misfit: float, rng: np.random.Generator
 ) -> bool:
-    if misfit > _UNLIKE or held_out.rms_sigma > _NEVER:
+    several = len(candidate.hypothesis.effects) > 1
+    missed = held_out.rms_sigma
+    if misfit > _UNLIKE or missed > (_UNPREDICTED if several else _NEVER):
         return False
-    if held_out.rms_sigma <= _UNPREDICTED or candidate.hypothesis.effects:
-        return held_out.rms_sigma <= _UNPREDICTED
-    return judge_misses(candidate, held_out, rng) > _SELDOM
+    if missed <= (_WELL_PREDICTED if several else _UNPREDICTED):
+        return True
+    return judge_misses(candidate, held_out, rng) > (0.0 if several else _SELDOM)
 
 
 def _simplest(judged: Sequence[Judged]) -> Judged:
