@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 __all__ = ["Picture", "sweep"]
 
 LEVELS_VPK = (1.5, 2.5, 4.0)
-POINTS = 25
-SETTLE_CYCLES, INTEGRATE_CYCLES = 20, 30
+POINTS = 21
+SETTLE_CYCLES, INTEGRATE_CYCLES = 15, 20
 
 
 class Picture:
