@@ -59,7 +59,7 @@ def residual_figure(diagnosis: Diagnosis) -> Figure:
             if extended is not None:
                 _draw(axes, frequency, extended, channel, block, factor, _EXTENDED, "extended")
     for (_, _, label), axes in zip(_CHANNELS, panels[:, 0], strict=True):
-        axes.set_ylabel(f"measured - predicted, {label}")
+        axes.set_ylabel(f"measured - predicted,\n{label}")
     panels[0, 0].legend(fontsize=8)
     names = " + ".join(cause.effect for cause in diagnosis.causes) or "nothing named"
     figure.suptitle(f"{diagnosis.unit}: {verdict.word}, {names}", fontsize=11)

@@ -109,7 +109,12 @@ def _dress(gain: Axes, phase: Axes, response: FrequencyResponse) -> None:
     # A name is no formula, whatever dollars stand in it.
     gain.set_title(f"{response.unit}{', SIMULATED' if simulated else ''}", parse_math=False)
     gain.set_ylabel("gain V_o/V_i (dB re 1 V/V)")
-    gain.legend(title="source level, V peak", fontsize=8)
+    # Above the curves, of which none has room to spare.
+    handles, labels = gain.get_legend_handles_labels()
+    gain.figure.legend(
+        handles, labels, title="source level, V peak", fontsize=8, loc="outside upper center",
+        ncols=2,
+    )  # fmt: skip
     phase.set_ylabel("phase, wrapped (deg)")
     phase.set_xlabel("frequency (Hz)")
     phase.set_ylim(-190, 190)

@@ -20,7 +20,7 @@ def response(**changes):
 
 
 def legend(figure):
-    return [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
 def test_each_level_is_named_with_its_features():
