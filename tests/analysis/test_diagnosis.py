@@ -82,6 +82,19 @@ def test_a_cause_that_is_taken_out_is_not_blamed_with_confidence_on_another(cach
     assert "filter-corner" not in {e for one in found.verdict.judged for e in one.effects}
 
 
+SEEN_BLAMED = (3, 891144620)
+"""Plain units in which Stribeck friction was named once: it imitates a branch of the motion."""
+SEEN_UNEXPLAINED = (306, 316)
+"""Plain units that were called unexplained once."""
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("seed", (*SEEN_BLAMED, *SEEN_UNEXPLAINED))
+def test_plain_units_that_once_misled_it_are_consistent(seed, cache):
+    found = diagnose_response(response_hiding([], seed), ADSS, cache=cache)
+    assert (found.verdict.word, found.causes) == ("consistent", ())
+
+
 @pytest.mark.study
 def test_two_large_causes_are_named_as_a_pair(cache):
     texts = ["amplifier-lag:tau_a=0.002", "load-inertia:J_L=0.0040"]
