@@ -89,7 +89,7 @@ SEEN_UNEXPLAINED = (306, 316)
 
 
 @pytest.mark.study
-@pytest.mark.parametrize("seed", (*SEEN_BLAMED, *SEEN_UNEXPLAINED))
+@pytest.mark.parametrize("seed", [*SEEN_BLAMED, *SEEN_UNEXPLAINED])
 def test_plain_units_that_once_misled_it_are_consistent(seed, cache):
     found = diagnose_response(response_hiding([], seed), ADSS, cache=cache)
     assert (found.verdict.word, found.causes) == ("consistent", ())
