@@ -51,9 +51,13 @@ everything differ by about as much, as each has runs of its own."""
 _UNLIKE = 4.0
 """A fit worse than own runs' by more standard deviations than this is no explanation."""
 
-_UNPREDICTED, _NEVER, _SELDOM = 1.5, 2.0, 0.03
-"""Nor is one that misses levels not fitted by so many standard deviations, root mean square; by up
-to the second it may, where a larger share of its own runs than the third does so, too."""
+_UNPREDICTED = 1.5
+"""Nor is one that misses levels not fitted by so many standard deviations, root mean square."""
+
+_NEVER, _SELDOM = 2.0, 0.03
+"""The baseline may miss them by as many as the first of these, where a larger share of its own runs
+than the second does so, too: that something is missing wants better proof than that a cause does
+not fit."""
 
 _WELL_PREDICTED = 1.0
 """Several causes together can fit nearly anything: where they miss levels not fitted by more than
@@ -145,13 +149,12 @@ def judge_candidates(
 def _is_adequate(
     candidate: Candidate, held_out: HeldOut, misfit: float, rng: np.random.Generator
 ) -> bool:
-    several = len(candidate.hypothesis.effects) > 1
-    missed = held_out.rms_sigma
-    if misfit > _UNLIKE or missed > (_UNPREDICTED if several else _NEVER):
+    causes, missed = len(candidate.hypothesis.effects), held_out.rms_sigma
+    if misfit > _UNLIKE or missed > (_UNPREDICTED if causes else _NEVER):
         return False
-    if missed <= (_WELL_PREDICTED if several else _UNPREDICTED):
+    if missed <= (_WELL_PREDICTED if causes > 1 else _UNPREDICTED):
         return True
-    return judge_misses(candidate, held_out, rng) > (0.0 if several else _SELDOM)
+    return judge_misses(candidate, held_out, rng) > (0.0 if causes else _SELDOM)
 
 
 def _simplest(judged: Sequence[Judged]) -> Judged:
