@@ -41,7 +41,7 @@ _WITHIN_TOLERANCE = 40.0
 _FALSE_ALARM = 20.0
 """By so much must a cause beat the baseline beyond its costs."""
 
-_BY_CHANCE = 0.05
+_BY_CHANCE = 0.04
 """Share of the baseline's own runs, with nothing hidden, that it may explain better by as much."""
 
 _TIE = 20.0
@@ -134,7 +134,7 @@ def judge_candidates(
     if (
         not best.effects
         or best.score < baseline.score + _FALSE_ALARM
-        or judge_chance(baseline.candidate, best.candidate, rng) > _BY_CHANCE
+        or _may_be_chance(baseline, best, rng)
     ):
         word: Word = "consistent" if baseline.adequate else "unexplained"
         return Verdict(word, baseline, tuple(judged), baseline)
@@ -155,6 +155,13 @@ def _is_adequate(
     if missed <= (_WELL_PREDICTED if causes > 1 else _UNPREDICTED):
         return True
     return judge_misses(candidate, held_out, rng) > (0.0 if causes else _SELDOM)
+
+
+def _may_be_chance(baseline: Judged, best: Judged, rng: np.random.Generator) -> bool:
+    # Own runs say nothing about an observation that is unlike all of them.
+    if baseline.misfit > _UNLIKE:
+        return False
+    return judge_chance(baseline.candidate, best.candidate, rng) > _BY_CHANCE
 
 
 def _simplest(judged: Sequence[Judged]) -> Judged:
