@@ -68,7 +68,7 @@ def test_nothing_is_blamed_where_nothing_is_hidden(cache):
     seed = int(np.random.SeedSequence().entropy % 2**31)
     print(f"seed {seed}")
     found = diagnose_response(response_hiding([], seed), ADSS, cache=cache)
-    # About one plain unit in forty, at a ratio near 0, is called unexplained after so short a sweep.
+    # About one plain unit in forty, at a ratio near 0, is called unexplained by so short a sweep.
     assert found.verdict.word in ("consistent", "unexplained")
     assert found.causes == ()
     assert found.next_measurement is None
