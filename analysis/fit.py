@@ -23,7 +23,6 @@ from analysis.executor import Executor
 from analysis.library import run_families
 from analysis.likelihood import Match, match_prediction
 from analysis.observation import Observation
-from analysis.placement import HEAT
 from analysis.reading_noise import likeliest_noise, possible_noises
 from sim.response import START_SPREAD
 from sim.unit import Unit
@@ -160,7 +159,7 @@ def _heard(
         low, high = [axis.low for axis in axes], [axis.high for axis in axes]
         return look.match(np.clip(found.mean, low, high)).log_likelihood
 
-    return likeliest_noise(possible, likelihood, HEAT)
+    return likeliest_noise(possible, likelihood)
 
 
 class _Look:

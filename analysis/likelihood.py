@@ -19,7 +19,10 @@ from numpy.typing import NDArray
 from analysis.emulator import TAIL_FREEDOM, Prediction
 from analysis.observation import Observation
 
-__all__ = ["Match", "match_prediction"]
+__all__ = ["HEAT", "Match", "match_prediction"]
+
+HEAT = 15.0
+"""Neighbouring points of a sweep err together: a likelihood counts about so many for one."""
 
 _ITERATIONS = 12
 

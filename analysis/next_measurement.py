@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.candidate import Candidate
+from analysis.likelihood import HEAT
 from analysis.observation import Observation, channels_of_readings, unread
-from analysis.placement import HEAT, groups_along
+from analysis.placement import groups_along
 from analysis.population import Population, simulate_groups
 from daq.plan import SweepPlan, spaced_frequencies
 from sim.unit import Unit

@@ -13,10 +13,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.likelihood import HEAT
 from analysis.next_measurement import NextMeasurement
 from analysis.paper_belief import Judged
 from analysis.paper_sweeps import LONGEST_STEP_S, Reading
-from analysis.placement import HEAT
 from daq.plan import SweepPlan, spaced_frequencies
 from sim.paper_scheme import PAPER_LEVEL_VPK
 from sim.response import simulate_cycles

@@ -14,12 +14,10 @@ from numpy.typing import NDArray
 from analysis.calibration import Calibrated
 from analysis.candidate import Candidate
 from analysis.causes import Hypothesis
+from analysis.likelihood import HEAT
 from analysis.population import Group
 
-__all__ = ["HEAT", "groups_about", "groups_along", "groups_around"]
-
-HEAT = 15.0
-"""Neighbouring points of a sweep err together: a likelihood counts about so many for one."""
+__all__ = ["groups_about", "groups_along", "groups_around"]
 
 _RATIOS = 10
 """Machines in a group; a second five cost a fifth more time than the first."""

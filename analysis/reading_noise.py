@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from analysis.likelihood import HEAT
 from analysis.observation import USUAL_NOISE_V, Observation
 
 __all__ = ["likeliest_noise", "possible_noises"]
@@ -37,7 +38,6 @@ def possible_noises(observation: Observation) -> Sequence[Observation]:
 def likeliest_noise(
     observations: Sequence[Observation],
     log_likelihood: Callable[[Observation], float],
-    heat: float,
 ) -> Observation:
     """The most probable among observations that differ in their noise.
 
@@ -45,12 +45,10 @@ def likeliest_noise(
     ----------
     log_likelihood
         Of the best that simulations do with each.
-    heat
-        How many points a likelihood counts for one, as neighbours err together.
     """
     if len(observations) == 1:
         return observations[0]
-    return max(observations, key=lambda seen: log_likelihood(seen) / heat + _log_prior(seen))
+    return max(observations, key=lambda seen: log_likelihood(seen) / HEAT + _log_prior(seen))
 
 
 def _log_prior(observation: Observation) -> float:

@@ -19,7 +19,7 @@ from analysis.candidate import Candidate, Effects, form_candidates
 from analysis.causes import Hypothesis
 from analysis.holdout import hold_out
 from analysis.observation import Observation
-from analysis.placement import HEAT, groups_about, groups_along, groups_around
+from analysis.placement import groups_about, groups_along, groups_around
 from analysis.population import Group, Population, simulate_groups
 from analysis.progress import Progress, part_of
 from analysis.reading_noise import likeliest_noise, possible_noises
@@ -102,8 +102,13 @@ def search_causes(
     if doubted:
         rough.start(_pairs(rough.observation, atlas, rough), _PAIR_GROUPS)
         rough.hear()
-    fine = _Hunt(unit, observation, rng, part_of(progress, 0.6, 1.0, "looking closer"))
-    fine.observation = observation.with_noise(rough.observation.noise_v)
+    fine = _Hunt(
+        unit,
+        observation,
+        rng,
+        part_of(progress, 0.6, 1.0, "looking closer"),
+        rough.observation.noise_v,
+    )
     third = _third(rough)
     fine.take_over([rough.found[key] for key in third], _THIRD_GROUPS)
     fine.hear()
@@ -194,8 +199,10 @@ class _Hunt:
         observation: Observation,
         rng: np.random.Generator,
         progress: Callable[[float], None] | None,
+        noise_v: float | None = None,
     ) -> None:
-        self._unit, self.observation, self._rng = unit, observation, rng
+        heard = observation if noise_v is None else observation.with_noise(noise_v)
+        self._unit, self.observation, self._rng = unit, heard, rng
         self._noises = possible_noises(observation)
         self._progress, self._left = progress, 1.0
         self._runs: dict[Effects, Population] = {}
@@ -257,7 +264,7 @@ class _Hunt:
             starts, runs = {key: best.best.place}, {key: self._runs[key]}
             return form_candidates(self._unit, seen, runs, starts)[key].best.log_likelihood
 
-        heard = likeliest_noise(self._noises, likelihood, HEAT)
+        heard = likeliest_noise(self._noises, likelihood)
         if heard.noise_v != self.observation.noise_v:
             self.observation = heard
             self._form({effects: c.best.place for effects, c in self.found.items()})

@@ -15,8 +15,8 @@ import numpy as np
 from analysis.adequacy import judge_adequacy, judge_chance, judge_misses
 from analysis.candidate import Candidate
 from analysis.holdout import HeldOut, hold_out
+from analysis.likelihood import HEAT
 from analysis.observation import Observation
-from analysis.placement import HEAT
 
 __all__ = ["Judged", "Verdict", "judge_candidates"]
 

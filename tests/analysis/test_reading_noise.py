@@ -11,7 +11,6 @@ from daq.plan import SweepPlan
 
 ROWS = 40
 PLAN = SweepPlan(tuple(np.linspace(100.0, 180.0, ROWS)), (1.0,))
-HEAT = 15.0
 
 
 def seen(noise_v):
@@ -22,7 +21,7 @@ def test_a_reading_whose_quiet_points_show_the_usual_noise_leaves_nothing_to_try
     for noise in (1e-5, USUAL_NOISE_V, 1.2 * USUAL_NOISE_V):
         observation = seen(noise)
         assert possible_noises(observation) == [observation]
-        assert likeliest_noise([observation], lambda _: pytest.fail("asked"), HEAT) is observation
+        assert likeliest_noise([observation], lambda _: pytest.fail("asked")) is observation
 
 
 def test_noises_are_tried_from_the_usual_one_to_what_the_quietest_points_show():
@@ -58,11 +57,11 @@ def test_noise_and_chatter_are_told_apart_by_what_simulations_show(chatter_v, no
     rng = np.random.default_rng(seed)
     read = np.log(np.sqrt(2.0) * np.hypot(chatter_v, noise_v)) + 0.1 * rng.standard_normal(ROWS)
     shown = replace(seen(1.0), noise_v=2e-3, noise=np.full(ROWS, 2e-3))
-    heard = likeliest_noise(possible_noises(shown), scatter_likelihood(chatter_v, read), HEAT)
+    heard = likeliest_noise(possible_noises(shown), scatter_likelihood(chatter_v, read))
     assert heard.noise_v == pytest.approx(noise_v, rel=0.35)
 
 
 def test_where_chatter_drowns_it_the_noise_is_taken_for_the_usual_one():
     shown = replace(seen(1.0), noise_v=5e-3, noise=np.full(ROWS, 5e-3))
-    heard = likeliest_noise(possible_noises(shown), lambda _: 0.0, HEAT)
+    heard = likeliest_noise(possible_noises(shown), lambda _: 0.0)
     assert heard.noise_v == pytest.approx(USUAL_NOISE_V)

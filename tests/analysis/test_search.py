@@ -97,7 +97,7 @@ def test_what_is_left_out_of_the_catalogue_is_not_looked_at(runs):
     assert verdict.word == "unexplained"
 
 
-def test_every_candidate_is_held_against_the_same_noise(runs, monkeypatch):
+def test_every_candidate_is_held_against_the_same_noise(runs):
     rng = np.random.default_rng(6)
     observed = synthetic.observation(read(("load-inertia",), np.array([0.4, 0.8]), rng))
     loud = observed.with_noise(4.0 * USUAL_NOISE_V)
