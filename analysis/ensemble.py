@@ -6,19 +6,19 @@ a bench would have read from each. Every draw is one run, as a measurement is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.observation import Observation, channels_of_readings, readings_of_cycles
+from analysis.observation import Observation, channels_of_readings
 from daq.plan import SweepPlan
 from sim.effects import EffectSetting
 from sim.response import START_SPREAD, Servo, simulate_cycles
 from sim.unit import Unit
 
-__all__ = ["TOLERANCES", "Draws", "Machine", "run_machines", "safe_cycles"]
+__all__ = ["TOLERANCES", "Draws", "Machine", "safe_cycles"]
 
 TOLERANCES = {"R_m": 0.005, "k_t": 0.005, "J_L": 0.005, "k_s1": 0.005, "k_a": 0.005, "k_ts": 0.005}
 """One standard deviation of the unit-to-unit spread of datasheet values, as a share."""
@@ -75,36 +75,6 @@ class Draws:
         )
 
 
-def run_machines(
-    unit: Unit,
-    machines: Sequence[Machine],
-    observation: Observation,
-    progress: Callable[[float], None] | None = None,
-) -> Draws:
-    """Take machines through the sweeps of an observation.
-
-    Raises
-    ------
-    AnalysisError
-        If a motion grew without bound.
-    """
-    servos = [machine.servo(unit) for machine in machines]
-    mean = np.empty((len(servos), len(observation)), dtype=complex)
-    variance = np.empty((len(servos), len(observation)))
-    simulated = 0.0
-    lots = _lots(len(servos))
-    for done, lot in enumerate(lots):
-        for plan, rows in observation.plans:
-            cycles = safe_cycles([servos[i] for i in lot], plan)
-            for i, one in zip(lot, cycles, strict=True):
-                first = one[..., 1].reshape(len(rows), -1)
-                mean[i, rows], variance[i, rows] = readings_of_cycles(first)
-            simulated += plan.duration_s * len(lot)
-        if progress is not None:
-            progress((done + 1) / len(lots))
-    return Draws(tuple(machines), mean, variance, simulated)
-
-
 def safe_cycles(
     servos: Sequence[Servo], plan: SweepPlan, workers: int | None = None
 ) -> list[NDArray[np.complex128]]:
@@ -124,10 +94,4 @@ def safe_cycles(
     )
 
 
-def _lots(count: int) -> list[range]:
-    """Ranges small enough that their cycles fit in memory and progress can be seen."""
-    return [range(start, min(start + _LOT, count)) for start in range(0, count, _LOT)]
-
-
-_LOT = 128
 _STEPS_S = (1e-5, 5e-6, 2.5e-6)

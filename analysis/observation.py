@@ -20,7 +20,6 @@ __all__ = [
     "CHANNELS",
     "USUAL_NOISE_V",
     "Observation",
-    "channels_of_cycles",
     "channels_of_readings",
     "observe",
     "readings_of_cycles",
@@ -193,27 +192,6 @@ def _plans(
         )
         for grid, levels in grids.items()
     )
-
-
-def channels_of_cycles(
-    coefficients: NDArray[np.complex128], noise: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Channels of a simulated sweep, as a bench with this reading noise would see them.
-
-    Parameters
-    ----------
-    coefficients
-        (..., rows, cycles): V_o/V_i cycle by cycle.
-    noise
-        (rows,): relative noise per component of the reading, added to the scatter.
-
-    Returns
-    -------
-    ndarray
-        (..., 3, rows). The scatter counts both components, as a reading that
-        is not turned into its own direction shows it.
-    """
-    return channels_of_readings(*readings_of_cycles(coefficients), noise)
 
 
 def readings_of_cycles(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.observation import channels_of_cycles, observe
+from analysis.observation import channels_of_readings, observe, readings_of_cycles
 from daq.errors import AnalysisError
 from daq.frf import DB_PER_NEPER, FrequencyResponse, PointFlag
 
@@ -99,7 +99,8 @@ def test_simulated_channels_show_mean_scatter_and_noise():
     noise = np.array([0.01, 0.02])
     cycles = 4000
     spread = rng.standard_normal((2, cycles)) + 1j * rng.standard_normal((2, cycles))
-    channels = channels_of_cycles(truth[:, None] * (1 + 0.3 * spread), noise)
+    readings = readings_of_cycles(truth[:, None] * (1 + 0.3 * spread))
+    channels = channels_of_readings(*readings, noise)
     np.testing.assert_allclose(channels[0], np.log(np.abs(truth)), atol=0.02)
     np.testing.assert_allclose(channels[1], np.angle(truth), atol=0.02)
     expected = np.sqrt(2 * 0.3**2 / cycles + 2 * noise**2)
