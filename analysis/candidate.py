@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.branches import find_motions
 from analysis.causes import Hypothesis
 from analysis.ensemble import TOLERANCES
 from analysis.observation import Observation
@@ -74,6 +75,7 @@ def _surface(observation: Observation, population: Population, hypothesis: Hypot
         width,
         none,
         np.empty(0),
+        find_motions(observation, population),
     )
 
 
@@ -95,31 +97,46 @@ def _pooled_slopes(
     their slopes.
     """
     k, shape = len(DEVIATING), (3, len(observation))
-    normal = np.zeros((k, k, *shape))
-    right = np.zeros((k, *shape))
+    normal = np.zeros((*shape, k, k))
+    right = np.zeros((*shape, k))
     for key, population in fine.items():
-        places = population.places
+        places, surface = population.places, surfaces[key]
         offset = (places - np.median(places, axis=0)) / np.maximum(np.ptp(places, axis=0), 1e-6)
         basis = np.column_stack([np.ones(len(places)), offset, offset[:, :1] ** 2])
-        values = np.nan_to_num(surfaces[key].difference.reshape(len(places), -1))
-        weight = _robust(values)
-        left, inside = _residual(basis, values), _residual(basis, population.deviations)
-        left = left.reshape(len(places), *shape)
-        trust = weight.reshape(left.shape)
-        normal += np.einsum("ni,nj,ncr->ijcr", inside, inside, trust)
-        right += np.einsum("ni,ncr,ncr->icr", inside, left, trust)
+        values = np.nan_to_num(surface.difference)
+        # Runs in another state of motion follow deviations in another way.
+        trust = _robust(values) * surface.alike[:, None]
+        inside, seen = _apart(basis, population.deviations, values, trust)
+        normal += inside
+        right += seen
     # A slope of one is what a gain does; hundreds are not believed without evidence.
-    ridge = np.zeros_like(normal)
-    for i in range(k):
-        ridge[i, i] = 1.0 / 30.0**2
-    solved = np.linalg.solve(
-        np.moveaxis(normal + ridge, (0, 1), (-2, -1)), np.moveaxis(right, 0, -1)[..., None]
+    ridge = np.eye(k) / 30.0**2
+    solved = np.linalg.solve(normal + ridge, right[..., None])[..., 0]
+    return np.asarray(np.moveaxis(solved, -1, 0), dtype=float)
+
+
+def _apart(
+    basis: NDArray[np.float64],
+    deviations: NDArray[np.float64],
+    values: NDArray[np.float64],
+    trust: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Normal matrices (3, rows, k, k) and right sides of deviations, what places do taken out."""
+    p = basis.shape[1]
+    both = np.column_stack([basis, deviations])
+    products = (both[:, :, None] * both[:, None, :]).reshape(len(both), -1)
+    flat = trust.reshape(len(trust), -1)
+    whole = (products.T @ flat).T.reshape(*trust.shape[1:], both.shape[1], both.shape[1])
+    right = (both.T @ (flat * values.reshape(flat.shape))).T.reshape(*trust.shape[1:], -1)
+    placed = (
+        whole[..., :p, :p]
+        + 1e-9 * np.eye(p) * np.trace(whole[..., :p, :p], axis1=-2, axis2=-1)[..., None, None]
     )
-    return np.asarray(np.moveaxis(solved[..., 0], -1, 0), dtype=float)
-
-
-def _residual(basis: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
-    return values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
+    across = np.swapaxes(np.linalg.solve(placed, whole[..., :p, p:]), -1, -2)
+    return (
+        whole[..., p:, p:] - across @ whole[..., :p, p:],
+        right[..., p:] - (across @ right[..., :p, None])[..., 0],
+    )
 
 
 def _robust(values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -28,16 +28,19 @@ class OwnRun:
 
     `place` (d,): where it was made. `alone`: the hypothesis's surface without
     the group that shares the run's deviations. `as_read` (3, rows): the run
-    with reading noise, minus the true observation.
+    with reading noise, minus the true observation; `quiet` (rows,): its state.
     """
 
     place: NDArray[np.float64]
     alone: Surface
     as_read: NDArray[np.float64]
+    quiet: NDArray[np.bool_]
 
     def seen_by(self, surface: Surface) -> Surface:
         """Another hypothesis's surface, relative to this run instead of the observation."""
-        return replace(surface, difference=_wrapped(surface.difference - self.as_read))
+        motions = surface.motions.against(self.quiet)
+        difference = _wrapped(surface.difference - self.as_read)
+        return replace(surface, difference=difference, motions=motions)
 
 
 def own_runs(candidate: Candidate, rng: np.random.Generator) -> Iterator[OwnRun]:
@@ -53,8 +56,10 @@ def own_runs(candidate: Candidate, rng: np.random.Generator) -> Iterator[OwnRun]
         as_read = surface.difference[i].copy()
         as_read[:2] += rng.standard_normal((2, len(noise))) * noise
         moved = _wrapped(surface.difference[others] - as_read)
-        alone = replace(surface, places=surface.places[others], difference=moved)
-        yield OwnRun(surface.places[i], alone, as_read)
+        quiet = surface.motions.quiet[i]
+        motions = surface.motions.of(others).against(quiet)
+        alone = replace(surface, places=surface.places[others], difference=moved, motions=motions)
+        yield OwnRun(surface.places[i], alone, as_read, quiet)
 
 
 def _wrapped(difference: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.atlas import Atlas
+from analysis.branches import Motions
 from analysis.candidate import Candidate, Effects
 from analysis.observation import Observation
 from analysis.population import Population
@@ -75,7 +76,10 @@ _Expected = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
 def _about_best(candidate: Candidate) -> list[_Expected]:
     """Places about a candidate's best one, with the mean and the scatter expected there."""
-    best, surface = candidate.best.place, replace(candidate.surface, tailed=False)
+    best = candidate.best.place
+    # The atlas, which is laid over it, is too thin to tell states of motion apart.
+    nothing = Motions.unknown(*candidate.surface.difference.shape[::2])
+    surface = replace(candidate.surface, tailed=False, motions=nothing)
     places = [
         np.array([ratio, *np.clip(best[1:] + step, 0.0, 1.0)])
         for ratio in np.unique(np.clip(best[0] + _PAIR_RATIOS, 0.0, 1.0))
@@ -119,7 +123,10 @@ def _surface(coarse: Observation, population: Population) -> Surface:
     width = np.array(_WIDTHS[population.places.shape[1]])
     none = np.empty((0, 3, len(coarse)))
     difference = differences(coarse, population)
-    return Surface(coarse, population.places, difference, width, none, np.empty(0), tailed=False)
+    nothing = Motions.unknown(*difference.shape[::2])
+    return Surface(
+        coarse, population.places, difference, width, none, np.empty(0), nothing, tailed=False
+    )
 
 
 def _grid(d: int, ratios: int | None = None) -> NDArray[np.float64]:

@@ -16,13 +16,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.branches import Motions
 from analysis.emulator import GAIN_TOLERANCE
 from analysis.observation import Observation
 from analysis.population import Population
 
 __all__ = ["Fit", "Surface", "differences"]
 
-_WIDENINGS = 1.3 ** np.arange(9)
+_WIDENINGS: NDArray[np.float64] = 1.3 ** np.arange(9, dtype=np.float64)
 _SPARE = 2.0
 _CURVATURE = 0.3
 """Ridge of the slopes, in units of the kernel's reach: few runs must not make a wild slope."""
@@ -37,6 +38,9 @@ _ITERATIONS = 6
 
 _STRIDES = (0.5, 0.25, 0.12, 0.06)
 """Reach of the random steps of a climb, as shares of what was simulated."""
+
+_UNALIKE = 1e-4
+"""Weight of runs in another state of motion: they count only where there are no others."""
 
 _TAIL = 4.0
 """Degrees of freedom of Student's t, whose variance is _TAIL / (_TAIL - 2) of its scale squared."""
@@ -91,6 +95,8 @@ class Surface:
         (k,): prior standard deviations of the deviations.
     quadratic
         Whether the regression bends along each coordinate.
+    motions
+        States of the runs and of the observation: where they differ a run tells nothing.
     tailed
         Whether scatter is fitted as Student's t (slower) or as a mean square.
     """
@@ -101,6 +107,7 @@ class Surface:
     width: NDArray[np.float64]
     slopes: NDArray[np.float64]
     sigmas: NDArray[np.float64]
+    motions: Motions
     quadratic: bool = False
     tailed: bool = True
 
@@ -110,28 +117,63 @@ class Surface:
 
     def expected(self, place: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
         """Mean difference (3, rows) of runs at a place, and the scatter of a single run there."""
-        offset, weight, near = self._neighbours(place)
+        offset = (self.places - place) / self.width
+        weights = self._weights(offset)
+        shape = self.difference.shape[1:]
+        mean, variance = np.empty(shape), np.empty(shape)
+        mixed = self.motions.mixed
+        if not mixed.all():
+            pick = self._reach(weights.sum(axis=1))
+            found = self._regress(offset, weights[pick][:, None], _WIDENINGS[[pick]], ~mixed)
+            mean[:, ~mixed], variance[:, ~mixed] = found
+        if mixed.any():
+            alike = self.alike[:, mixed]
+            picks = self._reach(weights @ alike)
+            weight = weights[picks].T * alike
+            mean[:, mixed], variance[:, mixed] = self._regress(
+                offset, weight, _WIDENINGS[picks], mixed
+            )
+        variance = variance @ self._blur
+        return mean + self._unread, np.sqrt(variance + self._least)
+
+    def _regress(
+        self,
+        offset: NDArray[np.float64],
+        weight: NDArray[np.float64],
+        reach: NDArray[np.float64],
+        rows: NDArray[np.bool_],
+    ) -> tuple[NDArray, NDArray]:
+        """Value and variance (3, some rows) at offset 0, with weights (n, 1 or some rows)."""
+        near = weight.max(axis=1) > 0.0
+        weight, offset = weight[near], offset[near]
+        values = self._values[near][:, :, rows]
         columns = [np.ones(len(offset)), *offset.T]
         if self.quadratic:
             columns += list((offset**2).T)
         basis = np.column_stack(columns)
-        flat = self._flat[near]
-        ridge = np.diag([1e-9] + [_CURVATURE] * (basis.shape[1] - 1))
-        weighted = basis * weight[:, None]
-        hat = np.linalg.solve(basis.T @ weighted + ridge, weighted.T)
-        coefficients = hat @ flat
-        used = float(np.einsum("ij,ji->", hat, basis * weight[:, None]))
-        total = float(weight.sum())
-        squares = (flat - basis @ coefficients) ** 2
-        variance = weight @ squares / total
+        terms = basis.shape[1]
+        products = (basis[:, :, None] * basis[:, None, :]).reshape(len(basis), -1)
+        normal = (products.T @ weight).T.reshape(-1, terms, terms)
+        ridge = np.zeros((len(reach), terms))
+        ridge[:, 0] = 1e-9
+        # The ridge is for slopes in units of the kernel's reach.
+        ridge[:, 1:] = _CURVATURE * reach[:, None] ** 2
+        hat = np.linalg.solve(normal + ridge[:, :, None] * np.eye(terms), basis.T[None])
+        hat = hat * weight.T[:, None]
+        coefficients = np.einsum(
+            "rpn,ncr->pcr", np.broadcast_to(hat, (values.shape[2], *hat.shape[1:])), values
+        )
+        total = weight.sum(axis=0)
+        used = np.einsum("rpn,np,nr->r", hat, basis, weight)
+        squares = (values - np.einsum("np,pcr->ncr", basis, coefficients)) ** 2
+        w = weight[:, None]
+        variance = (w * squares).sum(axis=0) / total
         for _ in range(_TAIL_ITERATIONS if self.tailed else 0):
             # The scale of Student's t, which a few runs far out do not blow up.
             trust = (_TAIL + 1.0) / (_TAIL + squares / (_SCALE**2 * variance + 1e-12))
-            variance = weight @ (trust * squares) / (_SCALE**2 * total)
-        variance *= total / max(total - used, 0.3 * total)
-        shape = self.difference.shape[1:]
-        variance = variance.reshape(shape) @ self._blur * (1.0 + float(hat[0] @ hat[0]))
-        return coefficients[0].reshape(shape) + self._unread, np.sqrt(variance + self._least)
+            variance = (w * trust * squares).sum(axis=0) / (_SCALE**2 * total)
+        variance *= total / np.maximum(total - used, 0.3 * total)
+        return coefficients[0], variance * (1.0 + (hat[:, 0] ** 2).sum(axis=1))
 
     def fit(self, place: NDArray[np.float64], rows: NDArray[np.bool_] | None = None) -> Fit:
         """Agreement at a place, deviations fitted to some rows (all where None)."""
@@ -152,6 +194,7 @@ class Surface:
             best = np.linalg.solve(normal, (slope * trust) @ y)
         residual = -mean - np.tensordot(best, slopes, axes=1)
         density = self.log_density(-residual, std)
+        density[2] += self._log_shares(place)
         _, log_det = np.linalg.slogdet(normal @ np.diag(sigmas**2))
         prior = -0.5 * float(np.sum((best / sigmas) ** 2)) - 0.5 * float(log_det)
         total = float(density[seen].sum()) + prior
@@ -183,18 +226,27 @@ class Surface:
         tail = -0.5 * (_TAIL + 1.0) * np.log1p((mean / scale) ** 2 / _TAIL)
         return np.where(np.isfinite(mean), tail - np.log(scale), 0.0)
 
-    def _neighbours(
-        self, place: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-        """Offsets and weights of runs within reach; the reach grows until they suffice."""
+    def _log_shares(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Of runs near a place that do as was observed, row by row."""
+        weights = self._weights((self.places - place) / self.width)
+        return self.motions.log_shares(weights[self._reach(weights.sum(axis=1))])
+
+    def _weights(self, offset: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Weights (reaches, n) of runs for every reach that may be needed."""
+        squares = np.sum(offset**2, axis=1) / _WIDENINGS[:, None] ** 2
+        return np.asarray(np.clip(1.0 - squares / 4.0, 0.0, None) ** 2)
+
+    def _reach(self, totals: NDArray[np.float64]) -> NDArray[np.intp]:
+        """The first reach whose weights (reaches, ...) suffice, or the last."""
         needed = (2 if self.quadratic else 1) * len(self.width) + 1 + _SPARE
-        for widening in _WIDENINGS:
-            offset = (self.places - place) / (self.width * widening)
-            weight = np.clip(1.0 - np.sum(offset**2, axis=1) / 4.0, 0.0, None) ** 2
-            if weight.sum() >= needed:
-                break
-        near = weight > 0.0
-        return offset[near], weight[near], near
+        enough = totals >= needed
+        enough[-1] = True
+        return np.argmax(enough, axis=0)
+
+    @cached_property
+    def alike(self) -> NDArray[np.float64]:
+        """(n, rows): 1 where a run does as was observed, else next to nothing."""
+        return np.maximum(self.motions.alike, _UNALIKE)
 
     @cached_property
     def _blur(self) -> NDArray[np.float64]:
@@ -219,6 +271,6 @@ class Surface:
         return np.stack([noise**2, noise**2, 0.0 * noise]) + _FLOOR[:, None] ** 2
 
     @cached_property
-    def _flat(self) -> NDArray[np.float64]:
-        """(n, 3 rows): the differences, 0 where nothing was observed."""
-        return np.nan_to_num(self.difference.reshape(len(self.places), -1))
+    def _values(self) -> NDArray[np.float64]:
+        """(n, 3, rows): the differences, 0 where nothing was observed."""
+        return np.nan_to_num(self.difference)

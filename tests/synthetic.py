@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from analysis.branches import Motions
 from analysis.candidate import Candidate
 from analysis.causes import Hypothesis
 from analysis.observation import Observation
@@ -80,7 +81,8 @@ def candidate(seen: Observation, effects: tuple[str, ...] = (), seed: int = 0, g
     places, deviations, runs = np.array(places), np.array(deviations), np.array(runs)
     difference = runs - seen.values - np.tensordot(deviations, DEVIATION_SLOPES, axes=1)
     width = np.array([0.4] + [0.4] * (hypothesis.d - 1))
-    surface = Surface(seen, places, difference, width, DEVIATION_SLOPES, SIGMAS)
+    motions = Motions.unknown(len(places), ROWS)
+    surface = Surface(seen, places, difference, width, DEVIATION_SLOPES, SIGMAS, motions)
     nothing = np.zeros((len(places), ROWS))
     population = Population(places, deviations, nothing + 1.0 + 0j, nothing)
     return Candidate(hypothesis, population, surface, surface.climb(places.mean(axis=0)))
