@@ -193,6 +193,34 @@ def test_cubic_spring_swings_with_the_period_of_duffing():
     assert abs(w) < 2e-2 * amplitude * math.sqrt(k / J)
 
 
+def test_two_hardening_springs_on_a_tiny_inertia_follow_their_equations():
+    # As in the middle of a hardening shaft: a force on the tiny inertia moves both springs at once.
+    k, h, tiny = 100.0, 2000.0, J / 500.0
+    assembly = Assembly()
+    Inertia("q", J).enter(assembly)
+    Inertia("m", tiny).enter(assembly)
+    for name, along in (("a", {"q": 1.0, "m": -1.0}), ("b", {"m": 1.0})):
+        Spring(along, k).enter(assembly)
+        HardeningSpring(name, along, k, h).enter(assembly)
+    system = assembly.build(output={"q": 1.0})
+
+    def rates(t, x):
+        one, other = (k * y * (1.0 + h * y * y) for y in (x[0] - x[1], x[1]))
+        return [x[2], x[3], -one / J, (one - other) / tiny]
+
+    time = 3e-3
+    start = [0.06, 0.03, 0.0, 0.0]
+    exact = solve_ivp(rates, (0.0, time), start, method="DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
+    errors = []
+    for step_s in (2e-6, 1e-6):
+        start_state = rows_of(system, q=start[0], m=start[1])
+        _, state = drive(system, start_state, 1.0 / time, 1, step_s=step_s)
+        found = at(system, state, "q", "m", "q'")
+        errors.append(np.max(np.abs(found - exact[:3]) / [0.06, 0.03, 60.0]))
+    assert errors[1] < 3e-4
+    assert errors[0] > 3.0 * errors[1]
+
+
 def test_viscous_damping_decays_exactly():
     c = 4e-4
     system = system_of(Damper({"q": 1.0}, c))
