@@ -40,7 +40,7 @@ _RATIOS = 10
 
 _BASELINE_GROUPS, _SIZES = 3, 6
 _COSTLY = {"shaft-hardening": 3}
-"""Groups of effects whose laws take several times the work."""
+"""Groups of effects whose laws take twice the work."""
 
 _LEAST_FREQUENCIES = 20
 
