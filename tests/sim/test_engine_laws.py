@@ -193,31 +193,36 @@ def test_cubic_spring_swings_with_the_period_of_duffing():
     assert abs(w) < 2e-2 * amplitude * math.sqrt(k / J)
 
 
-def test_two_hardening_springs_on_a_tiny_inertia_follow_their_equations():
-    # As in the middle of a hardening shaft: a force on the tiny inertia moves both springs at once.
+@pytest.mark.parametrize("tinies", [1, 2])
+def test_hardening_springs_with_tiny_inertias_between_follow_their_equations(tinies):
+    # As in the middle of a hardening shaft: a force on a tiny inertia moves both its springs.
     k, h, tiny = 100.0, 2000.0, J / 500.0
+    names = ["q", "m", "n"][: tinies + 1]
+    inertias = np.array([J, *[tiny] * tinies])
     assembly = Assembly()
-    Inertia("q", J).enter(assembly)
-    Inertia("m", tiny).enter(assembly)
-    for name, along in (("a", {"q": 1.0, "m": -1.0}), ("b", {"m": 1.0})):
+    for name, inertia in zip(names, inertias, strict=True):
+        Inertia(name, float(inertia)).enter(assembly)
+    for name, beyond in zip(names, [*names[1:], None], strict=True):
+        along = {name: 1.0} if beyond is None else {name: 1.0, beyond: -1.0}
         Spring(along, k).enter(assembly)
         HardeningSpring(name, along, k, h).enter(assembly)
     system = assembly.build(output={"q": 1.0})
 
     def rates(t, x):
-        one, other = (k * y * (1.0 + h * y * y) for y in (x[0] - x[1], x[1]))
-        return [x[2], x[3], -one / J, (one - other) / tiny]
+        twist = x[: len(names)] - np.append(x[1 : len(names)], 0.0)
+        torque = k * twist * (1.0 + h * twist**2)
+        return [*x[len(names) :], *((np.append(0.0, torque[:-1]) - torque) / inertias)]
 
-    time = 3e-3
-    start = [0.06, 0.03, 0.0, 0.0]
-    exact = solve_ivp(rates, (0.0, time), start, method="DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
+    time, start = 3e-3, 0.03 * np.arange(len(names), 0, -1)
+    exact = solve_ivp(
+        rates, (0.0, time), [*start, *(0.0 * start)], method="DOP853", rtol=1e-11, atol=1e-13
+    ).y[: len(names), -1]
     errors = []
     for step_s in (2e-6, 1e-6):
-        start_state = rows_of(system, q=start[0], m=start[1])
-        _, state = drive(system, start_state, 1.0 / time, 1, step_s=step_s)
-        found = at(system, state, "q", "m", "q'")
-        errors.append(np.max(np.abs(found - exact[:3]) / [0.06, 0.03, 60.0]))
-    assert errors[1] < 3e-4
+        begin = rows_of(system, **dict(zip(names, start, strict=True)))
+        _, state = drive(system, begin, 1.0 / time, 1, step_s=step_s)
+        errors.append(np.max(np.abs(at(system, state, *names) - exact) / start))
+    assert errors[1] < 1e-3
     assert errors[0] > 3.0 * errors[1]
 
 
