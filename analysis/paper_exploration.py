@@ -32,7 +32,7 @@ _LANE_FREE = frozenset(
 """Effects whose size leaves the linear part alone: machines of any size are stepped together."""
 
 _SLOW = frozenset({"shaft-hardening"})
-"""Effects that are stepped six times slower than others and get half as many groups."""
+"""Effects that are stepped at half the speed of others and get half as many groups."""
 
 _NEAR_STD = 0.02
 """Spread of the ratios simulated about a known one."""

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.assembly import Law, PiecewiseLinearSystem
-from sim.kernel import FORCES_AT_ONCE, MOST_LANES, ROWS_AT_ONCE, STRIBECK, step_cycles
+from sim.kernel import FORCES_AT_ONCE, MOST_LANES, PAIR, ROWS_AT_ONCE, STRIBECK, step_cycles
 from sim.propagator import Modes, Propagator, build_propagator, find_modes
 
 __all__ = ["HARMONICS", "LONGEST_STEP_S", "Motion", "Stretch", "advance"]
@@ -36,8 +36,8 @@ LONGEST_STEP_S = 5e-6
 
 _LANE_MULTIPLE = 8
 
-_CUBIC_SWEEPS = 8
-"""Both halves of a hardening shaft push the same tiny inertia: one pass does not settle them."""
+_HARDENING_SWEEPS = 2
+"""Passes where a hardening shaft and a play push one tiny inertia; the shaft goes once more."""
 
 _COUPLED_SWEEPS = 4
 """Passes where one play pushes another within a step, as through a heavily damped shaft."""
@@ -149,7 +149,7 @@ class _Tables:
     """What the kernel needs of the laws, fixed for one system and step.
 
     `rows` (m, n), `feedthrough` (m,): what each law sees of state and input.
-    `look`, `gain`, `push`, `kinds`, `fixed`, `waves`, `sweeps`: see `sim.kernel`.
+    `look`, `gain`, `push`, `kinds`, `fixed`, `waves`, `order`: see `sim.kernel`.
     """
 
     rows: NDArray[np.float64]
@@ -160,20 +160,22 @@ class _Tables:
     kinds: NDArray[np.int64]
     fixed: NDArray[np.float64]
     waves: NDArray[np.float64]
-    sweeps: int
+    order: NDArray[np.int64]
 
 
 def _tables(system: PiecewiseLinearSystem, modes: Modes, propagator: Propagator) -> _Tables:
     laws = system.nonlinearities
     n, m, p = len(system.b), len(laws), modes.shapes.shape[1]
     rows = np.array([law.outlet for law in laws]).reshape(m, n)
-    push = np.pad(propagator.push, ((0, 0), (0, -m % FORCES_AT_ONCE if m else FORCES_AT_ONCE)))
+    push = np.pad(propagator.push, ((0, 0), (0, max(FORCES_AT_ONCE - m, m % 2))))
     look = np.vstack([rows, system.o]) @ modes.shapes
     gain = look @ push
-    kinds = [
-        STRIBECK if law.law is Law.FRICTION and law.parameters[1] != 0.0 else int(law.law)
-        for law in laws
-    ]
+    kinds = _in_pairs(
+        [
+            STRIBECK if law.law is Law.FRICTION and law.parameters[1] != 0.0 else int(law.law)
+            for law in laws
+        ]
+    )
     fixed = [(law.stiffness, law.damping / propagator.step_s) for law in laws]
     angle = 2.0 * np.pi * np.arange(propagator.steps_per_cycle) / propagator.steps_per_cycle
     waves = np.stack([wave(k * angle) for k in (1, 2, 3) for wave in (np.cos, np.sin)], axis=1)
@@ -186,19 +188,40 @@ def _tables(system: PiecewiseLinearSystem, modes: Modes, propagator: Propagator)
         kinds=np.array(kinds, dtype=np.int64),
         fixed=np.array(fixed).reshape(m, 2),
         waves=waves,
-        sweeps=_sweeps(kinds, gain, fixed),
+        order=np.array(_order(kinds, gain, fixed), dtype=np.int64),
     )
 
 
-def _sweeps(kinds: list[int], gain: NDArray[np.float64], fixed: list[tuple[float, float]]) -> int:
-    """How many passes over the laws settle what they do to each other within one step."""
-    if Law.CUBIC in kinds:
-        return _CUBIC_SWEEPS
-    plays = [j for j, kind in enumerate(kinds) if kind == Law.PLAY]
+def _in_pairs(kinds: list[int]) -> list[int]:
+    """Mark the first of two hardening springs in a row, so that they are solved together."""
+    kinds = kinds.copy()
+    for j in range(len(kinds) - 1):
+        led = j > 0 and kinds[j - 1] == PAIR
+        if kinds[j] == kinds[j + 1] == Law.CUBIC and not led:
+            kinds[j] = PAIR
+    return kinds
+
+
+def _order(
+    kinds: list[int], gain: NDArray[np.float64], fixed: list[tuple[float, float]]
+) -> list[int]:
+    """Laws in an order that settles what they do to each other within one step.
+
+    Where springs harden, they and the plays are gone through until they agree; what acts on
+    the heavy inertias alone follows once.
+    """
+    followers = [j + 1 for j, kind in enumerate(kinds) if kind == PAIR]
+    once = [j for j in range(len(kinds)) if j not in followers]
+    springs = [j for j in once if kinds[j] in (Law.CUBIC, PAIR)]
+    plays = [j for j in once if kinds[j] == Law.PLAY]
     slope = np.array([fixed[j][0] + 2.0 * fixed[j][1] for j in plays])
     taken_over = np.abs(gain[np.ix_(plays, plays)]) * slope
     np.fill_diagonal(taken_over, 0.0)
-    return _COUPLED_SWEEPS if taken_over.max(initial=0.0) > _LOOSE else 1
+    sweeps = _COUPLED_SWEEPS if taken_over.max(initial=0.0) > _LOOSE else 1
+    if not springs:
+        return once * sweeps
+    rest = [j for j in once if j not in springs and j not in plays]
+    return (springs + plays) * max(sweeps, _HARDENING_SWEEPS) + springs + rest
 
 
 def _run_block(
@@ -229,7 +252,7 @@ def _run_block(
         tables.look, tables.gain, tables.kinds, tables.fixed, parameters.reshape(-1, len(picked)),
         np.stack([through.real, through.imag, constant], axis=1).reshape(-1, len(picked)),
         tables.waves,
-        tables.sweeps, stretch.settle_cycles, coordinates, seen, sums, peak,
+        tables.order, stretch.settle_cycles, coordinates, seen, sums, peak,
     )  # fmt: skip
     return sums, peak, _times(modes.shapes, coordinates) + forced.imag
 

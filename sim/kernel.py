@@ -26,7 +26,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-__all__ = ["FORCES_AT_ONCE", "MOST_LANES", "ROWS_AT_ONCE", "STRIBECK", "step_cycles"]
+__all__ = ["FORCES_AT_ONCE", "MOST_LANES", "PAIR", "ROWS_AT_ONCE", "STRIBECK", "step_cycles"]
 
 MOST_LANES = 64
 """Lanes that one call can step; a full call costs little more than one of eight."""
@@ -35,10 +35,13 @@ ROWS_AT_ONCE = 14
 """Coordinates that are looked at in one go: 13 states as modes; further ones come in pairs."""
 
 FORCES_AT_ONCE = 4
-"""Forces that act in one go, two meshes and two frictions; further ones come in fours."""
+"""Forces that act in one go, two meshes and two frictions; further ones come in pairs."""
 
 STRIBECK = 4
 """Kind of a friction that peaks at rest; the other kinds are those of `sim.assembly.Law`."""
+
+PAIR = 5
+"""Kind of a hardening spring that is solved together with the law after it, another such spring."""
 
 _PLAY, _FRICTION, _EXCESS = 0, 1, 2
 
@@ -132,15 +135,44 @@ def excess_force(y0, y1, limit):
 
 
 @_law
+def cubic_mean(y0, y1, quarter):
+    """Mean of -k y^3 over the step; `quarter` is k/4."""
+    return -quarter * (y0 * y0 + y1 * y1) * (y0 + y1)
+
+
+@_law
+def cubic_slope(y0, y1, quarter):
+    """How fast that mean falls with y1."""
+    return quarter * (y0 * y0 + 2.0 * y0 * y1 + 3.0 * y1 * y1)
+
+
+@_law
 def cubic_force(y0, ahead, last, k, beta):
     """Mean of -k y^3 over the step, by two Newton steps from the last force."""
     quarter = 0.25 * k
     y1 = ahead + beta * last
-    miss = y1 - ahead + beta * quarter * (y0 * y0 + y1 * y1) * (y0 + y1)
-    y1 -= miss / (1.0 + beta * quarter * (y0 * y0 + 2.0 * y0 * y1 + 3.0 * y1 * y1))
-    miss = y1 - ahead + beta * quarter * (y0 * y0 + y1 * y1) * (y0 + y1)
-    y1 -= miss / (1.0 + beta * quarter * (y0 * y0 + 2.0 * y0 * y1 + 3.0 * y1 * y1))
-    return -quarter * (y0 * y0 + y1 * y1) * (y0 + y1)
+    for _ in range(2):
+        miss = y1 - ahead - beta * cubic_mean(y0, y1, quarter)
+        y1 -= miss / (1.0 + beta * cubic_slope(y0, y1, quarter))
+    return cubic_mean(y0, y1, quarter)
+
+
+@_law
+def cubic_pair(y0, z0, y_ahead, z_ahead, p, r, k_y, k_z, yy, yz, zy, zz):
+    """Forces of two hardening springs, by one Newton step for both from the last, p and r.
+
+    y sees yy p + yz r of them, z sees zy p + zz r. In turn they would settle slowly: two halves
+    of a shaft push the tiny inertia between them, and each nearly undoes what the other did.
+    """
+    k, n = 0.25 * k_y, 0.25 * k_z
+    y, z = y_ahead + yy * p + yz * r, z_ahead + zy * p + zz * r
+    p, r = cubic_mean(y0, y, k), cubic_mean(z0, z, n)
+    s, t = cubic_slope(y0, y, k), cubic_slope(z0, z, n)
+    y_miss, z_miss = y - y_ahead - yy * p - yz * r, z - z_ahead - zy * p - zz * r
+    inverse = 1.0 / ((1.0 + yy * s) * (1.0 + zz * t) - yz * t * zy * s)
+    y -= ((1.0 + zz * t) * y_miss - yz * t * z_miss) * inverse
+    z -= ((1.0 + yy * s) * z_miss - zy * s * y_miss) * inverse
+    return cubic_mean(y0, y, k), cubic_mean(z0, z, n)
 
 
 _part = njit(forceinline=True, fastmath=_FLAGS, error_model="numpy")
@@ -150,8 +182,7 @@ _part = njit(forceinline=True, fastmath=_FLAGS, error_model="numpy")
 def _turn(carry, push, drift, q, force, lanes):
     """Coordinates in pairs of rows: the forces of the last step push them, then they turn."""
     for i in range(0, carry.shape[0], 2):
-        for k in range(FORCES_AT_ONCE, push.shape[1], 4):
-            _push_pair(push, i, k, q, force, lanes)
+        _push_further(push, i, q, force, lanes)
         a0, a1, a2, a3 = push[i, 0], push[i, 1], push[i, 2], push[i, 3]
         b0, b1, b2, b3 = push[i + 1, 0], push[i + 1, 1], push[i + 1, 2], push[i + 1, 3]
         c00, c01, c10, c11 = carry[i, 0], carry[i, 1], carry[i + 1, 0], carry[i + 1, 1]
@@ -164,22 +195,31 @@ def _turn(carry, push, drift, q, force, lanes):
 
 
 @_part
-def _push_pair(push, i, k, q, force, lanes):
-    a0, a1, a2, a3 = push[i, k], push[i, k + 1], push[i, k + 2], push[i, k + 3]
-    b0, b1, b2, b3 = push[i + 1, k], push[i + 1, k + 1], push[i + 1, k + 2], push[i + 1, k + 3]
-    for s in range(lanes):
-        p0, p1, p2, p3 = force[k, s], force[k + 1, s], force[k + 2, s], force[k + 3, s]
-        q[i, s] += a0 * p0 + a1 * p1 + a2 * p2 + a3 * p3
-        q[i + 1, s] += b0 * p0 + b1 * p1 + b2 * p2 + b3 * p3
+def _push_further(push, i, q, force, lanes):
+    for k in range(FORCES_AT_ONCE, push.shape[1], 2):
+        a0, a1, b0, b1 = push[i, k], push[i, k + 1], push[i + 1, k], push[i + 1, k + 1]
+        for s in range(lanes):
+            q[i, s] += a0 * force[k, s] + a1 * force[k + 1, s]
+            q[i + 1, s] += b0 * force[k, s] + b1 * force[k + 1, s]
+
+
+@_part
+def _push(push, q, force, lanes):
+    for i in range(0, push.shape[0], 2):
+        a0, a1, a2, a3 = push[i, 0], push[i, 1], push[i, 2], push[i, 3]
+        b0, b1, b2, b3 = push[i + 1, 0], push[i + 1, 1], push[i + 1, 2], push[i + 1, 3]
+        for s in range(lanes):
+            p0, p1, p2, p3 = force[0, s], force[1, s], force[2, s], force[3, s]
+            q[i, s] += a0 * p0 + a1 * p1 + a2 * p2 + a3 * p3
+            q[i + 1, s] += b0 * p0 + b1 * p1 + b2 * p2 + b3 * p3
+        _push_further(push, i, q, force, lanes)
 
 
 @_part
 def _multiply(carry, push, drift, q, force, spare, lanes):
     """The same where every coordinate feels every other; slower, and rarely needed."""
     p = carry.shape[0]
-    for i in range(0, p, 2):
-        for k in range(0, push.shape[1], 4):
-            _push_pair(push, i, k, q, force, lanes)
+    _push(push, q, force, lanes)
     for i in range(p):
         for s in range(lanes):
             spare[i, s] = drift[i, s]
@@ -223,13 +263,10 @@ def _feel(gain, j, force, free, y, to, lanes):
         y[to, s] = (
             free[j, s] + g0 * force[0, s] + g1 * force[1, s] + g2 * force[2, s] + g3 * force[3, s]
         )
-    for k in range(FORCES_AT_ONCE, gain.shape[1], 4):
-        g0, g1, g2, g3 = gain[j, k], gain[j, k + 1], gain[j, k + 2], gain[j, k + 3]
+    for k in range(FORCES_AT_ONCE, gain.shape[1], 2):
+        g0, g1 = gain[j, k], gain[j, k + 1]
         for s in range(lanes):
-            y[to, s] += (
-                g0 * force[k, s] + g1 * force[k + 1, s]
-                + g2 * force[k + 2, s] + g3 * force[k + 3, s]
-            )  # fmt: skip
+            y[to, s] += g0 * force[k, s] + g1 * force[k + 1, s]
 
 
 @_part
@@ -260,6 +297,17 @@ def _solve(kind, stiffness, damping, own, parameters, j, y, ahead, force, lanes)
 
 
 @_part
+def _solve_pair(gain, parameters, j, y, ahead, force, lanes):
+    """The forces of laws j and j + 1, two hardening springs."""
+    at, yy, yz, zy, zz = 3 * j, gain[j, j], gain[j, j + 1], gain[j + 1, j], gain[j + 1, j + 1]
+    for s in range(lanes):
+        force[j, s], force[j + 1, s] = cubic_pair(
+            y[j, s], y[j + 1, s], ahead[0, s], ahead[1, s], force[j, s], force[j + 1, s],
+            parameters[at, s], parameters[at + 3, s], yy, yz, zy, zz,
+        )  # fmt: skip
+
+
+@_part
 def _accumulate(table, tick, y, m, total, lanes):
     """Add the output, row m of y, to the Fourier sums and keep its largest magnitude."""
     c1, s1, c2 = table[tick, 0], table[tick, 1], table[tick, 2]
@@ -278,7 +326,7 @@ def _accumulate(table, tick, y, m, total, lanes):
 
 @njit(cache=True, fastmath=_FLAGS, error_model="numpy", nogil=True)
 def step_cycles(carry, push, drift_in, look, gain, kinds, fixed, parameters, waves, table,
-                sweeps, settle_cycles, start, seen, sums, peak):  # fmt: skip
+                order, settle_cycles, start, seen, sums, peak):  # fmt: skip
     """Step coordinates through settle and kept cycles.
 
     Parameters
@@ -296,8 +344,8 @@ def step_cycles(carry, push, drift_in, look, gain, kinds, fixed, parameters, wav
         alone makes each of them see.
     table
         (steps, 6): cosine and sine of harmonics 1 to 3 over a cycle.
-    sweeps
-        How often the laws are solved in turn in each step.
+    order
+        Laws in the order in which each step solves them, with the newest forces of the others.
     start, seen
         (p, lanes), (m, lanes): coordinates and what the laws see at the start;
         overwritten by those at the end.
@@ -310,6 +358,9 @@ def step_cycles(carry, push, drift_in, look, gain, kinds, fixed, parameters, wav
     others = gain.copy()
     for j in range(m):
         others[j, j] = 0.0
+        if kinds[j] == PAIR:
+            others[j, j + 1] = 0.0
+            others[j + 1, j] = 0.0
     ticks = table.shape[0]
     q = np.zeros((look.shape[1], MOST_LANES))
     spare = np.zeros((look.shape[1], MOST_LANES))
@@ -317,7 +368,7 @@ def step_cycles(carry, push, drift_in, look, gain, kinds, fixed, parameters, wav
     force = np.zeros((push.shape[1], MOST_LANES))
     free = np.zeros((m + 1, MOST_LANES))
     y = np.zeros((m + 1, MOST_LANES))
-    ahead = np.zeros((1, MOST_LANES))
+    ahead = np.zeros((2, MOST_LANES))
     wave = np.zeros((3 * (m + 1), MOST_LANES))
     constant = np.zeros((3 * m, MOST_LANES))
     total = np.zeros((8, MOST_LANES))
@@ -341,12 +392,16 @@ def step_cycles(carry, push, drift_in, look, gain, kinds, fixed, parameters, wav
                 _multiply(carry, push, drift, q, force, spare, lanes)
             _look(look, rows, wave, table[tick, 0], table[tick, 1], q, free, lanes)
             # The first step knows no last forces to start from.
-            passes = sweeps if cycle + step > 0 else _FIRST_SWEEPS
-            for solved in range(passes * m):
-                j = solved % m
+            turns = len(order) if cycle + step > 0 else _FIRST_SWEEPS * len(order)
+            for turn in range(turns):
+                j = order[turn % len(order)]
                 _feel(others, j, force, free, ahead, 0, lanes)
-                _solve(kinds[j], fixed[j, 0], fixed[j, 1], gain[j, j], constant, j, y, ahead,
-                       force, lanes)  # fmt: skip
+                if kinds[j] == PAIR:
+                    _feel(others, j + 1, force, free, ahead, 1, lanes)
+                    _solve_pair(gain, constant, j, y, ahead, force, lanes)
+                else:
+                    _solve(kinds[j], fixed[j, 0], fixed[j, 1], gain[j, j], constant, j, y, ahead,
+                           force, lanes)  # fmt: skip
             for j in range(rows):
                 _feel(gain, j, force, free, y, j, lanes)
             if cycle >= settle_cycles:
@@ -356,9 +411,7 @@ def step_cycles(carry, push, drift_in, look, gain, kinds, fixed, parameters, wav
                 for s in range(lanes):
                     sums[cycle - settle_cycles, k, s] = total[k, s]
                     total[k, s] = 0.0
-    for i in range(0, p, 2):
-        for k in range(0, push.shape[1], 4):
-            _push_pair(push, i, k, q, force, lanes)
+    _push(push, q, force, lanes)
     for s in range(lanes):
         peak[s] = total[7, s]
         for j in range(m):

@@ -193,6 +193,39 @@ def test_cubic_spring_swings_with_the_period_of_duffing():
     assert abs(w) < 2e-2 * amplitude * math.sqrt(k / J)
 
 
+@pytest.mark.parametrize("tinies", [1, 2])
+def test_hardening_springs_with_tiny_inertias_between_follow_their_equations(tinies):
+    # As in the middle of a hardening shaft: a force on a tiny inertia moves both its springs.
+    k, h, tiny = 100.0, 2000.0, J / 500.0
+    names = ["q", "m", "n"][: tinies + 1]
+    inertias = np.array([J, *[tiny] * tinies])
+    assembly = Assembly()
+    for name, inertia in zip(names, inertias, strict=True):
+        Inertia(name, float(inertia)).enter(assembly)
+    for name, beyond in zip(names, [*names[1:], None], strict=True):
+        along = {name: 1.0} if beyond is None else {name: 1.0, beyond: -1.0}
+        Spring(along, k).enter(assembly)
+        HardeningSpring(name, along, k, h).enter(assembly)
+    system = assembly.build(output={"q": 1.0})
+
+    def rates(t, x):
+        twist = x[: len(names)] - np.append(x[1 : len(names)], 0.0)
+        torque = k * twist * (1.0 + h * twist**2)
+        return [*x[len(names) :], *((np.append(0.0, torque[:-1]) - torque) / inertias)]
+
+    time, start = 3e-3, 0.03 * np.arange(len(names), 0, -1)
+    exact = solve_ivp(
+        rates, (0.0, time), [*start, *(0.0 * start)], method="DOP853", rtol=1e-11, atol=1e-13
+    ).y[: len(names), -1]
+    errors = []
+    for step_s in (2e-6, 1e-6):
+        begin = rows_of(system, **dict(zip(names, start, strict=True)))
+        _, state = drive(system, begin, 1.0 / time, 1, step_s=step_s)
+        errors.append(np.max(np.abs(at(system, state, *names) - exact) / start))
+    assert errors[1] < 1e-3
+    assert errors[0] > 3.0 * errors[1]
+
+
 def test_viscous_damping_decays_exactly():
     c = 4e-4
     system = system_of(Damper({"q": 1.0}, c))

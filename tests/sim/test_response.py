@@ -93,12 +93,14 @@ def test_a_seed_gives_the_same_bits_and_another_seed_does_not(seed):
 
 
 def crowd():
-    """Forty servos of four kinds: plays and frictions vary, one kind is another machine."""
+    """Forty servos of five kinds: plays and frictions vary, one kind is another machine."""
     for i in range(40):
         if i % 10 == 3:
             yield Servo.of(EDSS, 0.5, seed=i)
         elif i % 10 == 6:
             yield Servo.of(ADSS, 0.5, [parse_effect("load-inertia:J_L=0.002")], seed=i)
+        elif i % 10 == 8:
+            yield Servo.of(ADSS, i / 40.0, [parse_effect("shaft-hardening:h=3e4")], seed=i)
         else:
             unit = ADSS.with_parameters(T_f_m=0.01 + 1e-4 * i, b_t_deg=0.05 + 1e-3 * i)
             yield Servo.of(unit, i / 40.0, seed=i)
@@ -109,7 +111,7 @@ def test_company_changes_nothing_to_the_last_bit(workers):
     plan = plan_with(frequencies_hz=(118.0, 131.0), levels_vpk=(2.5, 1.2), integrate_cycles=3)
     servos = list(crowd())
     together = simulate_cycles(servos, plan, workers=workers)
-    for i in (0, 3, 6, 17, 39):
+    for i in (0, 3, 6, 17, 28, 39):
         (alone,) = simulate_cycles([servos[i]], plan)
         assert np.array_equal(together[i], alone), i
 
