@@ -36,7 +36,7 @@ LONGEST_STEP_S = 5e-6
 
 _LANE_MULTIPLE = 8
 
-_HARDENING_SWEEPS = 2
+_HARDENING_SWEEPS = 3
 """Passes where a hardening shaft and a play push one tiny inertia; the shaft goes once more."""
 
 _COUPLED_SWEEPS = 4
