@@ -137,9 +137,10 @@ def _compare(fine: _Hunt, rng: np.random.Generator) -> None:
         leader, *near = fine.leading(most, behind)
         if behind == _CLOSE and not near:
             break
-        if () in fine.leading(len(fine.found), behind):
-            near.append(())
-        fine.settle(list(dict.fromkeys([leader, *_parts(leader, fine.found), *near])), _LAST_GROUPS)
+        # The parts of a pair and the plain model count even where others lie before them.
+        close = set(fine.leading(len(fine.found), behind))
+        near += [key for key in (*_parts(leader, fine.found), ()) if key in close]
+        fine.settle(list(dict.fromkeys([leader, *near])), _LAST_GROUPS)
     fine.hear()
 
 
@@ -178,7 +179,9 @@ def _is_nothing_missing(fine: _Hunt, rng: np.random.Generator) -> bool:
 def _third(rough: _Hunt) -> list[Effects]:
     """Who is looked at on all rows: the leaders, the parts of the first, and the baseline."""
     leading = rough.leading(_THIRD, _TOO_FAR)
-    return _with_baseline([*leading, *_parts(leading[0], rough.found), rough.best_single])
+    others = [*_parts(leading[0], rough.found), rough.best_single]
+    hopeful = set(rough.leading(len(rough.found), _HOPELESS))
+    return _with_baseline([*leading, *(key for key in others if key in hopeful)])
 
 
 def _parts(key: Effects, found: Mapping[Effects, Candidate]) -> list[Effects]:

@@ -25,6 +25,8 @@ __all__ = ["sharpen_candidate"]
 _ROUNDS, _GROUPS = 5, 4
 _SHARP = 0.035
 """Standard deviation of every coordinate from which on nothing more is simulated."""
+_WORTHWHILE, _LEAST_ROUNDS = 0.9, 2
+"""Nor, after so many rounds, where one left the largest of them above this share of what it was."""
 
 
 def sharpen_candidate(
@@ -42,9 +44,13 @@ def sharpen_candidate(
         If a motion grew without bound.
     """
     key, found = candidate.hypothesis.effects, size_candidate(candidate, observation, rng)
+    before = np.inf
     for done in range(_ROUNDS):
-        if np.sqrt(np.diag(found.covariance)).max() <= _SHARP:
+        widest = np.sqrt(np.diag(found.covariance)).max()
+        stalled = done >= _LEAST_ROUNDS and widest > _WORTHWHILE * before
+        if widest <= _SHARP or stalled:
             break
+        before = widest
         groups = list(groups_around(candidate.hypothesis, found, _GROUPS, rng))
         made = simulate_groups(unit, groups, observation, rng)[key]
         # The surface stays as it was judged; sizing asks it for its widths alone.

@@ -89,8 +89,16 @@ def test_it_ends_where_the_data_tell_no_more(monkeypatch, asked):
     monkeypatch.setattr(sharpening, "size_candidate", sized([0.2] * 50))
     rng = np.random.default_rng(0)
     answer = sharpening.sharpen_candidate(synthetic.ADSS, found(observed, 0), observed, rng)
-    assert 2 < len(asked) < 10
+    assert len(asked) == 2
     assert answer.covariance[0, 0] == pytest.approx(0.2**2)
+
+
+def test_it_goes_on_as_long_as_it_pays_but_not_for_ever(monkeypatch, asked):
+    observed = observed_at(0)
+    monkeypatch.setattr(sharpening, "size_candidate", sized(0.5 * 0.8 ** np.arange(50)))
+    rng = np.random.default_rng(0)
+    sharpening.sharpen_candidate(synthetic.ADSS, found(observed, 0), observed, rng)
+    assert 3 < len(asked) < 10
 
 
 @pytest.mark.parametrize("seed", range(4))
