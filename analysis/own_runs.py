@@ -21,6 +21,9 @@ __all__ = ["OwnRun", "own_runs"]
 _RUNS = 48
 """Runs that are taken in turn: the nearest to the best place."""
 
+_LOST = 0.02
+"""Share of rows at which a run may do what no other does, if the observation has no more."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OwnRun:
@@ -44,13 +47,21 @@ class OwnRun:
 
 
 def own_runs(candidate: Candidate, rng: np.random.Generator) -> Iterator[OwnRun]:
-    """The runs nearest to a candidate's best place, one by one."""
+    """The runs nearest to a candidate's best place, one by one.
+
+    A run that alone did what it did has no others to be fitted by: it would be unlike them by
+    hundreds, and tells nothing of an observation that is not alone.
+    """
     surface, best = candidate.surface, candidate.best
+    most_lost = max(surface.lost(best.place), _LOST * len(surface.observation))
     noise = surface.observation.noise
     distance = np.sum(((surface.places - best.place) / surface.width) ** 2, axis=1)
-    families = candidate.population.deviations[:, 0]
-    for i in np.argsort(distance, kind="stable")[:_RUNS]:
-        others = families != families[i]
+    deviations = candidate.population.deviations
+    taken = 0
+    for i in np.argsort(distance, kind="stable"):
+        if taken == _RUNS:
+            return
+        others = np.any(deviations != deviations[i], axis=1)
         if not np.any(others):
             continue
         as_read = surface.difference[i].copy()
@@ -59,7 +70,9 @@ def own_runs(candidate: Candidate, rng: np.random.Generator) -> Iterator[OwnRun]
         quiet = surface.motions.quiet[i]
         motions = surface.motions.of(others).against(quiet)
         alone = replace(surface, places=surface.places[others], difference=moved, motions=motions)
-        yield OwnRun(surface.places[i], alone, as_read, quiet)
+        if alone.lost(surface.places[i]) <= most_lost:
+            taken += 1
+            yield OwnRun(surface.places[i], alone, as_read, quiet)
 
 
 def _wrapped(difference: NDArray[np.float64]) -> NDArray[np.float64]:

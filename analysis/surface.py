@@ -42,6 +42,10 @@ _STRIDES = (0.5, 0.25, 0.12, 0.06)
 _UNALIKE = 1e-4
 """Weight of runs in another state of motion: they count only where there are no others."""
 
+_UNKNOWN = np.array([0.5, 0.5, 1.5])
+"""Scatter of a motion that no run shows, by channel: a machine that never does what was observed
+is unlikely, but not as unlikely as its other motion would have it."""
+
 _TAIL = 4.0
 """Degrees of freedom of Student's t, whose variance is _TAIL / (_TAIL - 2) of its scale squared."""
 
@@ -130,8 +134,11 @@ class Surface:
             alike = self.alike[:, mixed]
             picks = self._reach(weights @ alike)
             weight = weights[picks].T * alike
-            mean[:, mixed], variance[:, mixed] = self._regress(
-                offset, weight, _WIDENINGS[picks], mixed
+            found = self._regress(offset, weight, _WIDENINGS[picks], mixed)
+            unknown = np.clip(1.0 - weight.sum(axis=0), 0.0, 1.0)
+            mean[:, mixed], variance[:, mixed] = (
+                found[0],
+                found[1] + unknown * _UNKNOWN[:, None] ** 2,
             )
         variance = variance @ self._blur
         return mean + self._unread, np.sqrt(variance + self._least)
@@ -225,6 +232,12 @@ class Surface:
         scale = _SCALE * std
         tail = -0.5 * (_TAIL + 1.0) * np.log1p((mean / scale) ** 2 / _TAIL)
         return np.where(np.isfinite(mean), tail - np.log(scale), 0.0)
+
+    def lost(self, place: NDArray[np.float64]) -> int:
+        """How many rows no run near a place shows as they were observed."""
+        weights = self._weights((self.places - place) / self.width)
+        near = weights[self._reach(weights.sum(axis=1))]
+        return int(np.count_nonzero(near @ self.motions.alike < 1.0))
 
     def _log_shares(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
         """Of runs near a place that do as was observed, row by row."""

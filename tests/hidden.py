@@ -35,12 +35,19 @@ SIZES = (0.4, 0.75)
 
 @dataclass(frozen=True)
 class Hidden:
-    """A unit's response and what is hidden in it."""
+    """A unit's response and what is hidden in it; `machine` is the unit off its datasheet."""
 
     unit: Unit
+    machine: Unit
     ratio: float
     effects: tuple[EffectSetting, ...]
     response: FrequencyResponse
+
+    def measured(self, plan: SweepPlan, rng: np.random.Generator) -> FrequencyResponse:
+        """Another sweep of the same machine, as a bench reads it."""
+        seed = int(rng.integers(2**31))
+        swept = simulate(self.machine, self.ratio, plan, effects=self.effects, seed=seed)
+        return reading(swept, rng)
 
 
 def off_datasheet(unit: Unit, rng: np.random.Generator) -> Unit:
@@ -71,16 +78,20 @@ def drawn_effect(unit: Unit, effect: str, rng: np.random.Generator) -> EffectSet
     return EffectSetting(effect, values)
 
 
-def hide(name: str, effects: tuple[str, ...], rng: np.random.Generator) -> Hidden:
+def hide(
+    name: str,
+    effects: tuple[str, ...],
+    rng: np.random.Generator,
+    levels_vpk: tuple[float, ...] = LEVELS_VPK,
+) -> Hidden:
     """A response of a unit by name that hides effects by identifier."""
     unit = load_unit(name)
     settings = tuple(drawn_effect(unit, effect, rng) for effect in effects)
     ratio = float(rng.uniform(0.05, 0.95))
-    plan = SweepPlan(spaced_frequencies(*_band(unit), 61), LEVELS_VPK)
-    response = simulate(
-        off_datasheet(unit, rng), ratio, plan, effects=settings, seed=int(rng.integers(2**31))
-    )
-    return Hidden(unit, ratio, settings, reading(response, rng))
+    plan = SweepPlan(spaced_frequencies(*_band(unit), 61), levels_vpk)
+    machine = off_datasheet(unit, rng)
+    response = simulate(machine, ratio, plan, effects=settings, seed=int(rng.integers(2**31)))
+    return Hidden(unit, machine, ratio, settings, reading(response, rng))
 
 
 def reading(response: FrequencyResponse, rng: np.random.Generator) -> FrequencyResponse:
