@@ -5,19 +5,21 @@ Run as ``python tests/campaigns/soak.py [--minutes M] [--write]``, or as
 it, as fast as it goes; this process is the bench and measures over TCP, one
 session after the other into one history, each with its lock and its watchdog.
 After each session it notes memory, file handles and threads of both processes,
-bytes of history per point, and pace. It ends with 1 if any of them grows.
-Needs /proc, so Linux.
+bytes of history per point, and pace, as a line of JSON in ``build/soak.jsonl``:
+a run that is cut short loses nothing, and ``--report`` tells what that file
+holds. It ends with 1 if any of them grows. Needs /proc, so Linux.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +36,7 @@ from tui.bench import bench_session  # noqa: E402
 from tui.measure_options import PlanOptions, session_request  # noqa: E402
 
 PAGE = ROOT / "docs" / "reliability.md"
+SAMPLES = ROOT / "build" / "soak.jsonl"
 PICTURE = ROOT / "docs" / "pictures" / "soak.png"
 BEGIN, END = "<!-- soak begins -->", "<!-- soak ends -->"
 LEVELS_VPK, POINTS = (1.5, 2.5), 6
@@ -208,24 +211,40 @@ def report(samples: list[Sample], *, write: bool) -> list[str]:
     return found
 
 
+def run(seconds: float) -> None:
+    """Measure for that long; every sample is on the disk before the next session begins."""
+    serve = ("--unit", "adss", "--ratio", "0.3", "--tcp", "0", "--speed", "fast")
+    SAMPLES.parent.mkdir(exist_ok=True)
+    with (
+        tempfile.TemporaryDirectory(prefix="soak-") as folder,
+        serving(*serve) as served,
+        SAMPLES.open("w", encoding="ascii", buffering=1) as lines,
+    ):
+        db, url = Path(folder) / "bench.db", served["tcp"]
+        children = Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children")
+        server = int(children.read_text(encoding="ascii").split()[0])
+        for number, sample in enumerate(soak(seconds, db, url, server)):
+            lines.write(json.dumps(asdict(sample)) + "\n")
+            if number % 100 == 0:
+                print(sample, flush=True)
+
+
+def recorded() -> list[Sample]:
+    """The samples of the last run, whether or not it came to its end."""
+    lines = SAMPLES.read_text(encoding="ascii").splitlines()
+    return [Sample(**json.loads(line)) for line in lines]
+
+
 def main() -> int:
     """Run, print, and perhaps write."""
     words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     words.add_argument("--minutes", type=float, default=60.0)
+    words.add_argument("--report", action="store_true", help="no run, only the last one's samples")
     words.add_argument("--write", action="store_true", help="write table and picture into the docs")
     given = words.parse_args()
-    samples = []
-    serve = ("--unit", "adss", "--ratio", "0.3", "--tcp", "0", "--speed", "fast")
-    with tempfile.TemporaryDirectory(prefix="soak-") as folder, serving(*serve) as served:
-        db, url = Path(folder) / "bench.db", served["tcp"]
-        children = Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children")
-        server = int(children.read_text(encoding="ascii").split()[0])
-        for sample in soak(given.minutes * 60.0, db, url, server):
-            samples.append(sample)
-            if len(samples) % 100 == 1:
-                print(sample, flush=True)
-        found = report(samples, write=given.write)
-    return 1 if found else 0
+    if not given.report:
+        run(given.minutes * 60.0)
+    return 1 if report(recorded(), write=given.write) else 0
 
 
 if __name__ == "__main__":
