@@ -72,12 +72,12 @@ class Child:
         return True
 
     def starved_s(self) -> float:
-        """How long it, or its watchdog, has waited for a processor."""
+        """How long it, or its watchdog where that is longer, has waited for a processor."""
         if not self.pid:
             return starved_s(self.process.pid or 0)
         with suppress(OSError):
             watchdogs = fault_child.children_of(self.pid)
-            return starved_s(self.pid) + sum(map(starved_s, watchdogs))
+            return max(starved_s(process) for process in (self.pid, *watchdogs))
         return 0.0
 
     def end(self) -> None:

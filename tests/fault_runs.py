@@ -31,7 +31,7 @@ from daq.store import Store
 
 END_S = 60.0
 """Bound of a session, time limits shortened as in `fault_child.shorten_waits`; the time in which
-program and instrument were ready and got no processor is the machine's and does not count."""
+program or instrument was ready and got no processor is the machine's and does not count."""
 LASTING_END_S = 240.0
 """The same where the fault strikes at every reply: each is waited for, and none for ever."""
 OFF_S = 60.0
@@ -62,7 +62,7 @@ class Outcome:
     elapsed_s: float = 0.0
     """How long the disturbed session took."""
     starved_s: float = 0.0
-    """How much of that program and instrument were ready and got no processor."""
+    """How much of that the program, or the instrument, was ready and got no processor."""
     off_after_s: float | None = None
     """From the end of the program to the source off; None if it was cut off from it."""
     wrongs: list[str] = field(default_factory=list)
@@ -285,20 +285,25 @@ class Stopwatch:
     def __init__(self, child: Child, served: Served | None) -> None:
         self._parts = [part for part in (child, served) if part is not None]
         self._began = time.monotonic()
-        self._waited = [part.starved_s() for part in self._parts]
-        self.starved_s = 0.0
+        self._last = [part.starved_s() for part in self._parts]
+        self._waited = [0.0] * len(self._parts)
 
     def elapsed_s(self) -> float:
         """By the clock."""
         return time.monotonic() - self._began
+
+    @property
+    def starved_s(self) -> float:
+        """How long the one of the two that waited longer has waited: they do so side by side."""
+        return max(self._waited)
 
     def own_s(self) -> float:
         """By the clock, less what the machine owed it."""
         for number, part in enumerate(self._parts):
             waited = part.starved_s()
             # What ends takes its account with it.
-            self.starved_s += max(0.0, waited - self._waited[number])
-            self._waited[number] = waited
+            self._waited[number] += max(0.0, waited - self._last[number])
+            self._last[number] = waited
         return self.elapsed_s() - self.starved_s
 
 

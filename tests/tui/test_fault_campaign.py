@@ -133,7 +133,8 @@ def test_the_judge_sees_points_that_are_lost_changed_or_wrong(tmp_path):
 
 def test_the_judge_counts_no_waiting_for_a_processor_but_every_other():
     accounts = iter([2.0, 5.0, 0.0])  # the last: the program has ended
-    watch = Stopwatch(SimpleNamespace(starved_s=lambda: next(accounts)), None)
+    program = SimpleNamespace(starved_s=lambda: next(accounts))
+    watch = Stopwatch(program, SimpleNamespace(starved_s=lambda: 1.0))
     for _ in range(2):
         assert watch.own_s() == pytest.approx(watch.elapsed_s() - 3.0, abs=0.5)
     assert watch.starved_s == 3.0
