@@ -157,9 +157,11 @@ def grown(samples: list[Sample]) -> list[str]:
 def table(samples: list[Sample]) -> list[str]:
     """The result in words."""
     end, sessions = samples[-1], len(samples)
+    longest_s = max(sample.session_s for sample in samples)
     lines = [
         f"{end.elapsed_s / 60:.0f} minutes, {sessions} sessions, "
-        f"{sessions * len(LEVELS_VPK)} sweeps, {end.points} points into one history; the first "
+        f"{sessions * len(LEVELS_VPK)} sweeps, {end.points} points into one history, a sample "
+        f"after every session, at the latest after {longest_s:.0f} s; the first "
         f"tenth of the sessions is left out, then the median of a tenth at the beginning and "
         "of one at the end:",
         "",
@@ -178,23 +180,27 @@ def draw(samples: list[Sample], path: Path) -> None:
 
     sweeps = np.array([sample.points for sample in samples]) // POINTS
     figure = Figure(figsize=(9.0, 6.0), layout="constrained")
+    counted = ("bench_handles", "server_handles", "bench_threads", "server_threads")
     panels = (
         ("memory, MiB", ("bench_mib", "server_mib")),
-        ("file handles and threads", ("bench_handles", "server_handles", "bench_threads")),
+        ("file handles and threads", counted),
         ("history, bytes per point", ("bytes_per_point",)),
         ("time of a session, s", ("session_s",)),
     )
     for axes, (title, names) in zip(figure.subplots(2, 2, sharex=True).flat, panels, strict=True):
-        for name in names:
+        for name, dashes in zip(names, ("-", "--", "-.", ":"), strict=False):
             values = [getattr(sample, name) for sample in samples]
-            axes.plot(sweeps, values, linewidth=0.8, label=name.rpartition("_")[0].split("_")[0])
-            if "handles" in title:
-                axes.lines[-1].set_label(name.replace("_", ": "))
-        axes.set_ylim(bottom=0.0)
+            label = NAMES[name] if names is counted else name.partition("_")[0]
+            # Dashed, since some lie on each other.
+            axes.plot(sweeps, values, dashes, linewidth=1.2, label=label)
+        axes.set_ylim(0.0, 1.1 * float(axes.dataLim.ymax))
         axes.set_title(title, fontsize=10)
         axes.grid(alpha=0.3)
         if len(names) > 1:
-            axes.legend(fontsize=8)
+            axes.legend(fontsize=8, loc="lower right")
+        if names == ("bytes_per_point",):
+            # The file that a first session makes is nearly empty, and far above all others.
+            axes.set_ylim(0.0, 1.5 * float(np.median(values)))
     figure.supxlabel("sweeps", fontsize=10)
     figure.savefig(path, dpi=110)
 
