@@ -113,14 +113,15 @@ def outside(name: str, runs: int, seed: int) -> Result:
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", check=False,
     )  # fmt: skip
     covered = [int(number) for number in re.findall(r"cov: (\d+)", done.stdout)]
-    executed = re.search(r"number_of_executed_units: (\d+)", done.stdout)
+    # The last is that of the end; what a fault ends has told how far it was before.
+    executed = re.findall(r"^(?:#|stat::number_of_executed_units: )(\d+)", done.stdout, re.M)
     fault = ""
     if done.returncode:
         said = re.findall(r"^(?:\w*Error\b.*|.*ERROR: libFuzzer.*)", done.stdout, re.MULTILINE)
         fault = "; ".join(said)[:300] or done.stdout[-300:]
     return Result(
         name,
-        int(executed.group(1)) if executed else 0,
+        int(executed[-1]) if executed else 0,
         max(covered, default=0),
         time.monotonic() - began,
         fault,
