@@ -7,7 +7,7 @@ JOBS ?= 2
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: help demo test check bench blind faults fuzz soak docs lock clean
+.PHONY: help demo test check bench blind faults fuzz soak docs audit lock clean
 
 help:
 	@echo "make demo    the whole job without hardware; results in demo/"
@@ -19,6 +19,7 @@ help:
 	@echo "make fuzz    a million damaged inputs to everything that reads; an hour or two"
 	@echo "make soak    measure back to back for an hour and watch what is held on to"
 	@echo "make docs    everything that the documentation prints, in full; half an hour"
+	@echo "make audit   ask for known weaknesses of what is required; needs the network"
 	@echo "make lock    write down the installed versions in requirements.lock"
 	@echo "make clean   remove what the other targets left, except .venv"
 
@@ -34,6 +35,7 @@ check: $(READY)
 	@$(BIN)/mypy --no-error-summary
 	@$(BIN)/lint-imports --no-logo > .venv/lint-imports.log || { cat .venv/lint-imports.log; exit 1; }
 	@$(BIN)/python tests/links.py
+	@$(BIN)/python tests/locked.py
 
 bench: $(READY)
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check --constraint requirements.lock \
@@ -56,6 +58,11 @@ soak: $(READY)
 
 docs: $(READY)
 	@$(BIN)/python tests/campaigns/printed_commands.py
+
+audit: $(READY)
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check --constraint requirements.lock \
+	  --editable '.[audit]' || { echo "nothing was audited: pip-audit was not installed" >&2; exit 2; }
+	@$(BIN)/python tests/audit.py
 
 lock: $(READY)
 	@$(BIN)/python -m pip freeze --exclude-editable > requirements.lock

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from analysis.diagnosis import Diagnosis
 from analysis.verdict import Judged
-from daq.formats.atomic import file_stem
+from daq.formats.atomic import file_stem, replacing
 from daq.frf import DB_PER_NEPER
 
 __all__ = ["draw_diagnosis", "probability_figure", "residual_figure"]
@@ -33,7 +33,8 @@ def draw_diagnosis(diagnosis: Diagnosis, folder: Path) -> list[Path]:
         ("probabilities", probability_figure(diagnosis)),
     ):
         path = folder / f"{file_stem(diagnosis.unit)}-diagnosis-{name}.png"
-        figure.savefig(path, dpi=130)
+        with replacing(path) as partial:
+            figure.savefig(partial, dpi=130)
         written.append(path)
     return written
 

@@ -16,7 +16,7 @@ from matplotlib.patches import Ellipse
 
 from analysis.paper_belief import Belief, Judged
 from analysis.paper_diagnosis import PaperDiagnosis
-from daq.formats.atomic import file_stem
+from daq.formats.atomic import file_stem, replacing
 
 __all__ = ["draw", "paper_diagnosis_figure"]
 
@@ -30,7 +30,8 @@ def draw(diagnosis: PaperDiagnosis, directory: Path) -> list[Path]:
     """Write the figure of one unit as PNG into a directory, made if missing."""
     directory.mkdir(parents=True, exist_ok=True)
     path = directory / f"{file_stem(diagnosis.unit)}-paper-diagnosis.png"
-    paper_diagnosis_figure([diagnosis]).savefig(path, dpi=130)
+    with replacing(path) as partial:
+        paper_diagnosis_figure([diagnosis]).savefig(partial, dpi=130)
     return [path]
 
 

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from analysis.paper_numbers import UnitName
+from daq.formats.atomic import replacing
 
 if TYPE_CHECKING:
     from analysis.paper import ReproducedRow, Reproduction
@@ -62,8 +63,8 @@ def draw(result: Reproduction, directory: Path) -> list[Path]:
     paths = []
     for name, make in figures.items():
         paths.append(directory / f"{name}.png")
-        with rc_context(_STYLE):
-            make(result).savefig(paths[-1])
+        with rc_context(_STYLE), replacing(paths[-1]) as partial:
+            make(result).savefig(partial)
     return paths
 
 

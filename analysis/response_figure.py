@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator, NullLocator
 
 from analysis.resonance import LevelFeatures
+from daq.formats.atomic import replacing
 from daq.frf import FrequencyResponse, PointFlag
 
 __all__ = ["draw_response", "save_response_figure"]
@@ -60,7 +61,8 @@ def save_response_figure(
     response: FrequencyResponse, features: Sequence[LevelFeatures], path: Path
 ) -> None:
     """Write `draw_response` as a picture; the suffix names its kind."""
-    draw_response(response, features).savefig(path, dpi=130)
+    with replacing(path) as partial:
+        draw_response(response, features).savefig(partial, dpi=130)
 
 
 def _draw_level(

@@ -29,6 +29,8 @@ __all__ = [
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(E[+-]?\d{1,3})?", re.IGNORECASE | re.ASCII)
 _INTEGER = re.compile(r"[+-]?\d{1,18}", re.ASCII)
 _ERROR = re.compile(r'([+-]?\d{1,18})\s*,\s*"((?:[^"]|"")*)"', re.ASCII)
+_BLANK = " \t\r\n"
+"""What may stand around a reply; `str.strip` alone takes control characters, too."""
 
 
 def parse_number(text: str) -> float:
@@ -39,9 +41,10 @@ def parse_number(text: str) -> float:
     ProtocolError
         If the text is anything but one number.
     """
-    if not _NUMBER.fullmatch(text.strip()):
+    stripped = text.strip(_BLANK)
+    if not _NUMBER.fullmatch(stripped):
         raise ProtocolError(f"a number was due, but {text!r} came")
-    value = float(text)
+    value = float(stripped)
     if not math.isfinite(value):
         raise ProtocolError(f"a number was due, but {text!r} is too large to be one")
     return value
@@ -55,9 +58,10 @@ def parse_integer(text: str) -> int:
     ProtocolError
         If the text is anything but one integer.
     """
-    if not _INTEGER.fullmatch(text.strip()):
+    stripped = text.strip(_BLANK)
+    if not _INTEGER.fullmatch(stripped):
         raise ProtocolError(f"an integer was due, but {text!r} came")
-    return int(text)
+    return int(stripped)
 
 
 def parse_string(text: str) -> str:
@@ -68,7 +72,7 @@ def parse_string(text: str) -> str:
     ProtocolError
         If a quote is not closed.
     """
-    stripped = text.strip()
+    stripped = text.strip(_BLANK)
     if stripped[:1] not in ("'", '"'):
         return stripped
     quote = stripped[0]
@@ -97,7 +101,7 @@ def parse_error(text: str) -> QueueEntry:
     ProtocolError
         If it has any other form.
     """
-    match = _ERROR.fullmatch(text.strip())
+    match = _ERROR.fullmatch(text.strip(_BLANK))
     if match is None:
         raise ProtocolError(f"an error-queue entry was due, but {text!r} came")
     return QueueEntry(int(match.group(1)), match.group(2).replace('""', '"'))

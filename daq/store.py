@@ -283,8 +283,10 @@ class Store:
             try:
                 yield connection
             except (ValueError, TypeError, KeyError) as error:
+                # What was stored may stand in it, line ends and all.
+                told = " ".join(str(error).split())
                 raise FileFormatError(
-                    f"{self.path}: holds a record that cannot be read ({error}); restore a copy"
+                    f"{self.path}: holds a record that cannot be read ({told}); restore a copy"
                 ) from error
 
     def _update(self, connection: sa.Connection, measurement: int, **values: Any) -> None:

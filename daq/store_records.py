@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 from daq.analyser import Identity, SourceState, SweepPoint
 from daq.bounded_text import parse_json
-from daq.errors import FileFormatError, InputError
+from daq.errors import InputError
 from daq.plan import SweepPlan
 
 __all__ = [
@@ -128,7 +128,7 @@ def plan_from_text(text: str) -> SweepPlan:
 
     Raises
     ------
-    FileFormatError
+    ValueError
         If the text is not a plan.
     """
     try:
@@ -136,5 +136,5 @@ def plan_from_text(text: str) -> SweepPlan:
         for name in ("frequencies_hz", "levels_vpk"):
             document[name] = tuple(document[name])
         return SweepPlan(**document)
-    except (ValueError, TypeError, KeyError, InputError) as error:
-        raise FileFormatError(f"history: a stored sweep plan cannot be read ({error})") from error
+    except (TypeError, KeyError, InputError) as error:
+        raise ValueError(f"it is no sweep plan: {error}") from error

@@ -13,7 +13,6 @@ import numpy as np
 import sqlalchemy as sa
 
 from daq.analyser import Identity, SourceState, SweepPoint
-from daq.errors import FileFormatError
 from daq.frf import GAIN_STD_COMPONENTS, FrequencyResponse, PointFlag
 from daq.store_records import Measurement, MeasurementHeader, StoredPoint, plan_from_text
 
@@ -62,7 +61,7 @@ def measurement_of(row: sa.Row[Any]) -> Measurement:
 
     Raises
     ------
-    FileFormatError
+    ValueError
         If the row holds words that this program does not know.
     """
     instrument = None
@@ -75,10 +74,6 @@ def measurement_of(row: sa.Row[Any]) -> Measurement:
             options=tuple(row.options),
             simulated=bool(row.simulated),
         )
-    try:
-        source_state = SourceState(row.source_state)
-    except ValueError as error:
-        raise FileFormatError(f"history: measurement {row.id}: {error}") from error
     return Measurement(
         id=row.id,
         header=MeasurementHeader(
@@ -93,7 +88,7 @@ def measurement_of(row: sa.Row[Any]) -> Measurement:
         ),
         instrument=instrument,
         state=row.state,
-        source_state=source_state,
+        source_state=SourceState(row.source_state),
         started=row.started,
         ended=row.ended,
         readback=row.readback,

@@ -22,6 +22,7 @@ __all__ = ["AdapterClient", "Listener", "RawClient", "Terminal"]
 
 _CHUNK = 65536
 _LONGEST_LINE = 4_000_000
+_MOST_UNHEARD = 4_000_000
 _LIVELY_S = 0.2
 _REPLUG_S = 0.5
 """How long a pulled pseudo-terminal stays away."""
@@ -74,7 +75,8 @@ class _Client:
             while self._out:
                 del self._out[: self.wire.send(self._out)]
         except BlockingIOError:
-            return
+            # Who asks and asks and never listens is hung up on before the memory is full.
+            self.closed = self.closed or len(self._out) > _MOST_UNHEARD
         except OSError:
             self.closed = True
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import multiprocessing
 import threading
+from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import fault_child
@@ -15,6 +17,13 @@ from bench_server import url as url_of
 
 from sim.analyser35670a import Analyser35670A
 from sim.serve import Server
+
+
+def starved_s(process: int) -> float:
+    """How long a process or thread was ready to run and got no processor; 0.0 once it is gone."""
+    with suppress(OSError):
+        return int(Path(f"/proc/{process}/schedstat").read_text(encoding="ascii").split()[1]) / 1e9
+    return 0.0
 
 
 class Programs:
@@ -62,6 +71,15 @@ class Child:
             self.verdict = content
         return True
 
+    def starved_s(self) -> float:
+        """How long it, or its watchdog where that is longer, has waited for a processor."""
+        if not self.pid:
+            return starved_s(self.process.pid or 0)
+        with suppress(OSError):
+            watchdogs = fault_child.children_of(self.pid)
+            return max(starved_s(process) for process in (self.pid, *watchdogs))
+        return 0.0
+
     def end(self) -> None:
         """Gone, and its pipe closed."""
         if self.process.is_alive():
@@ -90,6 +108,11 @@ class Served:
         self.raw = host, int(port)
         self._thread: threading.Thread | None = threading.Thread(target=self._server.run)
         self._thread.start()
+
+    def starved_s(self) -> float:
+        """How long the instrument has waited for a processor."""
+        thread = self._thread
+        return 0.0 if thread is None else starved_s(thread.native_id or 0)
 
     def unplug(self) -> None:
         """Nobody is there any more; may be called twice."""

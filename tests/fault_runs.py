@@ -30,7 +30,8 @@ from daq.frf import PointFlag
 from daq.store import Store
 
 END_S = 60.0
-"""Bound of a session, time limits shortened as in `fault_child.shorten_waits`."""
+"""Bound of a session, time limits shortened as in `fault_child.shorten_waits`; the time in which
+program or instrument was ready and got no processor is the machine's and does not count."""
 LASTING_END_S = 240.0
 """The same where the fault strikes at every reply: each is waited for, and none for ever."""
 OFF_S = 60.0
@@ -59,6 +60,9 @@ class Outcome:
     resumes: int = 0
     """Further sessions that it took to complete the measurement."""
     elapsed_s: float = 0.0
+    """How long the disturbed session took."""
+    starved_s: float = 0.0
+    """How much of that the program, or the instrument, was ready and got no processor."""
     off_after_s: float | None = None
     """From the end of the program to the source off; None if it was cut off from it."""
     wrongs: list[str] = field(default_factory=list)
@@ -119,7 +123,7 @@ class Run:
     def _first(self) -> Child:
         child = self._start(0, plain=False)
         bound_s = LASTING_END_S if "times=0" in (self._case.fault or "") else END_S
-        began, struck, ended_s = time.monotonic(), False, None
+        watch, struck = Stopwatch(child, self._served), False
         beside = Beside(
             self._case, self._db, self._served, lambda: self._start(0, plain=True), self.wrong
         )
@@ -132,11 +136,10 @@ class Run:
                     self._wake(child)
                 if child.verdict is not None:
                     break
-                if time.monotonic() - began > bound_s:
+                if watch.own_s() > bound_s:
                     self.wrong(f"did not end within {bound_s:g} s")
                     break
-            ended_s = time.monotonic()
-        self.outcome.elapsed_s = ended_s - began
+            self.outcome.elapsed_s, self.outcome.starved_s = watch.elapsed_s(), watch.starved_s
         child.end()
         if child.verdict is None and self._case.disturbance not in ("kill", "kill-both"):
             self.wrong("ended without a word")
@@ -267,13 +270,41 @@ class Run:
 
     def _go_on(self, measurement: int) -> Child:
         child = self._start(measurement, plain=True)
-        began = time.monotonic()
+        watch = Stopwatch(child, self._served)
         while child.verdict is None and child.listen(0.1):
-            if time.monotonic() - began > 2 * END_S:
+            if watch.own_s() > 2 * END_S:
                 self.wrong(f"going on did not end within {2 * END_S:g} s")
                 break
         child.end()
         return child
+
+
+class Stopwatch:
+    """Times a program, without the time in which there was no processor for it."""
+
+    def __init__(self, child: Child, served: Served | None) -> None:
+        self._parts = [part for part in (child, served) if part is not None]
+        self._began = time.monotonic()
+        self._last = [part.starved_s() for part in self._parts]
+        self._waited = [0.0] * len(self._parts)
+
+    def elapsed_s(self) -> float:
+        """By the clock."""
+        return time.monotonic() - self._began
+
+    @property
+    def starved_s(self) -> float:
+        """How long the one of the two that waited longer has waited: they do so side by side."""
+        return max(self._waited)
+
+    def own_s(self) -> float:
+        """By the clock, less what the machine owed it."""
+        for number, part in enumerate(self._parts):
+            waited = part.starved_s()
+            # What ends takes its account with it.
+            self._waited[number] += max(0.0, waited - self._last[number])
+            self._last[number] = waited
+        return self.elapsed_s() - self.starved_s
 
 
 def _same(one: complex, other: complex) -> bool:

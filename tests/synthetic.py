@@ -6,6 +6,8 @@ cannot bend towards (its `blind` coordinates) is what tells it from another.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from analysis.branches import Motions
@@ -65,9 +67,31 @@ def observation(values) -> Observation:
     )
 
 
-def candidate(seen: Observation, effects: tuple[str, ...] = (), seed: int = 0, groups: int = 10):
-    """A candidate with runs all over, its deviations known."""
+def thinned(seen: Observation, step: int) -> Observation:
+    """The same with every so manieth frequency alone."""
+    kept = np.isin(seen.frequency_hz, FREQUENCIES[::step])
+    plan = SweepPlan(FREQUENCIES[::step], LEVELS)
+    return replace(
+        seen,
+        values=seen.values[:, kept],
+        source_vpk=seen.source_vpk[kept],
+        frequency_hz=seen.frequency_hz[kept],
+        noise=seen.noise[kept],
+        plans=((plan, np.arange(np.count_nonzero(kept))),),
+    )
+
+
+def candidate(
+    seen: Observation,
+    effects: tuple[str, ...] = (),
+    seed: int = 0,
+    groups: int = 10,
+    scatter: float = 1.0,
+):
+    """A candidate with runs all over of what was seen, its deviations known."""
     rng = np.random.default_rng(seed)
+    rows = np.isin(np.tile(FREQUENCIES, len(LEVELS)), seen.frequency_hz)
+    slopes = DEVIATION_SLOPES[..., rows]
     hypothesis = Hypothesis(ADSS, effects)
     places, deviations, runs = [], [], []
     for _ in range(groups):
@@ -77,12 +101,12 @@ def candidate(seen: Observation, effects: tuple[str, ...] = (), seed: int = 0, g
             place = np.array([ratio, *sizes])
             places.append(place)
             deviations.append(off)
-            runs.append(read(effects, place, rng, off))
+            runs.append(read(effects, place, rng, off, scatter)[:, rows])
     places, deviations, runs = np.array(places), np.array(deviations), np.array(runs)
-    difference = runs - seen.values - np.tensordot(deviations, DEVIATION_SLOPES, axes=1)
+    difference = runs - seen.values - np.tensordot(deviations, slopes, axes=1)
     width = np.array([0.4] + [0.4] * (hypothesis.d - 1))
-    motions = Motions.unknown(len(places), ROWS)
-    surface = Surface(seen, places, difference, width, DEVIATION_SLOPES, SIGMAS, motions)
-    nothing = np.zeros((len(places), ROWS))
+    motions = Motions.unknown(*difference.shape[::2])
+    surface = Surface(seen, places, difference, width, slopes, SIGMAS, motions)
+    nothing = np.zeros(runs[:, 0].shape)
     population = Population(places, deviations, nothing + 1.0 + 0j, nothing)
     return Candidate(hypothesis, population, surface, surface.climb(places.mean(axis=0)))

@@ -16,6 +16,7 @@ from daq.errors import ProtocolError
 
 __all__ = [
     "BLOCK_LIMIT_BYTES",
+    "KEPT_LIMIT_BYTES",
     "LINE_LIMIT_BYTES",
     "Deadline",
     "Transport",
@@ -32,6 +33,9 @@ a line of 128 bytes into two messages; both are left some room."""
 
 BLOCK_LIMIT_BYTES = 1 << 20
 """Largest block accepted; a longer claim is taken for a damaged header, not waited for."""
+
+KEPT_LIMIT_BYTES = 2 * BLOCK_LIMIT_BYTES
+"""Most that is kept of what came and was not read; who sends more talks without end."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -66,6 +66,14 @@ def open_transport(
     match address:
         case HostedAddress(scheme=scheme, rest=rest):
             transport = provided[scheme](rest)
+        case VisaAddress(resource=resource) if resource.upper().endswith("::SOCKET"):
+            from daq.transports.links import TcpLink
+            from daq.transports.stream import StreamTransport
+
+            _, host, port, _ = resource.split("::")
+            transport = StreamTransport(
+                TcpLink(host, int(port), Deadline.after(opening_s)), resource
+            )
         case VisaAddress(resource=resource):
             from daq.transports.visa import open_visa
 

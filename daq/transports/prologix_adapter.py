@@ -11,7 +11,7 @@ import re
 from dataclasses import dataclass
 
 from daq.errors import LinkError, ProtocolError
-from daq.transports.base import Deadline
+from daq.transports.base import KEPT_LIMIT_BYTES, Deadline
 from daq.transports.links import Link
 
 __all__ = ["AR488", "OTHER", "PROLOGIX", "Adapter", "Dialect", "dialect_of", "escape"]
@@ -98,9 +98,21 @@ class Adapter:
         self.link.send(data + b"\n", deadline)
 
     def gather(self, deadline: Deadline) -> bool:
-        """Wait for bytes and keep them; False if none came by the deadline."""
+        """Wait for bytes and keep them; False if none came by the deadline.
+
+        Raises
+        ------
+        ProtocolError
+            If more came, and was not taken, than any reply has.
+        """
         came = self.link.receive(deadline)
         self._unread += came
+        if len(self._unread) > KEPT_LIMIT_BYTES:
+            self._unread.clear()
+            raise ProtocolError(
+                f"{self.link.name}: talks without end, more than {KEPT_LIMIT_BYTES} bytes came; "
+                "is it a GPIB adapter?"
+            )
         return bool(came)
 
     def taken(self, count: int) -> bytes | None:
@@ -113,10 +125,11 @@ class Adapter:
 
     def taken_line(self) -> bytes | None:
         """The bytes kept up to the first line feed, without it; None if there is none yet."""
-        if b"\n" not in self._unread:
+        end = self._unread.find(b"\n")
+        if end < 0:
             return None
-        line, _, rest = bytes(self._unread).partition(b"\n")
-        self._unread = bytearray(rest)
+        line = bytes(self._unread[:end])
+        del self._unread[: end + 1]
         return line
 
     def kept(self) -> int:
@@ -155,6 +168,8 @@ class Adapter:
             if line.endswith(self.version):
                 self._versions_due -= 1
                 heard = True
+            elif deadline.expired:
+                break  # it talks on and on
         if heard:
             self._versions_due = 0  # those of before a reset never come
         self._unread.clear()
@@ -218,7 +233,7 @@ class Adapter:
                 self.send(b"++ver", deadline)
                 patience = deadline.within(_PATIENCE_S)
                 line = self._next_line(patience)
-                while line is not None and dialect_of(line) is None:
+                while line is not None and dialect_of(line) is None and not patience.expired:
                     heard, line = line, self._next_line(patience)
                 if line is None:
                     break

@@ -13,32 +13,38 @@ SCATTER = 0.2
 SENSITIVITY = np.linspace(0.5, 2.0, ROWS)
 
 
-def channels(x, rng, branch=False):
+def channels(x, rng, branch=False, scatter=SCATTER):
     """A response whose log gain follows x, in one piece or with errors shared by a half of it."""
     values = np.zeros((3, ROWS))
-    values[0] = np.log(0.1) + SENSITIVITY * x + SCATTER * rng.standard_normal(ROWS)
-    values[1] = SCATTER * rng.standard_normal(ROWS)
+    values[0] = np.log(0.1) + SENSITIVITY * x + scatter * rng.standard_normal(ROWS)
+    values[1] = scatter * rng.standard_normal(ROWS)
     values[2] = np.log(0.02) + 0.3 * rng.standard_normal(ROWS)
     if branch:
         values[0, : ROWS // 2] += SCATTER * rng.standard_normal()
     return values
 
 
-def experiment(seed, branch):
+def experiment(seed, branch, scatter=SCATTER, step=1):
+    """A truth and what is found of it from every so manieth point."""
     rng = np.random.default_rng(seed)
     truth = rng.uniform(0.3, 0.7)
     x = rng.uniform(0.0, 1.0, 140)
-    drawn = np.array([channels(v, rng, branch) for v in x])
-    measured = channels(truth, rng, branch)
+    drawn = np.array([channels(v, rng, branch, scatter) for v in x])[..., ::step]
+    measured = channels(truth, rng, branch, scatter)[:, ::step]
     response = FrequencyResponse.from_arrays(
-        np.linspace(100.0, 130.0, ROWS),
+        np.linspace(100.0, 130.0, ROWS)[::step],
         2.5,
         np.exp(measured[0] + 1j * measured[1]),
         unit="ADSS",
         gain_std_db=8.686 * np.exp(measured[2]),
     )
     emulator = Emulator(
-        x[:, None], np.zeros((140, 0)), drawn, (slice(0, ROWS),), np.array([0.3]), np.zeros(0)
+        x[:, None],
+        np.zeros((140, 0)),
+        drawn,
+        (slice(0, drawn.shape[-1]),),
+        np.array([0.3]),
+        np.zeros(0),
     )
     return truth, calibrate(observe(response), emulator, rng)
 
@@ -56,6 +62,21 @@ def test_intervals_cover_and_are_not_wider_than_the_best_estimator_deserves(bran
         covariance[: ROWS // 2, : ROWS // 2] += SCATTER**2
     best = 1.0 / np.sqrt(SENSITIVITY @ np.linalg.solve(covariance, SENSITIVITY))
     assert best * 0.8 < stated < best * 2.5
+
+
+@pytest.mark.parametrize("branch", [False, True])
+def test_noise_and_fewer_points_widen_the_interval(branch):
+    """Never once narrower, whatever was drawn, and by about as much as is due."""
+
+    def std(seed, **less):
+        return np.sqrt(experiment(seed, branch, **less)[1].covariance[0, 0])
+
+    whole = np.array([std(seed) for seed in range(4)])
+    # Beyond the prior's reach nothing widens, so less than the factor of 2 or the root of 6.
+    for less, least in (({"scatter": 2.0 * SCATTER}, 1.3), ({"step": 6}, 1.5)):
+        ratio = np.array([std(seed, **less) for seed in range(4)]) / whole
+        assert ratio.min() > 1.0
+        assert least < np.median(ratio) < 3.0
 
 
 def test_two_free_numbers_are_told_apart():

@@ -1,5 +1,7 @@
 """The chain from servo to features: what must not matter does not, what must scale does."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from side_by_side import ADSS, FRICTIONLESS, state_space
@@ -36,6 +38,57 @@ def test_a_linear_servo_answers_in_proportion(upward):
 def test_the_direction_of_the_sweep_does_not_matter_to_a_linear_servo(upward):
     down = swept(direction="down", levels=(1.0,))
     np.testing.assert_allclose(down.gain, upward.gain[upward.source_vpk == 1.0], rtol=1e-6)
+
+
+MECHANICAL = ("J_m", "J_g1", "J_s1", "J_p2", "J_L", "k_g1", "k_s1", "k_2", "B_m")
+FRICTION = ("T_f_m", "T_f_L")
+ELECTRIC = ("L_a", "R_m", "k_b", "k_ts")
+
+
+def multiplied(unit, factors):
+    """A unit some of whose parameters are so many times what they were."""
+    old = unit.parameters
+    return unit.with_parameters(**{name: factor * old[name] for name, factor in factors.items()})
+
+
+@pytest.mark.parametrize("factor", [0.3, 7.0])
+def test_a_scaled_linear_servo_answers_as_scaled(factor, upward):
+    gain = upward.gain[upward.source_vpk == 1.0]
+    tachometer = swept(multiplied(LINEAR, {"k_ts": factor}), levels=(1.0,))
+    np.testing.assert_allclose(tachometer.gain, factor * gain, rtol=1e-6)
+    # All of the mechanics so much heavier and stiffer, and a motor to match: the current is the
+    # same, the speed is smaller by the root.
+    heavy = dict.fromkeys(MECHANICAL, factor**2) | {"k_t": factor, "k_b": factor}
+    damped = (parse_effect(f"shaft-damping:c_s1={C_S1 * factor**2!r}"),)
+    plan = SweepPlan(BAND, (1.0,), settle_cycles=400, integrate_cycles=4)
+    scaled = simulate(multiplied(LINEAR, heavy), 0.3, plan, effects=damped)
+    np.testing.assert_allclose(scaled.gain, gain / factor, rtol=1e-6)
+
+
+WITH_PLAY = SweepPlan((118.0, 138.0, 150.0), (1.5, 2.5), settle_cycles=15, integrate_cycles=10)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("names", "levels"),
+    [((*MECHANICAL, *FRICTION, "k_t"), 1.0), (ELECTRIC, 4.0)],
+    ids=["torque", "voltage"],
+)
+def test_the_unit_of_torque_or_voltage_does_not_matter_even_with_play(names, levels, seed):
+    """A power of two rounds nothing, so that not even chatter tells the two apart."""
+    told = simulate(ADSS, 0.3, WITH_PLAY, seed=seed)
+    plan = replace(WITH_PLAY, levels_vpk=tuple(levels * v for v in WITH_PLAY.levels_vpk))
+    renamed = simulate(multiplied(ADSS, dict.fromkeys(names, 4.0)), 0.3, plan, seed=seed)
+    np.testing.assert_allclose(renamed.gain, told.gain, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("limit", "near"), [(0.0, 1e-9), (1.0, 1.0 - 1e-9)])
+def test_with_all_play_in_one_stage_it_is_the_limit_of_nearly_all(limit, near):
+    # Weakly driven: where it chatters, any change at all makes another motion.
+    plan = replace(WITH_PLAY, levels_vpk=(1.5,))
+    at, beside, other = (simulate(ADSS, r, plan, seed=1).gain for r in (limit, near, 1.0 - limit))
+    np.testing.assert_allclose(beside, at, rtol=1e-4)
+    assert np.abs(other / at - 1.0).max() > 0.01
 
 
 @pytest.mark.parametrize("ratio", [0.0, 1.0])

@@ -5,19 +5,21 @@ Run as ``python tests/campaigns/soak.py [--minutes M] [--write]``, or as
 it, as fast as it goes; this process is the bench and measures over TCP, one
 session after the other into one history, each with its lock and its watchdog.
 After each session it notes memory, file handles and threads of both processes,
-bytes of history per point, and pace. It ends with 1 if any of them grows.
-Needs /proc, so Linux.
+bytes of history per point, and pace, as a line of JSON in ``build/soak.jsonl``:
+a run that is cut short loses nothing, and ``--report`` tells what that file
+holds. It ends with 1 if any of them grows. Needs /proc, so Linux.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +36,7 @@ from tui.bench import bench_session  # noqa: E402
 from tui.measure_options import PlanOptions, session_request  # noqa: E402
 
 PAGE = ROOT / "docs" / "reliability.md"
+SAMPLES = ROOT / "build" / "soak.jsonl"
 PICTURE = ROOT / "docs" / "pictures" / "soak.png"
 BEGIN, END = "<!-- soak begins -->", "<!-- soak ends -->"
 LEVELS_VPK, POINTS = (1.5, 2.5), 6
@@ -154,9 +157,11 @@ def grown(samples: list[Sample]) -> list[str]:
 def table(samples: list[Sample]) -> list[str]:
     """The result in words."""
     end, sessions = samples[-1], len(samples)
+    longest_s = max(sample.session_s for sample in samples)
     lines = [
         f"{end.elapsed_s / 60:.0f} minutes, {sessions} sessions, "
-        f"{sessions * len(LEVELS_VPK)} sweeps, {end.points} points into one history; the first "
+        f"{sessions * len(LEVELS_VPK)} sweeps, {end.points} points into one history, a sample "
+        f"after every session, at the latest after {longest_s:.0f} s; the first "
         f"tenth of the sessions is left out, then the median of a tenth at the beginning and "
         "of one at the end:",
         "",
@@ -175,23 +180,27 @@ def draw(samples: list[Sample], path: Path) -> None:
 
     sweeps = np.array([sample.points for sample in samples]) // POINTS
     figure = Figure(figsize=(9.0, 6.0), layout="constrained")
+    counted = ("bench_handles", "server_handles", "bench_threads", "server_threads")
     panels = (
         ("memory, MiB", ("bench_mib", "server_mib")),
-        ("file handles and threads", ("bench_handles", "server_handles", "bench_threads")),
+        ("file handles and threads", counted),
         ("history, bytes per point", ("bytes_per_point",)),
         ("time of a session, s", ("session_s",)),
     )
     for axes, (title, names) in zip(figure.subplots(2, 2, sharex=True).flat, panels, strict=True):
-        for name in names:
+        for name, dashes in zip(names, ("-", "--", "-.", ":"), strict=False):
             values = [getattr(sample, name) for sample in samples]
-            axes.plot(sweeps, values, linewidth=0.8, label=name.rpartition("_")[0].split("_")[0])
-            if "handles" in title:
-                axes.lines[-1].set_label(name.replace("_", ": "))
-        axes.set_ylim(bottom=0.0)
+            label = NAMES[name] if names is counted else name.partition("_")[0]
+            # Dashed, since some lie on each other.
+            axes.plot(sweeps, values, dashes, linewidth=1.2, label=label)
+        axes.set_ylim(0.0, 1.1 * float(axes.dataLim.ymax))
         axes.set_title(title, fontsize=10)
         axes.grid(alpha=0.3)
         if len(names) > 1:
-            axes.legend(fontsize=8)
+            axes.legend(fontsize=8, loc="lower right")
+        if names == ("bytes_per_point",):
+            # The file that a first session makes is nearly empty, and far above all others.
+            axes.set_ylim(0.0, 1.5 * float(np.median(values)))
     figure.supxlabel("sweeps", fontsize=10)
     figure.savefig(path, dpi=110)
 
@@ -208,24 +217,40 @@ def report(samples: list[Sample], *, write: bool) -> list[str]:
     return found
 
 
+def run(seconds: float) -> None:
+    """Measure for that long; every sample is on the disk before the next session begins."""
+    serve = ("--unit", "adss", "--ratio", "0.3", "--tcp", "0", "--speed", "fast")
+    SAMPLES.parent.mkdir(exist_ok=True)
+    with (
+        tempfile.TemporaryDirectory(prefix="soak-") as folder,
+        serving(*serve) as served,
+        SAMPLES.open("w", encoding="ascii", buffering=1) as lines,
+    ):
+        db, url = Path(folder) / "bench.db", served["tcp"]
+        children = Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children")
+        server = int(children.read_text(encoding="ascii").split()[0])
+        for number, sample in enumerate(soak(seconds, db, url, server)):
+            lines.write(json.dumps(asdict(sample)) + "\n")
+            if number % 100 == 0:
+                print(sample, flush=True)
+
+
+def recorded() -> list[Sample]:
+    """The samples of the last run, whether or not it came to its end."""
+    lines = SAMPLES.read_text(encoding="ascii").splitlines()
+    return [Sample(**json.loads(line)) for line in lines]
+
+
 def main() -> int:
     """Run, print, and perhaps write."""
     words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     words.add_argument("--minutes", type=float, default=60.0)
+    words.add_argument("--report", action="store_true", help="no run, only the last one's samples")
     words.add_argument("--write", action="store_true", help="write table and picture into the docs")
     given = words.parse_args()
-    samples = []
-    serve = ("--unit", "adss", "--ratio", "0.3", "--tcp", "0", "--speed", "fast")
-    with tempfile.TemporaryDirectory(prefix="soak-") as folder, serving(*serve) as served:
-        db, url = Path(folder) / "bench.db", served["tcp"]
-        children = Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children")
-        server = int(children.read_text(encoding="ascii").split()[0])
-        for sample in soak(given.minutes * 60.0, db, url, server):
-            samples.append(sample)
-            if len(samples) % 100 == 1:
-                print(sample, flush=True)
-        found = report(samples, write=given.write)
-    return 1 if found else 0
+    if not given.report:
+        run(given.minutes * 60.0)
+    return 1 if report(recorded(), write=given.write) else 0
 
 
 if __name__ == "__main__":

@@ -37,7 +37,8 @@ def test_numbers_as_the_instrument_prints_them(text, value):
 
 
 @pytest.mark.parametrize(
-    "text", ["", "+", "1,2", "1 2", "nan", "inf", "0x10", "1e", "1_000", "E5", "+1.0E+999", "١"]
+    "text",
+    ["", "+", "1,2", "1 2", "nan", "inf", "0x10", "1e", "1_000", "E5", "+1.0E+999", "١", "2\x1d"],
 )
 def test_what_is_no_number(text):
     with pytest.raises(ProtocolError, match="number was due"):
@@ -56,7 +57,7 @@ def test_integers_carry_a_sign(text, value):
     assert parse_integer(text) == value
 
 
-@pytest.mark.parametrize("text", ["", "+2.56E+002", "1.0", "+", "1 2", "²"])
+@pytest.mark.parametrize("text", ["", "+2.56E+002", "1.0", "+", "1 2", "²", "+2\x1d"])
 def test_what_is_no_integer(text):
     with pytest.raises(ProtocolError, match="integer was due"):
         parse_integer(text)

@@ -214,6 +214,11 @@ def test_a_cut_file_is_refused(whole, tmp_path, part):
         ("UPDATE points SET detail = '{'", "points"),
         ("UPDATE plans SET document = '[]'", "measurement"),
         ("UPDATE plans SET document = '{\"levels_vpk\": [-1]}'", "measurement"),
+        (
+            'UPDATE plans SET document = \'{"frequencies_hz": [1], "levels_vpk": [1], '
+            '"a\\nb": 1}\'',
+            "measurement",
+        ),
         ("UPDATE measurements SET source_state = 'humming'", "measurement"),
         ("UPDATE points SET flags = 'x'", "points"),
         ("UPDATE units SET name = CAST(x'ff00ff' AS TEXT)", "measurement"),
@@ -225,6 +230,7 @@ def test_a_record_that_cannot_be_read_is_told(whole, tmp_path, script, reads):
     run_sql(path, script)
     with Store(path) as store, pytest.raises(FileFormatError) as caught:
         getattr(store, reads)(1)
+    assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
 
 

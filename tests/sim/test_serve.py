@@ -128,6 +128,22 @@ def test_two_clients_get_their_own_replies():
             assert line(two) == b"1992.0\n"
 
 
+def test_who_asks_without_end_and_never_listens_is_hung_up_on(monkeypatch):
+    monkeypatch.setattr("sim.wires._MOST_UNHEARD", 10_000)
+
+    def ask_on(wire):
+        # A connection that stays holds no more than the buffers of both its ends.
+        for _ in range(500):
+            wire.sendall(b"*IDN?\n" * 10_000)
+
+    with served() as server, raw(server) as deaf, raw(server) as other:
+        deaf.settimeout(30.0)
+        with pytest.raises(ConnectionError):
+            ask_on(deaf)
+        other.sendall(b"*IDN?\n")
+        assert b"35670A" in other.recv(100)
+
+
 def test_a_script_that_only_sleeps_finds_the_sweep_done():
     with served() as server, raw(server) as wire:
         wire.sendall(

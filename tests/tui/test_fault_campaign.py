@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 from fault_cases import DISTURBANCES, WIRES, Case, can_strike, draw_cases
 from fault_child import drives, instrument_of, options, true_gain
-from fault_runs import Campaign, Run
+from fault_runs import Campaign, Run, Stopwatch
 
 from daq.analyser import SweepPoint
 from daq.control import SessionControl
@@ -129,6 +129,15 @@ def test_the_judge_sees_points_that_are_lost_changed_or_wrong(tmp_path):
     assert "told otherwise" in first
     assert "170 Hz and 1 V peak was told and is lost" in second
     assert "150 Hz and 2 V peak is wrong by a factor of" in third
+
+
+def test_the_judge_counts_no_waiting_for_a_processor_but_every_other():
+    accounts = iter([2.0, 5.0, 0.0])  # the last: the program has ended
+    program = SimpleNamespace(starved_s=lambda: next(accounts))
+    watch = Stopwatch(program, SimpleNamespace(starved_s=lambda: 1.0))
+    for _ in range(2):
+        assert watch.own_s() == pytest.approx(watch.elapsed_s() - 3.0, abs=0.5)
+    assert watch.starved_s == 3.0
 
 
 def test_five_hundred_runs_go_through_everything_and_are_the_same_again():

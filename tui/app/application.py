@@ -22,6 +22,7 @@ from textual.binding import Binding, BindingType
 from textual.screen import ModalScreen, Screen
 
 from daq.errors import LashbenchError
+from daq.formats.atomic import write_text
 from daq.session_events import Finished, PointStored, RunIn
 from tui.app import bench_owner, messages
 from tui.app.analyses import Analyses
@@ -159,9 +160,9 @@ class BenchApp(App[int]):
         self.copy_to_clipboard(text)
         kept = ""
         if self._log_file is not None:
-            with suppress(OSError):
+            with suppress(LashbenchError):
                 path = self._log_file.with_name("copied.txt")
-                path.write_text(text + "\n", encoding="utf-8")
+                write_text(path, text + "\n")
                 kept = f"; also in {path}"
         self.notify(f"copied{kept}")
 
