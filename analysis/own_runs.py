@@ -31,17 +31,17 @@ class OwnRun:
 
     `place` (d,): where it was made. `alone`: the hypothesis's surface without
     the group that shares the run's deviations. `as_read` (3, rows): the run
-    with reading noise, minus the true observation; `quiet` (rows,): its state.
+    with reading noise, minus the true observation; `scatter` (rows,): its own.
     """
 
     place: NDArray[np.float64]
     alone: Surface
     as_read: NDArray[np.float64]
-    quiet: NDArray[np.bool_]
+    scatter: NDArray[np.float64]
 
     def seen_by(self, surface: Surface) -> Surface:
         """Another hypothesis's surface, relative to this run instead of the observation."""
-        motions = surface.motions.against(self.quiet)
+        motions = surface.motions.against(self.scatter)
         difference = _wrapped(surface.difference - self.as_read)
         return replace(surface, difference=difference, motions=motions)
 
@@ -67,12 +67,12 @@ def own_runs(candidate: Candidate, rng: np.random.Generator) -> Iterator[OwnRun]
         as_read = surface.difference[i].copy()
         as_read[:2] += rng.standard_normal((2, len(noise))) * noise
         moved = _wrapped(surface.difference[others] - as_read)
-        quiet = surface.motions.quiet[i]
-        motions = surface.motions.of(others).against(quiet)
+        scatter = surface.motions.scatter[i]
+        motions = surface.motions.of(others).against(scatter)
         alone = replace(surface, places=surface.places[others], difference=moved, motions=motions)
         if alone.lost(surface.places[i]) <= most_lost:
             taken += 1
-            yield OwnRun(surface.places[i], alone, as_read, quiet)
+            yield OwnRun(surface.places[i], alone, as_read, scatter)
 
 
 def _wrapped(difference: NDArray[np.float64]) -> NDArray[np.float64]:
