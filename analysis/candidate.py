@@ -104,7 +104,7 @@ def _pooled_slopes(
         offset = (places - np.median(places, axis=0)) / np.maximum(np.ptp(places, axis=0), 1e-6)
         basis = np.column_stack([np.ones(len(places)), offset, offset[:, :1] ** 2])
         values = np.nan_to_num(surface.difference)
-        # Another motion follows deviations in another way.
+        # Runs in another state of motion follow deviations in another way.
         trust = _robust(values) * surface.alike[:, None]
         inside, seen = _apart(basis, population.deviations, values, trust)
         normal += inside

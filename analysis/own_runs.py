@@ -31,17 +31,17 @@ class OwnRun:
 
     `place` (d,): where it was made. `alone`: the hypothesis's surface without
     the group that shares the run's deviations. `as_read` (3, rows): the run
-    with reading noise, minus the true observation; `scatter` (rows,): its own.
+    with reading noise, minus the true observation; `quiet` (rows,): its state.
     """
 
     place: NDArray[np.float64]
     alone: Surface
     as_read: NDArray[np.float64]
-    scatter: NDArray[np.float64]
+    quiet: NDArray[np.bool_]
 
     def seen_by(self, surface: Surface) -> Surface:
         """Another hypothesis's surface, relative to this run instead of the observation."""
-        motions = surface.motions.against(self.scatter)
+        motions = surface.motions.against(self.quiet)
         difference = _wrapped(surface.difference - self.as_read)
         return replace(surface, difference=difference, motions=motions)
 
@@ -67,12 +67,12 @@ def own_runs(candidate: Candidate, rng: np.random.Generator) -> Iterator[OwnRun]
         as_read = surface.difference[i].copy()
         as_read[:2] += rng.standard_normal((2, len(noise))) * noise
         moved = _wrapped(surface.difference[others] - as_read)
-        scatter = surface.motions.scatter[i]
-        motions = surface.motions.of(others).against(scatter)
+        quiet = surface.motions.quiet[i]
+        motions = surface.motions.of(others).against(quiet)
         alone = replace(surface, places=surface.places[others], difference=moved, motions=motions)
         if alone.lost(surface.places[i]) <= most_lost:
             taken += 1
-            yield OwnRun(surface.places[i], alone, as_read, scatter)
+            yield OwnRun(surface.places[i], alone, as_read, quiet)
 
 
 def _wrapped(difference: NDArray[np.float64]) -> NDArray[np.float64]:

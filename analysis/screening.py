@@ -77,7 +77,7 @@ _Expected = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 def _about_best(candidate: Candidate) -> list[_Expected]:
     """Places about a candidate's best one, with the mean and the scatter expected there."""
     best = candidate.best.place
-    # The atlas, which is laid over it, is too thin to tell motions apart.
+    # The atlas, which is laid over it, is too thin to tell states of motion apart.
     nothing = Motions.unknown(*candidate.surface.difference.shape[::2])
     surface = replace(candidate.surface, tailed=False, motions=nothing)
     places = [

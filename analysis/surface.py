@@ -40,7 +40,7 @@ _STRIDES = (0.5, 0.25, 0.12, 0.06)
 """Reach of the random steps of a climb, as shares of what was simulated."""
 
 _UNALIKE = 1e-4
-"""Weight of runs in another motion: they count only where there are no others."""
+"""Weight of runs in another state of motion: they count only where there are no others."""
 
 _UNKNOWN = np.array([0.5, 0.5, 1.5])
 """Scatter of a motion that no run shows, by channel: a machine that never does what was observed
@@ -100,7 +100,7 @@ class Surface:
     quadratic
         Whether the regression bends along each coordinate.
     motions
-        How runs and observation scatter: where they do so differently a run tells nothing.
+        States of the runs and of the observation: where they differ a run tells nothing.
     tailed
         Whether scatter is fitted as Student's t (slower) or as a mean square.
     """

@@ -1,4 +1,4 @@
-"""Motions side by side: runs are compared with an observation only where both scatter alike."""
+"""States of motion: runs are compared with an observation only where both do the same."""
 
 import numpy as np
 import pytest
@@ -13,32 +13,28 @@ QUIET, LOUD = 0.2, 0.8
 """Shares of runs on either branch."""
 
 
-def scatter(quiet):
-    """Logarithms of the scatter of quiet and of chattering motion."""
-    return np.where(np.array(quiet, dtype=bool), -6.0, -2.5)
-
-
 def motions(quiet, seen, first=(0,)):
     starts = np.zeros(len(seen), dtype=bool)
     starts[list(first)] = True
-    return Motions(scatter(quiet), scatter(seen), starts)
+    return Motions(np.array(quiet, dtype=bool), np.array(seen, dtype=np.int8), starts)
 
 
-def test_runs_are_alike_whose_scatter_is_that_of_the_observation_noise_included():
+def test_a_state_is_told_by_the_scatter_above_the_reading_s_noise():
     seen = observation(np.zeros((3, ROWS)))
     floor = 0.5 * np.log(2.0 * seen.noise**2)
     seen.values[2] = floor
     seen.values[2, 1] = floor[1] + 3.0
     seen.values[2, 2] = np.nan
     variance = np.zeros((2, ROWS))
-    variance[1] = 2.0 * seen.noise**2 * (np.exp(6.0) - 1.0)
+    variance[1] = 100.0 * seen.noise**2
     runs = Population(
         np.zeros((2, 1)), np.zeros((2, 5)), np.ones((2, ROWS), dtype=complex), variance
     )
     found = find_motions(seen, runs)
-    assert found.alike[:, :4].tolist() == [[1, 0, 1, 1], [0, 1, 1, 0]]
+    assert found.quiet.tolist() == [[True] * ROWS, [False] * ROWS]
+    assert found.seen.tolist() == [1, 0, -1] + [1] * (ROWS - 3)
     assert np.flatnonzero(found.starts).tolist() == [block.start for block in seen.blocks]
-    assert found.mixed.tolist() == [True, True, False] + [True] * (ROWS - 3)
+    assert found.alike[:, :4].tolist() == [[1, 0, 1, 1], [0, 1, 1, 0]]
 
 
 def test_shares_are_paid_for_where_a_level_begins_and_where_the_motion_changes():
@@ -46,7 +42,7 @@ def test_shares_are_paid_for_where_a_level_begins_and_where_the_motion_changes()
     shares = motions(quiet, [1, 1, 1, 1]).log_shares(np.ones(8))
     assert shares[0] == pytest.approx(np.log(2.5 / 9.0))
     assert shares[1:] == pytest.approx(np.log(2.98 / 3.0))
-    jumped = motions(quiet, [True, True, False, False]).log_shares(np.ones(8))
+    jumped = motions(quiet, [1, 1, 0, 0]).log_shares(np.ones(8))
     # Of two quiet runs none changes; then six of six stay.
     assert jumped[2] == pytest.approx(np.log(0.02 / 3.0))
     assert jumped[3] == pytest.approx(np.log(6.98 / 7.0))
@@ -55,13 +51,11 @@ def test_shares_are_paid_for_where_a_level_begins_and_where_the_motion_changes()
     assert not np.any(Motions.unknown(8, 4).log_shares(np.ones(8)))
 
 
-def test_another_observation_brings_its_own_scatter_where_one_is_known():
-    one = motions([[True, False, True]], [False, True, True])
-    one.seen[1] = np.nan
-    other = one.against(scatter([True, True, False]))
-    np.testing.assert_array_equal(other.seen, [-6.0, np.nan, -2.5])
-    assert other.alike.tolist() == [[1, 1, 0]]
-    assert one.of(np.array([False])).scatter.shape == (0, 3)
+def test_another_observation_brings_its_own_states_where_states_are_known():
+    one = motions([[True, False, True]], [0, -1, 1])
+    other = one.against(np.array([True, True, False]))
+    assert other.seen.tolist() == [1, -1, 0]
+    assert one.of(np.array([False])).quiet.shape == (0, 3)
 
 
 def branching(rng, offset):
