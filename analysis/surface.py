@@ -97,10 +97,10 @@ class Surface:
         (k, 3, rows): change of the channels per unit of each deviation, or no rows.
     sigmas
         (k,): prior standard deviations of the deviations.
-    quadratic
-        Whether the regression bends along each coordinate.
     motions
         States of the runs and of the observation: where they differ a run tells nothing.
+    quadratic
+        Whether the regression bends along each coordinate.
     tailed
         Whether scatter is fitted as Student's t (slower) or as a mean square.
     """
@@ -136,10 +136,8 @@ class Surface:
             weight = weights[picks].T * alike
             found = self._regress(offset, weight, _WIDENINGS[picks], mixed)
             unknown = np.clip(1.0 - weight.sum(axis=0), 0.0, 1.0)
-            mean[:, mixed], variance[:, mixed] = (
-                found[0],
-                found[1] + unknown * _UNKNOWN[:, None] ** 2,
-            )
+            mean[:, mixed] = found[0]
+            variance[:, mixed] = found[1] + unknown * _UNKNOWN[:, None] ** 2
         variance = variance @ self._blur
         return mean + self._unread, np.sqrt(variance + self._least)
 
