@@ -53,7 +53,7 @@ class PrologixTransport:
             # A command may still do good once the adapter comes back; the answer to a question
             # could not be told from an older one.
             raise self._adapter_silent()
-        lying = self._adapter.unread().replace(b"\0", b"")
+        lying = self._adapter.inbox.emptied().replace(b"\0", b"")
         if lying.strip():
             raise ProtocolError(
                 f"{self.address}: {lying[:60]!r} came unasked for, after {self._waiting!r} and "
@@ -67,7 +67,7 @@ class PrologixTransport:
         adapter = self._adapter
         self._fruitless = 0
         adapter.send(b"++read eoi", deadline)
-        while (line := adapter.taken_line()) is None:
+        while (line := adapter.inbox.taken_line()) is None:
             self._wait_for_more(deadline)
         try:
             return line.replace(b"\0", b"").decode("ascii").strip()
@@ -85,7 +85,7 @@ class PrologixTransport:
 
         def take(count: int) -> bytes:
             nonlocal before
-            while (part := adapter.taken(count)) is None:
+            while (part := adapter.inbox.taken(count)) is None:
                 self._wait_for_more(deadline, before)
             before += count
             return part
@@ -98,10 +98,10 @@ class PrologixTransport:
         An adapter gives up in silence when a byte is late, and what is left of
         the reply stays in the instrument. `before` bytes of it were used up.
         """
-        came_before = before + self._adapter.kept()
+        came_before = before + len(self._adapter.inbox)
         if deadline.expired or (came_before and self._fruitless >= _FRUITLESS_READS):
             raise self._silence(came_before, deadline)
-        if self._adapter.gather(Deadline.after(_ONE_READ_S)):
+        if self._adapter.inbox.gather(Deadline.after(_ONE_READ_S)):
             self._fruitless = 0
         elif not deadline.expired:
             self._fruitless += 1

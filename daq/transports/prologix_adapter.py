@@ -11,7 +11,8 @@ import re
 from dataclasses import dataclass
 
 from daq.errors import LinkError, ProtocolError
-from daq.transports.base import KEPT_LIMIT_BYTES, Deadline
+from daq.transports.base import Deadline
+from daq.transports.inbox import Inbox
 from daq.transports.links import Link
 
 __all__ = ["AR488", "OTHER", "PROLOGIX", "Adapter", "Dialect", "dialect_of", "escape"]
@@ -76,6 +77,11 @@ class Adapter:
     deadline
         Bound of finding and setting it up.
 
+    Attributes
+    ----------
+    inbox
+        What came from it and was not taken.
+
     Raises
     ------
     LinkError
@@ -86,7 +92,7 @@ class Adapter:
     def __init__(self, link: Link, gpib_address: int, deadline: Deadline) -> None:
         self.link = link
         self.gpib_address = gpib_address
-        self._unread = bytearray()
+        self.inbox = Inbox(link, "a GPIB adapter")
         self._versions_due = 0
         self.version, self.dialect = self._find(deadline)
         self.set_up(deadline)
@@ -96,53 +102,6 @@ class Adapter:
     def send(self, data: bytes, deadline: Deadline) -> None:
         """Send one line, which is already escaped where it has to be."""
         self.link.send(data + b"\n", deadline)
-
-    def gather(self, deadline: Deadline) -> bool:
-        """Wait for bytes and keep them; False if none came by the deadline.
-
-        Raises
-        ------
-        ProtocolError
-            If more came, and was not taken, than any reply has.
-        """
-        came = self.link.receive(deadline)
-        self._unread += came
-        if len(self._unread) > KEPT_LIMIT_BYTES:
-            self._unread.clear()
-            raise ProtocolError(
-                f"{self.link.name}: talks without end, more than {KEPT_LIMIT_BYTES} bytes came; "
-                "is it a GPIB adapter?"
-            )
-        return bool(came)
-
-    def taken(self, count: int) -> bytes | None:
-        """`count` of the bytes kept, None if there are not so many yet."""
-        if len(self._unread) < count:
-            return None
-        first = bytes(self._unread[:count])
-        del self._unread[:count]
-        return first
-
-    def taken_line(self) -> bytes | None:
-        """The bytes kept up to the first line feed, without it; None if there is none yet."""
-        end = self._unread.find(b"\n")
-        if end < 0:
-            return None
-        line = bytes(self._unread[:end])
-        del self._unread[: end + 1]
-        return line
-
-    def kept(self) -> int:
-        """How many bytes are kept."""
-        return len(self._unread)
-
-    def unread(self) -> bytes:
-        """What came and was not taken, without waiting; taken by this call."""
-        while self.gather(Deadline.after(0.0)):
-            pass
-        lying = bytes(self._unread)
-        self._unread.clear()
-        return lying
 
     # The adapter's own commands
 
@@ -172,7 +131,7 @@ class Adapter:
                 break  # it talks on and on
         if heard:
             self._versions_due = 0  # those of before a reset never come
-        self._unread.clear()
+        self.inbox.clear()
         return heard
 
     def has_forgotten(self, deadline: Deadline) -> bool:
@@ -220,8 +179,8 @@ class Adapter:
         self.link.close()
 
     def _next_line(self, deadline: Deadline) -> str | None:
-        while (line := self.taken_line()) is None:
-            if not self.gather(deadline):
+        while (line := self.inbox.taken_line()) is None:
+            if not self.inbox.gather(deadline):
                 return None
         return _text(line)
 
@@ -242,7 +201,7 @@ class Adapter:
             dialect = None if line is None else dialect_of(line)
             if line is not None and dialect is not None:
                 return self._settled(line, dialect, deadline)
-        heard = heard or _text(self.unread())
+        heard = heard or _text(self.inbox.emptied())
         raise LinkError(
             f"{self.link.name}: no GPIB adapter answered '++ver' within {deadline.span_s:g} s "
             f"({f'it said {heard[:60]!r}' if heard else 'silent'}); is it a Prologix, AR488 or "
@@ -274,9 +233,9 @@ class Adapter:
         )
 
     def _hear_out(self, deadline: Deadline) -> None:
-        while self.gather(deadline.within(_QUIET_S)):
+        while self.inbox.gather(deadline.within(_QUIET_S)):
             pass
-        self._unread.clear()
+        self.inbox.clear()
 
 
 def _text(line: bytes) -> str:

@@ -1,8 +1,7 @@
 """An instrument on a bare TCP stream: one line feed ends a message, and a reply.
 
-Owns where a reply ends on a wire that has no ends of its own, and what is kept of
-one that does not end. Such a wire has no serial poll and no device clear. It speaks
-no SCPI.
+Owns where a reply ends on a wire that has no ends of its own. Such a wire has no
+serial poll and no device clear. It speaks no SCPI.
 """
 
 from __future__ import annotations
@@ -10,7 +9,8 @@ from __future__ import annotations
 import time
 
 from daq.errors import BenchTimeout, ProtocolError
-from daq.transports.base import KEPT_LIMIT_BYTES, Deadline, checked_line, take_block
+from daq.transports.base import Deadline, checked_line, take_block
+from daq.transports.inbox import Inbox
 from daq.transports.links import Link
 
 __all__ = ["StreamTransport"]
@@ -23,7 +23,7 @@ class StreamTransport:
         self.address = address
         self._link = link
         self._waiting = "nothing"
-        self._kept = bytearray()
+        self._inbox = Inbox(link, "the instrument")
 
     def write(self, line: str, deadline: Deadline) -> None:
         """Send one message."""
@@ -33,9 +33,8 @@ class StreamTransport:
 
     def read(self, deadline: Deadline) -> str:
         """One text reply, without terminator."""
-        while (end := self._kept.find(b"\n")) < 0:
-            self._wait_for_more(deadline, begun=bool(self._kept))
-        line = self._taken(end + 1)
+        while (line := self._inbox.taken_line()) is None:
+            self._wait_for_more(deadline)
         try:
             return line.decode("ascii").strip()
         except UnicodeDecodeError as error:
@@ -49,10 +48,10 @@ class StreamTransport:
 
         def take(count: int) -> bytes:
             nonlocal before
-            while len(self._kept) < count:
-                self._wait_for_more(deadline, begun=bool(before or self._kept))
+            while (part := self._inbox.taken(count)) is None:
+                self._wait_for_more(deadline, before)
             before += count
-            return self._taken(count)
+            return part
 
         return take_block(take)
 
@@ -61,10 +60,8 @@ class StreamTransport:
 
     def device_clear(self, deadline: Deadline) -> bool:
         """Drop what lies unread, without waiting for more; False, as nothing is cleared."""
-        self._kept.clear()
-        while self._gather(Deadline.after(0.0)):
-            pass
-        self._kept.clear()
+        self._inbox.clear()
+        self._inbox.emptied()
         return False
 
     def pause(self, seconds: float) -> None:
@@ -75,28 +72,12 @@ class StreamTransport:
         """Let go of the link."""
         self._link.close()
 
-    def _taken(self, count: int) -> bytes:
-        first = bytes(self._kept[:count])
-        del self._kept[:count]
-        return first
-
-    def _gather(self, deadline: Deadline) -> bool:
-        """Keep what is there, waiting for a first byte; False if none came by the deadline."""
-        came = self._link.receive(deadline)
-        self._kept += came
-        if len(self._kept) > KEPT_LIMIT_BYTES:
-            self._kept.clear()
-            raise ProtocolError(
-                f"{self.address}: talks without end after {self._waiting!r}, more than "
-                f"{KEPT_LIMIT_BYTES} bytes; is it the instrument?"
-            )
-        return bool(came)
-
-    def _wait_for_more(self, deadline: Deadline, *, begun: bool) -> None:
-        """Gather bytes of a reply; a peer that dribbles on does not stretch the deadline."""
-        if not (begun and deadline.expired) and self._gather(deadline):
+    def _wait_for_more(self, deadline: Deadline, before: int = 0) -> None:
+        """Gather bytes of a reply, `before` of which were used up; dribbles do not stretch it."""
+        begun = before + len(self._inbox) > 0
+        if not (begun and deadline.expired) and self._inbox.gather(deadline):
             return
-        self._kept.clear()
+        self._inbox.clear()
         if begun:
             raise ProtocolError(
                 f"{self.address}: the reply to {self._waiting!r} began and was cut short; "
