@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.observation import Observation, channels_of_readings
+from analysis.observation import Observation
 from analysis.population import Population
 
 __all__ = ["Motions", "find_motions"]
@@ -82,9 +82,8 @@ class Motions:
 
 def find_motions(observation: Observation, population: Population) -> Motions:
     """States of the runs of a population and of an observation."""
-    noise = observation.noise
-    limit = 0.5 * np.log(2.0 * noise**2) + _ABOVE_NOISE
-    scatter = channels_of_readings(population.mean, population.variance, noise)[:, 2]
+    limit = 0.5 * np.log(2.0 * observation.noise**2) + _ABOVE_NOISE
+    scatter = population.channels(observation)[:, 2]
     seen = observation.values[2]
     starts = np.zeros(len(observation), dtype=bool)
     starts[[block.start for block in observation.blocks]] = True

@@ -99,8 +99,6 @@ class Surface:
         (k,): prior standard deviations of the deviations.
     motions
         States of the runs and of the observation: where they differ a run tells nothing.
-    quadratic
-        Whether the regression bends along each coordinate.
     tailed
         Whether scatter is fitted as Student's t (slower) or as a mean square.
     """
@@ -112,7 +110,6 @@ class Surface:
     slopes: NDArray[np.float64]
     sigmas: NDArray[np.float64]
     motions: Motions
-    quadratic: bool = False
     tailed: bool = True
 
     def scan(self, grid: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -152,10 +149,7 @@ class Surface:
         near = weight.max(axis=1) > 0.0
         weight, offset = weight[near], offset[near]
         values = self._values[near][:, :, rows]
-        columns = [np.ones(len(offset)), *offset.T]
-        if self.quadratic:
-            columns += list((offset**2).T)
-        basis = np.column_stack(columns)
+        basis = np.column_stack([np.ones(len(offset)), offset])
         terms = basis.shape[1]
         products = (basis[:, :, None] * basis[:, None, :]).reshape(len(basis), -1)
         normal = (products.T @ weight).T.reshape(-1, terms, terms)
@@ -199,7 +193,8 @@ class Surface:
             best = np.linalg.solve(normal, (slope * trust) @ y)
         residual = -mean - np.tensordot(best, slopes, axes=1)
         density = self.log_density(-residual, std)
-        density[2] += self._log_shares(place)
+        # Of runs near the place so many do as was observed.
+        density[2] += self.motions.log_shares(self._near(place))
         _, log_det = np.linalg.slogdet(normal @ np.diag(sigmas**2))
         prior = -0.5 * float(np.sum((best / sigmas) ** 2)) - 0.5 * float(log_det)
         total = float(density[seen].sum()) + prior
@@ -233,14 +228,12 @@ class Surface:
 
     def lost(self, place: NDArray[np.float64]) -> int:
         """How many rows no run near a place shows as they were observed."""
-        weights = self._weights((self.places - place) / self.width)
-        near = weights[self._reach(weights.sum(axis=1))]
-        return int(np.count_nonzero(near @ self.motions.alike < 1.0))
+        return int(np.count_nonzero(self._near(place) @ self.motions.alike < 1.0))
 
-    def _log_shares(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Of runs near a place that do as was observed, row by row."""
+    def _near(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Weights (n,) of runs near a place, whatever they do there."""
         weights = self._weights((self.places - place) / self.width)
-        return self.motions.log_shares(weights[self._reach(weights.sum(axis=1))])
+        return weights[self._reach(weights.sum(axis=1))]
 
     def _weights(self, offset: NDArray[np.float64]) -> NDArray[np.float64]:
         """Weights (reaches, n) of runs for every reach that may be needed."""
@@ -249,7 +242,7 @@ class Surface:
 
     def _reach(self, totals: NDArray[np.float64]) -> NDArray[np.intp]:
         """The first reach whose weights (reaches, ...) suffice, or the last."""
-        needed = (2 if self.quadratic else 1) * len(self.width) + 1 + _SPARE
+        needed = len(self.width) + 1 + _SPARE
         enough = totals >= needed
         enough[-1] = True
         return np.argmax(enough, axis=0)

@@ -9,8 +9,9 @@ from analysis.population import Population
 from analysis.surface import Surface
 
 RUNS = 120
-QUIET, LOUD = 0.2, 0.8
-"""Shares of runs on either branch."""
+QUIET = 0.2
+"""Share of runs on the quiet branch."""
+MIDDLE = np.array([0.5])
 
 
 def motions(quiet, seen, first=(0,)):
@@ -58,13 +59,16 @@ def test_another_observation_brings_its_own_states_where_states_are_known():
     assert one.of(np.array([False])).quiet.shape == (0, 3)
 
 
-def branching(rng, offset):
-    """Runs of which some keep quiet, and the others lie far off and scatter."""
+@pytest.fixture(params=range(4))
+def branching(request):
+    """Runs of which some keep quiet, and the others lie far off and scatter; one is seen quiet."""
+    rng = np.random.default_rng(request.param)
     quiet = rng.uniform(size=RUNS) < QUIET
     values = 0.01 * rng.standard_normal((RUNS, 3, ROWS))
     loud = 0.3 * rng.standard_normal((RUNS, 3, ROWS)) - 0.5
     values[~quiet] = loud[~quiet]
-    return values + offset, np.tile(quiet[:, None], (1, ROWS))
+    states = motions(np.tile(quiet[:, None], (1, ROWS)), np.ones(ROWS))
+    return observation(np.zeros((3, ROWS))), values, states, rng
 
 
 def surface(seen, values, states):
@@ -73,34 +77,25 @@ def surface(seen, values, states):
     return Surface(seen, places, values, np.array([0.5]), none, np.empty(0), states)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_what_is_expected_of_a_quiet_sweep_is_what_quiet_runs_show(seed):
-    rng = np.random.default_rng(seed)
-    seen = observation(np.zeros((3, ROWS)))
-    values, quiet = branching(rng, 0.0)
-    states = motions(quiet, np.ones(ROWS))
-    mean, std = surface(seen, values, states).expected(np.array([0.5]))
+def test_what_is_expected_of_a_quiet_sweep_is_what_quiet_runs_show(branching):
+    seen, values, states, _ = branching
+    mean, std = surface(seen, values, states).expected(MIDDLE)
     assert np.abs(mean[:2]).max() < 0.02
     assert np.median(std[:2]) == pytest.approx(0.01, rel=0.4)
-    values[~quiet[:, 0]] += 7.0
-    again, _ = surface(seen, values, states).expected(np.array([0.5]))
+    values[~states.quiet[:, 0]] += 7.0
+    again, _ = surface(seen, values, states).expected(MIDDLE)
     assert np.abs(again - mean).max() < 0.01
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_a_machine_with_two_motions_is_believed_before_one_that_imitates_one_of_them(seed):
-    rng = np.random.default_rng(seed)
-    seen = observation(np.zeros((3, ROWS)))
-    values, quiet = branching(rng, 0.0)
-    states = motions(quiet, np.ones(ROWS))
+def test_a_machine_with_two_motions_is_believed_before_one_that_imitates_one_of_them(branching):
+    seen, values, states, rng = branching
     imitation = 0.01 * rng.standard_normal((RUNS, 3, ROWS)) + 0.02
     always = motions(np.ones((RUNS, ROWS)), np.ones(ROWS))
-    middle = np.array([0.5])
     true, false = surface(seen, values, states), surface(seen, imitation, always)
-    assert true.fit(middle).log_likelihood > false.fit(middle).log_likelihood + 20.0
+    assert true.fit(MIDDLE).log_likelihood > false.fit(MIDDLE).log_likelihood + 20.0
     # What taking every point for itself would say.
     blurred = surface(seen, values, Motions.unknown(RUNS, ROWS))
-    assert blurred.fit(middle).log_likelihood < false.fit(middle).log_likelihood - 20.0
+    assert blurred.fit(MIDDLE).log_likelihood < false.fit(MIDDLE).log_likelihood - 20.0
 
 
 def test_with_no_run_in_its_state_an_observation_is_compared_with_all_and_that_is_paid_for():
@@ -108,7 +103,7 @@ def test_with_no_run_in_its_state_an_observation_is_compared_with_all_and_that_i
     seen = observation(np.zeros((3, ROWS)))
     values = 0.01 * rng.standard_normal((RUNS, 3, ROWS))
     lost = surface(seen, values, motions(np.zeros((RUNS, ROWS)), np.ones(ROWS)))
-    fit = lost.fit(np.array([0.5]))
+    fit = lost.fit(MIDDLE)
     assert np.all(np.isfinite(fit.density))
     known = surface(seen, values, motions(np.ones((RUNS, ROWS)), np.ones(ROWS)))
-    assert fit.log_likelihood < known.fit(np.array([0.5])).log_likelihood - 3.0
+    assert fit.log_likelihood < known.fit(MIDDLE).log_likelihood - 3.0
