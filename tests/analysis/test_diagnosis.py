@@ -129,6 +129,9 @@ def test_one_level_without_phase_still_gets_a_verdict_and_asks_for_more(cache):
     json.dumps(document, allow_nan=False)
 
 
+WEAK_CHATTER = {"02": 1.5, "04": 1.5}
+"""Sets with a few points in a motion that few runs show: 1.47 and 1.37 were measured."""
+
 QUICK = ("12",)
 """Sets of every test run; the others are judged by `make blind`."""
 
@@ -154,8 +157,7 @@ def test_practice_sets_of_another_program(number, tmp_path, practice_cache):
             assert named[effect][name]["value"] == pytest.approx(value, rel=0.2)
     ratio = document["contribution_ratio"]["extended"]
     assert abs(ratio["value"] - truth["contribution_ratio"]) < max(0.06, 2.5 * ratio["std"])
-    # A few points in a weak chatter that few runs show make it 1.47 and 1.37 in sets 02 and 04.
-    assert document["extended"]["held_out_rms_sigma"] < 1.6
+    assert document["extended"]["held_out_rms_sigma"] < WEAK_CHATTER.get(number, 1.3)
     assert "\n".join(found.summary())
     for path in draw_diagnosis(found, tmp_path):
         assert path.read_bytes().startswith(b"\x89PNG")
