@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.causes import Hypothesis, every_single_cause
+from analysis.executor import Executor
 from analysis.observation import Observation
 from analysis.population import Group, Population, simulate_groups
 from sim.unit import Unit
@@ -55,6 +56,7 @@ def make_atlas(
     unit: Unit,
     coarse: Observation,
     cache: Path | None = None,
+    executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Atlas:
     """Simulate the atlas of a unit for the plan of a thinned observation, or read it from `cache`.
@@ -68,7 +70,7 @@ def make_atlas(
     if file is not None and (known := _read(file)) is not None:
         return known
     rng = np.random.default_rng(_SEED)
-    atlas = simulate_groups(unit, list(_groups(unit, rng)), coarse, rng, progress)
+    atlas = simulate_groups(unit, list(_groups(unit, rng)), coarse, rng, executor, progress)
     if file is not None:
         _write(file, atlas)
     return atlas

@@ -14,6 +14,7 @@ from types import TracebackType
 from typing import Any, Self, TypeVar
 
 from daq.errors import AnalysisError, InputError, LinkError
+from sim.effort import counting, spend
 
 __all__ = ["ClusterExecutor"]
 
@@ -105,7 +106,8 @@ class ClusterExecutor:
         results: dict[int, R] = {}
         try:
             for future in as_completed(futures, loop=self._client.loop):
-                results[place[future.key]] = future.result()
+                results[place[future.key]], simulated_s = future.result()
+                spend(simulated_s)
                 # Fetched is safe: a worker that is lost from now on takes no result with it.
                 future.release()
                 if progress is not None:
@@ -122,12 +124,20 @@ class ClusterExecutor:
         return [results[at] for at in range(len(tasks))]
 
 
-def _run(parcel: tuple[Callable[[T], R], T, str]) -> R:
-    """On a worker: do a task, unless this is another lashbench than the one that sent it."""
+def _run(parcel: tuple[Callable[[T], R], T, str]) -> tuple[R, float]:
+    """On a worker: do a task, and count what it simulates.
+
+    Raises
+    ------
+    AnalysisError
+        If this is another lashbench than the one that sent it.
+    """
     work, task, made_by = parcel
     here = version("lashbench")
     if here != made_by:
         raise AnalysisError(
             f"a worker holds lashbench {here}, this is {made_by}; install the same everywhere"
         )
-    return work(task)
+    with counting() as effort:
+        result = work(task)
+    return result, effort.simulated_s

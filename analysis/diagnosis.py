@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from analysis.calibration import Calibrated
+from analysis.executor import Executor
 from analysis.misfit import Departure, describe_departures, find_departures
 from analysis.next_measurement import NextMeasurement, propose_measurement
 from analysis.observation import Observation, observe
@@ -189,6 +190,7 @@ def diagnose_response(
     without: Collection[str] = (),
     cache: Path | None = None,
     seed: int = 0,
+    executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Diagnose a measured response.
@@ -205,6 +207,8 @@ def diagnose_response(
         Folder that keeps what was simulated for a unit and a plan.
     seed
         Of the starts and places of the simulations.
+    executor
+        Where runs are simulated; on this machine's cores if not given.
     progress
         Told the share done and what is being done, from the calling thread.
 
@@ -220,7 +224,7 @@ def diagnose_response(
         )
     started = time.perf_counter()
     with counting() as effort:
-        found = _diagnose(observe(response), unit, without, cache, seed, progress)
+        found = _diagnose(observe(response), unit, without, cache, seed, executor, progress)
     return replace(
         found,
         warnings=_warnings(response, found.observation),
@@ -235,6 +239,7 @@ def _diagnose(
     without: Collection[str],
     cache: Path | None,
     seed: int,
+    executor: Executor | None,
     progress: Progress | None,
 ) -> Diagnosis:
 
@@ -243,7 +248,7 @@ def _diagnose(
             progress(0.8 * share, text)
 
     candidates = search_causes(
-        unit, observed, without=without, cache=cache, seed=seed, progress=early
+        unit, observed, without=without, cache=cache, seed=seed, executor=executor, progress=early
     )
     observation = candidates[0].surface.observation
     rng = np.random.default_rng(seed)
@@ -253,9 +258,9 @@ def _diagnose(
     best = base
     if verdict.word != "unexplained":
         late = part_of(progress, 0.8, 0.9, "sizing it")
-        best = sharpen_candidate(unit, verdict.best.candidate, observation, rng, late)
+        best = sharpen_candidate(unit, verdict.best.candidate, observation, rng, executor, late)
     departures = find_departures(verdict.baseline.candidate, observation)
-    proposal = _proposal(unit, verdict, observation, seed, progress)
+    proposal = _proposal(unit, verdict, observation, seed, executor, progress)
     if progress is not None:
         progress(1.0, "done")
     return Diagnosis(
@@ -294,6 +299,7 @@ def _proposal(
     verdict: Verdict,
     observation: Observation,
     seed: int,
+    executor: Executor | None,
     progress: Progress | None,
 ) -> NextMeasurement | None:
     """A sweep that would decide, where something is left to decide."""
@@ -306,8 +312,9 @@ def _proposal(
 
     late = part_of(progress, 0.9, 1.0, "choosing the next measurement")
     return propose_measurement(
-        unit, verdict.best.candidate, rival.candidate, observation, seed=seed, progress=late
-    )
+        unit, verdict.best.candidate, rival.candidate, observation,
+        seed=seed, executor=executor, progress=late,
+    )  # fmt: skip
 
 
 def _warnings(response: FrequencyResponse, observation: Observation) -> tuple[str, ...]:

@@ -51,7 +51,7 @@ class Machine:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Draws:
-    """One run of each machine, free of any bench's noise, and the time simulated.
+    """One run of each machine, free of any bench's noise.
 
     `mean`, `variance` (draws, rows): see `analysis.observation.readings_of_cycles`.
     """
@@ -59,7 +59,6 @@ class Draws:
     machines: tuple[Machine, ...]
     mean: NDArray[np.complex128]
     variance: NDArray[np.float64]
-    simulated_s: float
 
     def channels(self, observation: Observation) -> NDArray[np.float64]:
         """Channels (draws, 3, rows) as the bench of an observation would read them."""
@@ -71,7 +70,6 @@ class Draws:
             self.machines + other.machines,
             np.concatenate([self.mean, other.mean]),
             np.concatenate([self.variance, other.variance]),
-            self.simulated_s + other.simulated_s,
         )
 
 

@@ -23,6 +23,7 @@ from analysis.observation import observe
 from analysis.paper_estimate import IndexCurve, index_curve_of_response
 from daq.errors import InputError
 from daq.frf import FrequencyResponse
+from sim.effort import counting
 from sim.unit import Unit
 
 __all__ = ["Estimate", "Uncertain", "estimate_features", "estimate_response"]
@@ -143,9 +144,10 @@ def estimate_response(
         axes = (_play_axis(unit),)
     elif total_backlash_unknown:
         axes = (replace(RATIO, coarse=17, scale=0.12), _total_axis(unit))
-    posterior = fit_posterior(
-        unit, observation, axes, seed=seed, cache=cache, executor=executor, progress=progress
-    )
+    with counting() as effort:
+        posterior = fit_posterior(
+            unit, observation, axes, seed=seed, cache=cache, executor=executor, progress=progress
+        )
     curve = index_curve_of_response(response, observation, posterior.draws)
     warnings = []
     misfit = _robust_rms(posterior)
@@ -154,7 +156,7 @@ def estimate_response(
             f"the model leaves {misfit:.1f} standard deviations of the response unexplained; "
             "run diagnose before trusting the ratio"
         )
-    return _from_posterior(unit, posterior, curve, tuple(warnings))
+    return _from_posterior(unit, posterior, curve, tuple(warnings), effort.simulated_s)
 
 
 def estimate_features(
@@ -176,7 +178,8 @@ def estimate_features(
         )
     from analysis.paper_estimate import fit_features
 
-    fitted = fit_features(arf_hz, rf_hz, unit, seed=seed, progress=progress)
+    with counting() as effort:
+        fitted = fit_features(arf_hz, rf_hz, unit, seed=seed, progress=progress)
     warnings = list(fitted.warnings)
     b_t = unit.backlash.b_t_deg
     return _assemble(
@@ -186,7 +189,7 @@ def estimate_features(
         fitted.weight,
         fitted.curve,
         tuple(warnings),
-        fitted.simulated_s,
+        effort.simulated_s,
     )
 
 
@@ -216,16 +219,19 @@ def _robust_rms(posterior: Posterior) -> float:
 
 
 def _from_posterior(
-    unit: Unit, posterior: Posterior, curve: IndexCurve | None, warnings: tuple[str, ...]
+    unit: Unit,
+    posterior: Posterior,
+    curve: IndexCurve | None,
+    warnings: tuple[str, ...],
+    simulated_s: float,
 ) -> Estimate:
     mesh = list(np.meshgrid(*posterior.values, indexing="ij"))
     if unit.stages == 1:
         mesh = [np.ones_like(mesh[0]), *mesh]
     ratios = mesh[0].ravel()
     total = mesh[1].ravel() if len(mesh) > 1 else np.full(ratios.shape, unit.backlash.b_t_deg)
-    return _assemble(
-        unit, ratios, total, posterior.weight.ravel(), curve, warnings, posterior.draws.simulated_s
-    )
+    weight = posterior.weight.ravel()
+    return _assemble(unit, ratios, total, weight, curve, warnings, simulated_s)
 
 
 def _assemble(

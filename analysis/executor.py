@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextvars import copy_context
 from typing import Protocol, TypeVar
 
 __all__ = ["Executor", "LocalExecutor"]
@@ -31,7 +32,8 @@ class Executor(Protocol):
         """Results in the order of the tasks, whatever the order in which they were done.
 
         `progress` is told the share done, from the calling thread. An error in
-        a task, or in `progress`, ends the whole; what has not begun is dropped.
+        a task, or in `progress`, ends the whole; what has not begun is dropped. What tasks
+        simulate counts for the caller (`sim.effort`).
         """
         ...
 
@@ -56,7 +58,8 @@ class LocalExecutor:
     ) -> list[R]:
         """See `Executor`."""
         with ThreadPoolExecutor(self._cores) as pool:
-            futures = [pool.submit(work, task) for task in tasks]
+            # Each in a copy of the context, through which motion is counted.
+            futures = [pool.submit(copy_context().run, work, task) for task in tasks]
             try:
                 for done, future in enumerate(as_completed(futures)):
                     future.result()

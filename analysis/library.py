@@ -13,56 +13,21 @@ import os
 import zipfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from analysis.ensemble import Draws, Machine, safe_cycles
-from analysis.executor import Executor, LocalExecutor
-from analysis.observation import Observation, readings_of_cycles
-from daq.plan import SweepPlan
+from analysis.ensemble import Draws, Machine
+from analysis.executor import Executor
+from analysis.family import Family, Readings, read_families
+from analysis.observation import Observation
 from sim.unit import Unit
 
-__all__ = ["Family", "read_family", "run_families"]
+__all__ = ["run_families"]
 
 _EDITION = 1
 """Counted up whenever the engine or the layout below change what is kept."""
-
-Readings = tuple[NDArray[np.complex128], NDArray[np.float64]]
-"""Mean of V_o/V_i and its relative variance, each (machines, rows)."""
-
-
-@dataclass(frozen=True, slots=True)
-class Family:
-    """Machines that share their linear part, and so fill the lanes of one call: a task.
-
-    `rows` are where each plan's points stand among the rows of the readings.
-    """
-
-    unit: Unit
-    machines: tuple[Machine, ...]
-    plans: tuple[tuple[SweepPlan, NDArray[np.int64]], ...]
-
-
-def read_family(family: Family) -> Readings:
-    """Take a family through its plans, on one core.
-
-    Raises
-    ------
-    AnalysisError
-        If a motion grew without bound even at the shortest step.
-    """
-    servos = [machine.servo(family.unit) for machine in family.machines]
-    count = sum(len(rows) for _, rows in family.plans)
-    mean = np.empty((len(servos), count), dtype=complex)
-    variance = np.empty((len(servos), count))
-    for plan, rows in family.plans:
-        for i, cycles in enumerate(safe_cycles(servos, plan, workers=1)):
-            first = cycles[..., 1].reshape(len(rows), -1)
-            mean[i, rows], variance[i, rows] = readings_of_cycles(first)
-    return mean, variance
 
 
 def run_families(
@@ -91,15 +56,12 @@ def run_families(
     machines = tuple(machine for family in families for machine in family)
     file = None if cache is None else cache / f"runs-{_mark(unit, machines, observation)}.npz"
     known = None if file is None else _read(file, (len(machines), len(observation)))
-    simulated = 0.0
     if known is None:
         tasks = [Family(unit, tuple(family), observation.plans) for family in families]
-        parts = (executor or LocalExecutor()).each(read_family, tasks, progress)
-        known = np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
-        simulated = len(machines) * sum(plan.duration_s for plan, _ in observation.plans)
+        known = read_families(tasks, executor, progress)
         if file is not None:
             _write(file, known)
-    return Draws(machines, *known, simulated)
+    return Draws(machines, *known)
 
 
 def _mark(unit: Unit, machines: Sequence[Machine], observation: Observation) -> str:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.candidate import Candidate
+from analysis.executor import Executor
 from analysis.likelihood import HEAT
 from analysis.observation import Observation, channels_of_readings, unread
 from analysis.placement import groups_along
@@ -91,6 +92,7 @@ def propose_measurement(
     observation: Observation,
     *,
     seed: int = 0,
+    executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> NextMeasurement | None:
     """The plan that best separates two candidates, or None where the limits allow none."""
@@ -98,7 +100,7 @@ def propose_measurement(
     plans = list(_feasible_plans(unit, observation))
     judged = []
     for number, plan in enumerate(plans):
-        judged.append(_separation(unit, first, second, plan, observation.noise_v, rng))
+        judged.append(_separation(unit, first, second, plan, observation.noise_v, rng, executor))
         if progress is not None:
             progress((number + 1) / len(plans))
     if not judged:
@@ -144,11 +146,12 @@ def _separation(
     plan: SweepPlan,
     noise_v: float,
     rng: np.random.Generator,
+    executor: Executor | None = None,
 ) -> float:
     grid = plan.frequencies_hz
     thinned = replace(plan, frequencies_hz=grid[:: max(len(grid) // _COARSE, 1)])
     asked = [g for c in (first, second) for g in groups_along(c, _GROUPS, rng)]
-    made = simulate_groups(unit, asked, unread(thinned, noise_v), rng)
+    made = simulate_groups(unit, asked, unread(thinned, noise_v), rng, executor)
     (mean_1, var_1), (mean_2, var_2) = (
         _moments(made[c.hypothesis.effects], plan.levels_vpk[0], noise_v) for c in (first, second)
     )

@@ -87,7 +87,6 @@ class FeatureFit:
     weight: NDArray[np.float64]
     curve: IndexCurve
     warnings: tuple[str, ...]
-    simulated_s: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -196,9 +195,7 @@ def fit_features(
         )
     if progress is not None:
         progress(1.0, "done")
-    return FeatureFit(
-        _RATIOS, weight / weight.sum(), index, tuple(warnings), plan.duration_s * len(servos)
-    )
+    return FeatureFit(_RATIOS, weight / weight.sum(), index, tuple(warnings))
 
 
 def _feature_curve(ratios: NDArray[np.float64], sweeps: list[FrequencyResponse]) -> _FeatureCurve:

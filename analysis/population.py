@@ -8,7 +8,7 @@ judges nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,17 +16,16 @@ from numpy.typing import NDArray
 from scipy.linalg import hadamard
 
 from analysis.causes import Hypothesis
-from analysis.ensemble import TOLERANCES, Machine, safe_cycles
-from analysis.observation import Observation, channels_of_readings, readings_of_cycles
+from analysis.ensemble import TOLERANCES
+from analysis.executor import Executor
+from analysis.family import Family, read_families
+from analysis.observation import Observation, channels_of_readings
 from sim.unit import Unit
 
 __all__ = ["DEVIATING", "Group", "Population", "simulate_groups"]
 
 DEVIATING = ("R_m", "k_t", "J_L", "k_s1", "k_a")
 """Datasheet values whose spread is simulated; that of k_ts scales the gain alone."""
-
-_LOT = 12
-"""Groups simulated between two reports of progress."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,52 +81,40 @@ def simulate_groups(
     groups: Sequence[Group],
     observation: Observation,
     rng: np.random.Generator,
+    executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> dict[tuple[str, ...], Population]:
     """Populations by the effects of their hypothesis.
+
+    `executor` says where they are simulated, this machine's cores if not given.
 
     Raises
     ------
     AnalysisError
         If a motion grew without bound even at the shortest step.
     """
-    found: dict[tuple[str, ...], Population] = {}
-    signs = list(_signs(groups, rng))
-    for start in range(0, len(groups), _LOT):
-        lot, ways = groups[start : start + _LOT], signs[start : start + _LOT]
-        made = _simulate(unit, lot, ways, observation, rng)
-        for group, population in zip(lot, made, strict=True):
-            key = group.hypothesis.effects
-            found[key] = found[key].joined(population) if key in found else population
-        if progress is not None:
-            progress(min((start + _LOT) / len(groups), 1.0))
-    return found
-
-
-def _simulate(
-    unit: Unit,
-    groups: Sequence[Group],
-    ways: Sequence[NDArray[np.float64]],
-    observation: Observation,
-    rng: np.random.Generator,
-) -> Iterable[Population]:
-    machines: list[Machine] = []
+    families: list[Family] = []
     deviations: list[NDArray[np.float64]] = []
-    for group, signs in zip(groups, ways, strict=True):
+    for group, signs in zip(groups, list(_signs(groups, rng)), strict=True):
         off = signs * np.array([TOLERANCES[symbol] for symbol in DEVIATING])
         named = tuple((s, float(v)) for s, v in zip(DEVIATING, off, strict=True))
         seeds = rng.integers(2**30, size=len(group.ratios))
-        machines += [
+        machines = tuple(
             group.hypothesis.machine(place, int(seed), named)
             for place, seed in zip(group.places, seeds, strict=True)
-        ]
+        )
+        families.append(Family(unit, machines, observation.plans))
         deviations.append(np.tile(off, (len(group.ratios), 1)))
-    mean, variance = _read(unit, machines, observation)
+    mean, variance = read_families(families, executor, progress)
+    found: dict[tuple[str, ...], Population] = {}
     start = 0
     for group, off in zip(groups, deviations, strict=True):
-        rows = slice(start, start + len(group.ratios))
+        rows = slice(start, start + len(off))
         start = rows.stop
-        yield Population(group.places, off, mean[rows], variance[rows])
+        made = Population(group.places, off, mean[rows], variance[rows])
+        key = group.hypothesis.effects
+        found[key] = found[key].joined(made) if key in found else made
+    return found
 
 
 def _signs(groups: Sequence[Group], rng: np.random.Generator) -> Iterator[NDArray[np.float64]]:
@@ -144,16 +131,3 @@ def _signs(groups: Sequence[Group], rng: np.random.Generator) -> Iterator[NDArra
         if not turn:
             turn += [sign * row for row in rng.permutation(patterns) for sign in (1.0, -1.0)]
         yield turn.pop(0)
-
-
-def _read(
-    unit: Unit, machines: Sequence[Machine], observation: Observation
-) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
-    servos = [machine.servo(unit) for machine in machines]
-    mean = np.empty((len(servos), len(observation)), dtype=complex)
-    variance = np.empty((len(servos), len(observation)))
-    for plan, rows in observation.plans:
-        for i, one in enumerate(safe_cycles(servos, plan)):
-            first = one[..., 1].reshape(len(rows), -1)
-            mean[i, rows], variance[i, rows] = readings_of_cycles(first)
-    return mean, variance

@@ -17,6 +17,7 @@ from analysis.adequacy import judge_adequacy, judge_chance
 from analysis.atlas import Atlas, coarse_stride, make_atlas
 from analysis.candidate import Candidate, Effects, form_candidates
 from analysis.causes import Hypothesis
+from analysis.executor import Executor
 from analysis.holdout import hold_out
 from analysis.observation import Observation
 from analysis.placement import groups_about, groups_along, groups_around
@@ -66,6 +67,7 @@ def search_causes(
     without: Collection[str] = (),
     cache: Path | None = None,
     seed: int = 0,
+    executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> list[Candidate]:
     """Candidates, the most likely first; the baseline is always among them.
@@ -79,6 +81,8 @@ def search_causes(
         when the cause is unknown.
     cache
         Folder in which atlases are kept.
+    executor
+        Where runs are simulated; on this machine's cores if not given.
 
     Raises
     ------
@@ -87,10 +91,10 @@ def search_causes(
     """
     coarse = observation.thinned(coarse_stride(observation))
     report = part_of(progress, 0.0, 0.4, "simulating every cause")
-    atlas = make_atlas(unit, coarse, cache, report)
+    atlas = make_atlas(unit, coarse, cache, executor, report)
     atlas = {k: v for k, v in atlas.items() if not set(k) & set(without)}
     rng = np.random.default_rng(seed)
-    rough = _Hunt(unit, coarse, rng, part_of(progress, 0.4, 0.6, "narrowing down"))
+    rough = _Hunt(unit, coarse, rng, executor, part_of(progress, 0.4, 0.6, "narrowing down"))
     rough.start(_singles(coarse, atlas), _FIRST_GROUPS)
     rough.hear()
     rough.look_closer(_with_baseline(rough.leading(_SECOND)), _SECOND_GROUPS)
@@ -106,6 +110,7 @@ def search_causes(
         unit,
         observation,
         rng,
+        executor,
         part_of(progress, 0.6, 1.0, "looking closer"),
         rough.observation.noise_v,
     )
@@ -201,13 +206,14 @@ class _Hunt:
         unit: Unit,
         observation: Observation,
         rng: np.random.Generator,
+        executor: Executor | None,
         progress: Callable[[float], None] | None,
         noise_v: float | None = None,
     ) -> None:
         heard = observation if noise_v is None else observation.with_noise(noise_v)
         self._unit, self.observation, self._rng = unit, heard, rng
         self._noises = possible_noises(observation)
-        self._progress, self._left = progress, 1.0
+        self._executor, self._progress, self._left = executor, progress, 1.0
         self._runs: dict[Effects, Population] = {}
         self.found: dict[Effects, Candidate] = {}
 
@@ -277,7 +283,9 @@ class _Hunt:
         self.take_over([self.found[key] for key in chosen], groups)
 
     def _simulate(self, groups: Sequence[Group]) -> None:
-        made = simulate_groups(self._unit, groups, self.observation, self._rng, self._report())
+        made = simulate_groups(
+            self._unit, groups, self.observation, self._rng, self._executor, self._report()
+        )
         for key, population in made.items():
             known = self._runs.get(key)
             self._runs[key] = population if known is None else known.joined(population)

@@ -14,6 +14,7 @@ import numpy as np
 
 from analysis.calibration import Calibrated
 from analysis.candidate import Candidate
+from analysis.executor import Executor
 from analysis.observation import Observation
 from analysis.placement import groups_around
 from analysis.population import simulate_groups
@@ -34,6 +35,7 @@ def sharpen_candidate(
     candidate: Candidate,
     observation: Observation,
     rng: np.random.Generator,
+    executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Calibrated:
     """Mean (d,) and covariance (d, d) of the coordinates, after runs about where they lie.
@@ -52,7 +54,7 @@ def sharpen_candidate(
             break
         before = widest
         groups = list(groups_around(candidate.hypothesis, found, _GROUPS, rng))
-        made = simulate_groups(unit, groups, observation, rng)[key]
+        made = simulate_groups(unit, groups, observation, rng, executor)[key]
         # The surface stays as it was judged; sizing asks it for its widths alone.
         candidate = replace(candidate, population=candidate.population.joined(made))
         found = size_candidate(candidate, observation, rng)

@@ -8,14 +8,22 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from threading import Lock
 
 __all__ = ["Effort", "counting", "spend"]
 
 
 class Effort:
-    """Seconds of motion simulated inside a `counting` block so far."""
+    """Seconds of motion simulated inside a `counting` block so far; threads may add to it."""
 
-    simulated_s = 0.0
+    def __init__(self) -> None:
+        self.simulated_s = 0.0
+        self._lock = Lock()
+
+    def add(self, simulated_s: float) -> None:
+        """Count so many seconds more."""
+        with self._lock:
+            self.simulated_s += simulated_s
 
 
 _COUNTS: ContextVar[tuple[Effort, ...]] = ContextVar("counts", default=())
@@ -23,7 +31,10 @@ _COUNTS: ContextVar[tuple[Effort, ...]] = ContextVar("counts", default=())
 
 @contextmanager
 def counting() -> Iterator[Effort]:
-    """Count what is simulated by this thread inside the block; blocks may be nested."""
+    """Count what is simulated inside the block; blocks may be nested.
+
+    Another thread counts where it runs in a copy of this one's context.
+    """
     effort = Effort()
     token = _COUNTS.set((*_COUNTS.get(), effort))
     try:
@@ -35,4 +46,4 @@ def counting() -> Iterator[Effort]:
 def spend(simulated_s: float) -> None:
     """Add to every count that is open."""
     for effort in _COUNTS.get():
-        effort.simulated_s += simulated_s
+        effort.add(simulated_s)

@@ -11,13 +11,16 @@ import numpy as np
 import pytest
 
 import analysis.cluster
+from analysis.causes import Hypothesis
 from analysis.cluster import ClusterExecutor
 from analysis.ensemble import Machine
 from analysis.executor import LocalExecutor
 from analysis.library import run_families
 from analysis.observation import unread
+from analysis.population import Group, Population, simulate_groups
 from daq.errors import AnalysisError, InputError, LinkError
 from daq.plan import SweepPlan
+from sim.effort import counting
 from sim.unit import load_unit
 
 distributed = pytest.importorskip("distributed")
@@ -127,11 +130,36 @@ def test_runs_on_a_cluster_are_those_of_this_machine_to_the_last_bit(workers):
     ]
     seen = unread(plan, 5e-4)
     unit = load_unit("adss")
-    with ClusterExecutor(address) as cluster:
+    with ClusterExecutor(address) as cluster, counting() as spent_there:
         there = run_families(unit, families, seen, executor=cluster)
-    here = run_families(unit, families, seen)
+    with counting() as spent_here:
+        here = run_families(unit, families, seen)
     np.testing.assert_array_equal(there.channels(seen), here.channels(seen))
     assert there.machines == here.machines
+    # What workers simulate counts here.
+    assert spent_there.simulated_s == pytest.approx(spent_here.simulated_s)
+    assert spent_here.simulated_s == pytest.approx(4 * plan.duration_s)
+
+
+def test_a_search_on_a_cluster_makes_the_runs_of_this_machine(workers):
+    address, _ = workers
+    unit, plan = load_unit("edss"), SweepPlan((60.0,), (2.5,), settle_cycles=1, integrate_cycles=2)
+    groups = [
+        Group(Hypothesis(unit, effects), np.array([0.2, 0.6]), np.full(len(effects), 0.6))
+        for effects in ((), ("load-inertia",), (), ("shaft-damping",))
+    ]
+
+    def runs(executor):
+        rng = np.random.default_rng(3)
+        return simulate_groups(unit, groups, unread(plan, 5e-4), rng, executor)
+
+    with ClusterExecutor(address) as cluster:
+        there = runs(cluster)
+    here = runs(None)
+    assert set(there) == set(here) == {(), ("load-inertia",), ("shaft-damping",)}
+    for key, population in here.items():
+        for field in Population.__slots__:
+            np.testing.assert_array_equal(getattr(there[key], field), getattr(population, field))
 
 
 def test_cancelled_work_is_not_begun(workers, tmp_path):

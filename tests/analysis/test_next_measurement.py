@@ -13,7 +13,7 @@ FIRST, SECOND = (candidate(SEEN, (e,)) for e in ("load-inertia", "shaft-stiffnes
 def proposed(monkeypatch, judge):
     tried = []
 
-    def separation(unit, first, second, plan, noise_v, rng):
+    def separation(unit, first, second, plan, noise_v, rng, executor):
         tried.append(plan)
         return judge(plan)
 

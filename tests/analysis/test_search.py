@@ -7,6 +7,7 @@ import pytest
 import synthetic
 
 from analysis import atlas, population, search
+from analysis.executor import LocalExecutor
 from analysis.observation import USUAL_NOISE_V
 from analysis.population import Population
 from analysis.verdict import judge_candidates
@@ -24,13 +25,22 @@ def read(effects, place, rng, deviations=None, scatter=1.0):
     return plain + sum(synthetic.effect_slope((e,)) * size for e, size in sizes.items())
 
 
+class Asked(Counter):
+    """How many runs of each hypothesis were asked for, atlas apart; and where, atlas included."""
+
+    def __init__(self):
+        super().__init__()
+        self.executors = set()
+
+
 @pytest.fixture
 def runs(monkeypatch):
-    """How many runs of each hypothesis were asked for, atlas apart."""
-    count = Counter()
+    """What was asked for."""
+    count = Asked()
 
-    def simulate(unit, groups, observation, rng, progress=None):
+    def simulate(unit, groups, observation, rng, executor=None, progress=None):
         found = {}
+        count.executors.add(executor)
         for group, signs in zip(groups, population._signs(groups, rng), strict=True):
             key, off = group.hypothesis.effects, signs * synthetic.SIGMAS
             channels = np.array([read(key, place, rng, off) for place in group.places])
@@ -77,6 +87,12 @@ def test_two_causes_are_found_together(runs, seed):
     pair = ("amplifier-lag", "load-inertia")
     _, verdict = diagnosed(pair, [0.8, 0.3], seed)
     assert (verdict.word, verdict.best.effects) == ("explained", pair)
+
+
+def test_every_run_is_made_where_the_caller_says(runs):
+    executor = LocalExecutor(1)
+    diagnosed(("amplifier-lag", "load-inertia"), [0.8, 0.3], 1, executor=executor)
+    assert runs.executors == {executor}
 
 
 def test_where_nothing_is_missing_the_search_ends_early(runs):

@@ -27,7 +27,7 @@ def asked(monkeypatch):
     """How many groups were simulated in each round."""
     rounds = []
 
-    def simulate(unit, groups, observation, rng, progress=None):
+    def simulate(unit, groups, observation, rng, executor=None, progress=None):
         rounds.append(len(groups))
         return {TRUE: population_of(groups, rng)}
 
@@ -77,7 +77,7 @@ def test_it_stops_as_soon_as_the_answer_is_sharp(monkeypatch, asked):
     monkeypatch.setattr(sharpening, "size_candidate", sized([0.2, 0.1, 0.01]))
     rng, told = np.random.default_rng(0), []
     answer = sharpening.sharpen_candidate(
-        synthetic.ADSS, found(observed, 0), observed, rng, told.append
+        synthetic.ADSS, found(observed, 0), observed, rng, progress=told.append
     )
     assert len(asked) == 2
     assert answer.covariance[0, 0] == pytest.approx(0.01**2)

@@ -1,5 +1,8 @@
 """The count of simulated seconds."""
 
+from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
+
 import pytest
 
 from daq.plan import SweepPlan
@@ -25,6 +28,20 @@ def test_blocks_count_for_themselves_and_for_those_around_them():
         spend(4.0)
     spend(8.0)
     assert (outer.simulated_s, inner.simulated_s) == (7.0, 2.0)
+
+
+def test_threads_count_where_they_run_in_a_copy_of_the_context():
+    threads, times = 4, 2000
+
+    def work():
+        for _ in range(times):
+            spend(0.5)
+
+    with counting() as effort, ThreadPoolExecutor(threads) as pool:
+        for done in [pool.submit(copy_context().run, work) for _ in range(threads)]:
+            done.result()
+        pool.submit(spend, 1.0).result()
+    assert effort.simulated_s == 0.5 * threads * times
 
 
 def fail(effort):

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from daq.errors import AnalysisError
 from tui.cli import main
 
 PRACTICE = Path(__file__).parents[1] / "data" / "practice"
@@ -156,7 +157,9 @@ def test_reproduce_gives_the_fields_that_scripts_use(capsys, tmp_path):
     assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in pictures)
 
 
-def test_estimate_simulates_where_the_cluster_is(calls, capsys, monkeypatch):
+@pytest.fixture
+def cluster(monkeypatch):
+    """A cluster that does nothing but know where it is, and whether it was left."""
     from analysis import cluster
 
     class Cluster:
@@ -174,9 +177,34 @@ def test_estimate_simulates_where_the_cluster_is(calls, capsys, monkeypatch):
             Cluster.left = True
 
     monkeypatch.setattr(cluster, "ClusterExecutor", Cluster)
+    return Cluster
+
+
+def test_estimate_simulates_where_the_cluster_is(calls, capsys, cluster):
     document(["estimate", SWEEP, "--unit", "adss", "--cluster", "tcp://here:8786"], capsys)
     assert calls[0][1]["executor"].address == "tcp://here:8786"
-    assert Cluster.left
+    assert cluster.left
+
+
+def test_diagnose_simulates_where_the_cluster_is(monkeypatch, capsys, cluster):
+    from analysis import diagnosis
+
+    asked = []
+
+    def known(response, unit, **options):
+        asked.append(options)
+        raise AnalysisError("no answer")
+
+    monkeypatch.setattr(diagnosis, "diagnose_response", known)
+    assert main(["diagnose", SWEEP, "--unit", "adss", "--cluster", "tcp://here:8786"]) == 1
+    assert "no answer" in capsys.readouterr().err
+    assert asked[0]["executor"].address == "tcp://here:8786"
+    assert cluster.left
+
+
+def test_the_papers_numbers_need_no_cluster(capsys):
+    assert main(["diagnose", "--paper", "--unit", "adss", "--cluster", "x"]) == 2
+    assert "--cluster" in capsys.readouterr().err
 
 
 def test_two_frequencies_need_no_cluster(capsys):

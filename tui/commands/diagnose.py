@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.errors import InputError
-from tui.options import Json, Plots, UnitName, prepare_directory
+from tui.executors import executor_at
+from tui.options import Cluster, Json, Plots, UnitName, prepare_directory
 from tui.output import Console, Injected
 from tui.places import cache_folder
 
@@ -27,6 +28,7 @@ def diagnose(
     paper: bool = False,
     plots: Plots = None,
     json: Json = False,
+    cluster: Cluster = None,
     console: Injected,
 ) -> None:
     """Show what the simulation gets wrong, name the cause and extend the model with it.
@@ -47,6 +49,8 @@ def diagnose(
                          else f"{file}: give either a response or --paper, not both")  # fmt: skip
     from sim.unit import load_unit
 
+    if paper and cluster is not None:
+        raise InputError("--cluster is for responses; the paper's numbers are diagnosed here")
     subject = load_unit(unit)
     if plots is not None:
         prepare_directory(plots)
@@ -58,7 +62,10 @@ def diagnose(
     response = read_response(file)
     from analysis.diagnosis import diagnose_response
 
-    result = diagnose_response(response, subject, cache=cache_folder(), progress=console.progress)
+    with executor_at(cluster) as executor:
+        result = diagnose_response(
+            response, subject, cache=cache_folder(), executor=executor, progress=console.progress
+        )
     if plots is not None:
         from analysis.diagnosis_figures import draw_diagnosis
 
