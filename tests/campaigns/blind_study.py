@@ -24,7 +24,7 @@ from hidden import EVERY_EFFECT, Hidden, hide
 
 from analysis.diagnosis import Diagnosis, diagnose_response
 
-KINDS = {"one cause": 0.55, "nothing": 0.2, "two causes": 0.1, "unknown cause": 0.15}
+KINDS = {"one cause": 0.45, "nothing": 0.15, "two causes": 0.25, "unknown cause": 0.15}
 CACHE = Path(__file__).parents[2] / ".venv" / "atlas"
 
 
