@@ -132,7 +132,7 @@ def reproduce(
     seed: int = 0,
     *,
     paper_runs: int = 16,
-    exact_runs: int = 6,
+    exact_runs: int = 12,
     rows: Sequence[tuple[UnitName, int]] | None = None,
 ) -> Reproduction:
     """Recompute the paper.

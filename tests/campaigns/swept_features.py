@@ -40,7 +40,7 @@ def swept_runs_db(unit_name: UnitName, ratio_percent: int, way: Direction) -> ND
         settle_cycles=20,
         integrate_cycles=30,
     )
-    runs = simulate_cycles(servos, plan, longest_step_s=EXACT_STEP_S[unit_name])
+    runs = simulate_cycles(servos, plan, longest_step_s=EXACT_STEP_S)
     return 20.0 * np.log10([np.abs(run[0, :, :, 1].mean(axis=-1)) for run in runs])
 
 
