@@ -87,10 +87,6 @@ class Hypothesis:
         ratio = float(np.clip(place[0], 0.0, 1.0))
         return Machine(ratio, seed, None, deviations, self.settings(place))
 
-    def with_effect(self, effect: str) -> Hypothesis:
-        """The hypothesis with one more effect."""
-        return Hypothesis(self.unit, tuple(sorted((*self.effects, effect))))
-
     @property
     def centred(self) -> bool:
         """Whether the one parameter is a datasheet value that lies amid its range."""

@@ -8,7 +8,6 @@ posterior of the contribution ratio; neither looks for causes of a misfit
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +20,7 @@ from analysis.executor import Executor
 from analysis.fit import RATIO, Axis, Posterior, fit_posterior
 from analysis.observation import observe
 from analysis.paper_estimate import IndexCurve, index_curve_of_response
+from analysis.progress import Progress
 from daq.errors import InputError
 from daq.frf import FrequencyResponse
 from sim.effort import counting
@@ -28,7 +28,6 @@ from sim.unit import Unit
 
 __all__ = ["Estimate", "Uncertain", "estimate_features", "estimate_response"]
 
-Progress = Callable[[float, str], None]
 
 _WIDE_RESIDUAL = 1.35
 """Robust residual, in standard deviations, from which the model is said to lack something."""

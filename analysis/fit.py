@@ -23,13 +23,13 @@ from analysis.executor import Executor
 from analysis.library import run_families
 from analysis.likelihood import Match, match_prediction
 from analysis.observation import Observation
+from analysis.progress import Progress
 from analysis.reading_noise import likeliest_noise, possible_noises
 from sim.response import START_SPREAD
 from sim.unit import Unit
 
 __all__ = ["Axis", "Posterior", "RATIO", "fit_posterior"]
 
-Progress = Callable[[float, str], None]
 
 _SIMULATED = ("R_m", "k_t", "J_L", "k_s1", "k_a")
 """Datasheet values whose spread is simulated; that of k_ts scales the gain alone."""

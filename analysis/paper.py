@@ -9,7 +9,7 @@ draws nothing itself and prints nothing.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,11 +22,11 @@ from analysis.paper_features import Compared, compare, read_grid
 from analysis.paper_index import IndexCurve, index_curves
 from analysis.paper_numbers import PaperNumbers, PublishedRow, UnitName, load_paper
 from analysis.paper_runs import exact_runs_db, grid_hz, paper_runs_db
+from analysis.progress import Progress
 from daq.errors import InputError
 
 __all__ = ["Reproduction", "ReproducedRow", "reproduce"]
 
-Progress = Callable[[float, str], None]
 
 PLATEAU_SPREAD = 0.024
 """Single runs that scatter by more than this share of RF find no peak but a plateau.

@@ -9,7 +9,7 @@ both without and with what the microscope knew of the gears.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -25,13 +25,13 @@ from analysis.paper_numbers import UnitName, load_paper
 from analysis.paper_proposal import propose_sweep
 from analysis.paper_search import search_sets
 from analysis.paper_sweeps import Reading, plan_about
+from analysis.progress import Progress
 from daq.errors import InputError
 from daq.plan import SweepPlan
 from sim.unit import Unit
 
 __all__ = ["PaperDiagnosis", "diagnose_features", "diagnose_paper", "paper_reading"]
 
-Progress = Callable[[float, str], None]
 
 _READING_HZ, _READING_DB = 0.5, 0.5
 """Reading errors: printed to 1 Hz, read off a plot or a marker to half a decibel."""

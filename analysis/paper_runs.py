@@ -91,9 +91,7 @@ def exact_runs_db(
             from_rest=True,
         )
         # (servos, levels, points, cycles, harmonics): one level, the drive's own harmonic.
-        cycles = np.array(simulate_cycles(servos, plan, longest_step_s=EXACT_STEP_S))[
-            :, 0, ..., 1
-        ]
+        cycles = np.array(simulate_cycles(servos, plan, longest_step_s=EXACT_STEP_S))[:, 0, ..., 1]
         parts.append(cycles.mean(axis=-1))
         tick(float((lot[-1] - grid[0] + 1.0) / grid.size))
     gains = np.concatenate(parts, axis=-1).reshape(len(ratios_percent), runs, grid.size)

@@ -6,7 +6,7 @@ what agreement is `analysis.paper_evidence`; no verdict is given here.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -15,10 +15,10 @@ from analysis.paper_evidence import RatioPrior, agree
 from analysis.paper_exploration import Explored, Explorer
 from analysis.paper_pairs import VISCOUS, GuessedPair, guess_pairs, possible_pairs
 from analysis.paper_sweeps import Reading
+from analysis.progress import Progress
 
 __all__ = ["search_sets"]
 
-Progress = Callable[[float, str], None]
 
 _HEAT, _MARGIN = 2.0, 0.05
 _SINGLES_SHARE = 0.6

@@ -17,44 +17,16 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.ensemble import TOLERANCES
-from analysis.estimate import estimate_response
-from daq.frf import DB_PER_NEPER, FrequencyResponse
-from daq.plan import SweepPlan, spaced_frequencies
-from sim.response import simulate
-from sim.unit import Unit, load_unit
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from hidden import BANDS_HZ, LEVELS_VPK, off_datasheet, reading  # noqa: E402
+
+from analysis.estimate import estimate_response  # noqa: E402
+from daq.plan import SweepPlan, spaced_frequencies  # noqa: E402
+from sim.response import simulate  # noqa: E402
+from sim.unit import load_unit  # noqa: E402
 
 RATIOS = (0.1, 0.3, 0.5, 0.7, 0.9)
-LEVELS_VPK = (1.5, 2.5, 4.0)
-BANDS_HZ = {"adss": (100.0, 180.0), "edss": (30.0, 110.0)}
-NOISE_V = 5e-4
-
-
-def machine(unit: Unit, rng: np.random.Generator) -> Unit:
-    """A unit off its datasheet within tolerance."""
-    known = unit.parameters
-    changed = {s: known[s] * (1.0 + rng.normal(0.0, share)) for s, share in TOLERANCES.items()}
-    return unit.with_parameters(**changed)
-
-
-def reading(response: FrequencyResponse, rng: np.random.Generator) -> FrequencyResponse:
-    """What a bench reads of a response: noise added and counted in the stated error."""
-    noise = NOISE_V / response.source_vpk
-    added = rng.standard_normal((2, len(response))) * noise
-    gain = response.gain + added[0] + 1j * added[1]
-    along = response.gain_std_db / DB_PER_NEPER
-    across = np.radians(response.phase_std_deg)
-    total = np.sqrt(along**2 + across**2 + 2.0 * (noise / np.abs(gain)) ** 2)
-    return FrequencyResponse.from_arrays(
-        response.frequency_hz,
-        response.source_vpk,
-        gain,
-        unit=response.unit,
-        gain_std_db=DB_PER_NEPER * total,
-        direction=response.direction,
-        settle_cycles=response.settle_cycles,
-        integrate_cycles=response.integrate_cycles,
-    )
 
 
 def main(draws: int = 4, seed: int | None = None, only: str = "") -> None:
@@ -79,7 +51,9 @@ def run(draws: int, seed: int | None, only: str, cache: Path) -> None:
             started = time.perf_counter()
             errors, stds, hits = [], [], 0
             for _ in range(draws):
-                swept = simulate(machine(unit, rng), ratio, plan, seed=int(rng.integers(2**31)))
+                swept = simulate(
+                    off_datasheet(unit, rng), ratio, plan, seed=int(rng.integers(2**31))
+                )
                 found = estimate_response(reading(swept, rng), unit, cache=cache)
                 low, high = found.contribution_ratio.interval95
                 hits += low <= ratio <= high

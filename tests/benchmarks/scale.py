@@ -23,8 +23,8 @@ from yardsticks.page import DOCS, machine, replace_block  # noqa: E402
 
 from analysis.calibration import Calibrated  # noqa: E402
 from analysis.estimate import estimate_response  # noqa: E402
-from analysis.fit import RATIO, _near_families, _wide_families  # noqa: E402
 from analysis.family import Family, read_family  # noqa: E402
+from analysis.fit import RATIO, _near_families, _wide_families  # noqa: E402
 from analysis.library import run_families  # noqa: E402
 from analysis.observation import observe  # noqa: E402
 from daq.plan import SweepPlan, spaced_frequencies  # noqa: E402

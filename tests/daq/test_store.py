@@ -41,12 +41,6 @@ def point(frequency_hz: float, gain: complex = 0.1 - 0.2j, **changes) -> SweepPo
     return SweepPoint(frequency_hz, gain, **changes)
 
 
-@pytest.fixture
-def store(tmp_path):
-    with Store(tmp_path / "bench.db", create=True) as opened:
-        yield opened
-
-
 def test_what_is_written_is_read_back_to_the_last_digit(store):
     measurement = store.begin(header())
     store.set_instrument(measurement, IDENTITY)
