@@ -14,7 +14,7 @@ help:
 	@echo "make test    all checks and tests"
 	@echo "make check   style, types, floors and links; under a minute"
 	@echo "make bench   benchmarks"
-	@echo "make blind   hide effects and have the diagnosis find them; an hour or more"
+	@echo "make blind   hide effects and have the diagnosis find them; some hours"
 	@echo "make faults  hundreds of sessions with something going wrong in each; half an hour"
 	@echo "make fuzz    a million damaged inputs to everything that reads; an hour or two"
 	@echo "make soak    measure back to back for an hour and watch what is held on to"
@@ -45,6 +45,8 @@ bench: $(READY)
 blind: $(READY)
 	@$(BIN)/python -m pytest -m study tests/analysis/test_diagnosis.py
 	@$(BIN)/python tests/campaigns/blind_study.py
+	@$(BIN)/python tests/campaigns/ties.py
+	@$(BIN)/python tests/campaigns/smallest.py
 
 faults: $(READY)
 	@$(BIN)/python tests/campaigns/faults.py

@@ -2,15 +2,14 @@
 
 Draws sets of four kinds (one cause, nothing, two causes, one cause that is
 taken out of the catalogue), diagnoses each without looking, and writes what
-came of it as a page. Every set is kept as one line of JSON, so that a study
-that was interrupted goes on, and several can be put together.
+came of it into its block of docs/blind-study.md. Every set is kept as one line
+of JSON, so that a study that was interrupted goes on, and several can be put together.
 
-    python tests/campaigns/blind_study.py [sets] [seed] [lines.jsonl] [page.md]
+    python tests/campaigns/blind_study.py [sets] [seed] [lines.jsonl]
 """
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from collections import Counter
@@ -21,11 +20,14 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from hidden import EVERY_EFFECT, Hidden, hide
+from kept import Kept, drawn_seed
+from yardsticks.page import replace_block
 
 from analysis.diagnosis import Diagnosis, diagnose_response
 
 KINDS = {"one cause": 0.45, "nothing": 0.15, "two causes": 0.25, "unknown cause": 0.15}
 CACHE = Path(__file__).parents[2] / ".venv" / "atlas"
+PAGE = Path(__file__).parents[2] / "docs" / "blind-study.md"
 
 
 def drawn_kinds(sets: int, rng: np.random.Generator) -> list[tuple[str, str, tuple[str, ...]]]:
@@ -73,12 +75,10 @@ def outcome(kind: str, hidden: Hidden, found: Diagnosis) -> dict:
     }
 
 
-def run(sets: int, seed: int, lines: Path) -> list[dict]:
-    """Diagnose the sets that are not in `lines` yet."""
-    known = [json.loads(line) for line in lines.read_text().splitlines()] if lines.exists() else []
-    done = {(one["seed"], one["number"]) for one in known}
+def run(sets: int, seed: int, kept: Kept) -> None:
+    """Diagnose the sets that are not kept yet."""
     for number, (kind, unit, effects) in enumerate(drawn_kinds(sets, np.random.default_rng(seed))):
-        if (seed, number) in done:
+        if kept.has(seed, number):
             continue
         hidden = hide(unit, effects, np.random.default_rng([seed, number]))
         used_s = time.process_time()
@@ -88,12 +88,8 @@ def run(sets: int, seed: int, lines: Path) -> list[dict]:
         )
         one = {"seed": seed, "number": number} | outcome(kind, hidden, found)
         # The clock would tell of whatever else the machine was doing.
-        one["processor_s"] = time.process_time() - used_s
-        known.append(one)
-        with lines.open("a") as stream:
-            stream.write(json.dumps(one) + "\n")
+        kept.add(one | {"processor_s": time.process_time() - used_s})
         print(number, kind, unit, effects, "->", one["verdict"], list(one["named"]), flush=True)
-    return known
 
 
 def wilson(hits: int, count: int) -> str:
@@ -117,8 +113,9 @@ def right(one: dict) -> bool:
     return sorted(one["named"]) == sorted(one["true"])
 
 
-def page(known: list[dict], seeds: list[int]) -> str:
+def block(kept: Kept) -> list[str]:
     """The study as Markdown."""
+    known = kept.outcomes
     by = {kind: [one for one in known if one["kind"] == kind] for kind in KINDS}
     single, nothing, pairs, unknown = (by[kind] for kind in KINDS)
     rivals = [one for one in single if list(one["true"]) in one["ranked"][:3]]
@@ -139,12 +136,7 @@ def page(known: list[dict], seeds: list[int]) -> str:
         for name, (value, _) in sizes.items()
     ]
     lines = [
-        "# The blind study",
-        "",
-        "Effects of the catalogue are drawn at random, with their size, the unit, its",
-        "contribution ratio, its deviations within tolerance and the reading noise, hidden in a",
-        "simulated response (3 levels, 61 frequencies) and diagnosed. `make blind` runs it.",
-        f"This page: {len(known)} sets, seeds {', '.join(map(str, seeds))}.",
+        f"{len(known)} sets, seeds {kept.seeds}.",
         "",
         "| question | answer |",
         "| --- | --- |",
@@ -172,7 +164,7 @@ def page(known: list[dict], seeds: list[int]) -> str:
         f"{np.median([o['processor_s'] for o in known]):.0f} s, "
         f"{max(o['processor_s'] for o in known):.0f} s |",
         "",
-        "## Reliability",
+        "### Reliability",
         "",
         "Of the sets given a probability, the share that was right:",
         "",
@@ -185,7 +177,7 @@ def page(known: list[dict], seeds: list[int]) -> str:
         lines.append(f"| {low:g} to {min(high, 1):g} | {wilson(hits, len(part))} |")
     lines += [
         "",
-        "## What was taken for what",
+        "### What was taken for what",
         "",
         "| hidden | answer | times |",
         "| --- | --- | --- |",
@@ -197,33 +189,22 @@ def page(known: list[dict], seeds: list[int]) -> str:
     )
     for (true, withheld, answer), times in sorted(answers.items()):
         lines.append(f"| {true}{' (withheld)' if withheld else ''} | {answer} | {times} |")
-    lines += ["", "Sets that were named rightly are left out of this table.", ""]
-    return "\n".join(lines)
+    return [*lines, "", "Sets that were named rightly are left out of this table."]
 
 
 def _answer(one: dict) -> str:
     return one["verdict"] + (f": {' + '.join(one['named'])}" if one["named"] else "")
 
 
-def main(
-    sets: int = 60,
-    seed: int | None = None,
-    lines: str = "build/blind-study.jsonl",
-    target: str = "docs/blind-study.md",
-) -> None:
-    """Run the study and write its page."""
-    seed = int(np.random.SeedSequence().entropy % 2**32) if seed is None else seed
+def main(sets: int = 60, seed: int | None = None, lines: str = "build/blind-study.jsonl") -> None:
+    """Run the study and write its block."""
+    seed, kept = drawn_seed(seed), Kept(lines)
     print(f"seed {seed}, {sets} sets", flush=True)
-    path = Path(lines)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    started = time.perf_counter()
-    known = run(sets, seed, path)
-    text = page(known, sorted({one["seed"] for one in known}))
-    Path(target).write_text(text)
-    print(text)
-    print(f"{time.perf_counter() - started:.0f} s", flush=True)
+    run(sets, seed, kept)
+    text = block(kept)
+    replace_block("study", text, PAGE)
+    print("\n".join(text))
 
 
 if __name__ == "__main__":
-    given = sys.argv[1:]
-    main(*(int(a) for a in given[:2]), *given[2:])
+    main(*(int(a) for a in sys.argv[1:3]), *sys.argv[3:4])

@@ -4,9 +4,10 @@ Hides single causes, drawn at random, in sweeps of one level: what a bench in a
 hurry takes, and what leaves rivals. Where the diagnosis proposes a measurement
 and one of the two that it is to part is the truth, that sweep is made of the
 same machine, both are simulated through it, and the one that explains it
-better is told.
+better is told. Every set is kept as a line of JSON, and the shares go into their
+block of docs/blind-study.md.
 
-    python tests/campaigns/ties.py [sets] [seed]
+    python tests/campaigns/ties.py [sets] [seed] [lines.jsonl]
 """
 
 from __future__ import annotations
@@ -18,8 +19,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from blind_study import CACHE, wilson
+from blind_study import CACHE, PAGE, wilson
 from hidden import EVERY_EFFECT, Hidden, hide
+from kept import Kept, drawn_seed
+from yardsticks.page import replace_block
 
 from analysis.candidate import Candidate, form_candidates
 from analysis.diagnosis import Diagnosis, diagnose_response
@@ -51,28 +54,56 @@ def parted(hidden: Hidden, found: Diagnosis, rng: np.random.Generator) -> float 
     return formed[true].best.log_likelihood - formed[other].best.log_likelihood
 
 
-def main(sets: int = 12, seed: int | None = None) -> None:
-    """Print each set and the shares."""
-    seed = int(np.random.SeedSequence().entropy % 2**32) if seed is None else seed
+def outcome(number: int, seed: int) -> dict:
+    """What is kept of one set."""
+    rng = np.random.default_rng([seed, number])
+    unit, effect = str(rng.choice(["adss", "edss"])), str(rng.choice(EVERY_EFFECT))
+    hidden = hide(unit, (effect,), rng, (LEVEL_VPK,))
+    found = diagnose_response(hidden.response, hidden.unit, cache=CACHE, seed=number)
+    proposal = found.next_measurement
+    return {
+        "seed": seed,
+        "number": number,
+        "unit": unit,
+        "effect": effect,
+        "verdict": found.verdict.word,
+        "asked": None if proposal is None else list(proposal.separates),
+        "expected_sigma": None if proposal is None else proposal.expected_sigma,
+        "lead": None if proposal is None else parted(hidden, found, rng),
+    }
+
+
+def block(kept: Kept) -> list[str]:
+    """The shares as Markdown."""
+    known = kept.outcomes
+    leads = [one["lead"] for one in known if one["lead"] is not None]
+    clear, wrong = sum(lead > CLEAR for lead in leads), sum(lead < -CLEAR for lead in leads)
+    return [
+        f"{len(known)} sets, seeds {kept.seeds}.",
+        "",
+        "| question | answer |",
+        "| --- | --- |",
+        "| a further measurement was proposed | "
+        f"{wilson(sum(one['asked'] is not None for one in known), len(known))} |",
+        "| what is hidden was one of the two to be parted, of those | "
+        f"{wilson(len(leads), sum(one['asked'] is not None for one in known))} |",
+        f"| after it, what is hidden led clearly | {wilson(clear, len(leads))} |",
+        f"| after it, the other one led clearly | {wilson(wrong, len(leads))} |",
+    ]
+
+
+def main(sets: int = 12, seed: int | None = None, lines: str = "build/ties.jsonl") -> None:
+    """Print each set, and write the shares."""
+    seed, kept = drawn_seed(seed), Kept(lines)
     print(f"seed {seed}, {sets} sets", flush=True)
-    leads: list[float] = []
     for number in range(sets):
-        rng = np.random.default_rng([seed, number])
-        unit, effect = str(rng.choice(["adss", "edss"])), str(rng.choice(EVERY_EFFECT))
-        hidden = hide(unit, (effect,), rng, (LEVEL_VPK,))
-        found = diagnose_response(hidden.response, hidden.unit, cache=CACHE, seed=number)
-        proposal = found.next_measurement
-        lead = None if proposal is None else parted(hidden, found, rng)
-        asked = "nothing" if proposal is None else " or ".join(proposal.separates)
-        told = "" if lead is None else f", truth leads by {lead:.0f}"
-        print(f"{number} {unit} {effect}: {found.verdict.word}, asks {asked}{told}", flush=True)
-        if lead is not None:
-            leads.append(lead)
-    clear = sum(lead > CLEAR for lead in leads)
-    wrong = sum(lead < -CLEAR for lead in leads)
-    print(f"the truth leads clearly: {wilson(clear, len(leads))}")
-    print(f"the other leads clearly: {wilson(wrong, len(leads))}")
+        if not kept.has(seed, number):
+            kept.add(outcome(number, seed))
+            print(kept.outcomes[-1], flush=True)
+    text = block(kept)
+    replace_block("ties", text, PAGE)
+    print("\n".join(text))
 
 
 if __name__ == "__main__":
-    main(*(int(argument) for argument in sys.argv[1:3]))
+    main(*(int(a) for a in sys.argv[1:3]), *sys.argv[3:4])

@@ -1,4 +1,4 @@
-"""Measured tables in docs/performance.md and docs/scale.md, and the machine they were measured on.
+"""Measured tables of the docs, and the machine they were measured on.
 
 Owns the way from a benchmark's lines into the page: each benchmark has a block
 of its own between two comments, and replaces that alone.
