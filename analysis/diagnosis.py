@@ -339,7 +339,8 @@ def _sentence(diagnosis: Diagnosis) -> str:
     if word == "unexplained":
         return "Something is missing that no cause known here explains."
     if word == "ambiguous":
-        rivals = " or ".join(" with ".join(one.effects) for one in diagnosis.verdict.rivals)
+        sets = (" with ".join(one.effects) for one in diagnosis.verdict.rivals)
+        rivals = " or ".join(names or "nothing beyond tolerance" for names in sets)
         return f"{names} ({where}) explains it, but so may {rivals}."
     return f"{names} ({where}) explains it."
 

@@ -27,8 +27,7 @@ _VERDICTS = {
     "consistent": "The response is what the unit's own model gives: nothing beyond tolerance is "
     "needed to explain it.",
     "explained": "The model alone does not give this response; with the cause below it does.",
-    "ambiguous": "The model alone does not give this response, and more than one cause would "
-    "explain it.",
+    "ambiguous": "More than one explanation of this response is left; the likeliest is below.",
     "unexplained": "Something is missing from the model that no cause in the catalogue explains; "
     "trust the ratio accordingly.",
 }

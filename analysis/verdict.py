@@ -41,6 +41,10 @@ _WITHIN_TOLERANCE = 40.0
 _FALSE_ALARM = 20.0
 """By so much must a cause beat the baseline beyond its costs."""
 
+_SURE = 3.0 * HEAT
+"""While it leads by less than this, that nothing is hidden has a twentieth of its probability or
+more, and is a rival: causes that nobody thought of are blamed on others by leads like these."""
+
 _BY_CHANCE = 0.04
 """Share of the baseline's own runs, with nothing hidden, that it may explain better by as much."""
 
@@ -98,15 +102,17 @@ class Verdict:
 
     @property
     def rivals(self) -> tuple[Judged, ...]:
-        """Sets within the margin of a tie that say something else than the best one."""
-        best = set(self.best.effects)
-        return tuple(
-            one
-            for one in self.judged
-            if one.score > self.best.score - _TIE
-            and not set(one.effects) <= best
-            and not set(one.effects) >= best
-        )
+        """Sets within the margin of a tie that say something else than the best one.
+
+        Among them that nothing is hidden, which has a wider margin.
+        """
+        return tuple(one for one in self.judged if self._is_rival(one))
+
+    def _is_rival(self, one: Judged) -> bool:
+        behind, best = self.best.score - one.score, set(self.best.effects)
+        if not one.effects:
+            return bool(best) and one.adequate and behind < _SURE
+        return behind < _TIE and not set(one.effects) <= best and not set(one.effects) >= best
 
 
 def judge_candidates(

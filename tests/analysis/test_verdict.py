@@ -1,5 +1,7 @@
 """The rules of judgement, in a world whose answers are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from synthetic import BASE, LEVELS, ROWS, candidate, observation, read, shape
@@ -74,6 +76,16 @@ def test_two_causes_that_look_the_same_are_both_named(monkeypatch):
         assert {one.effects for one in verdict.judged[:2]} == {TRUE, WRONG}
     # Scores differ by chance, by about 18: more than the margin in one case of four.
     assert sum(verdict.word == "ambiguous" for verdict in verdicts) >= 3
+
+
+@pytest.mark.parametrize(
+    ("lead", "adequate", "rivals"), [(44.0, True, [()]), (46.0, True, []), (44.0, False, [])]
+)
+def test_that_nothing_is_hidden_is_a_rival_while_it_has_a_twentieth(lead, adequate, rivals):
+    found = judge(seen(TRUE, 1), ((), TRUE), 1)
+    plain = replace(found.baseline, score=found.best.score - lead, adequate=adequate)
+    verdict = replace(found, judged=(found.best, plain), baseline=plain)
+    assert [one.effects for one in verdict.rivals] == rivals
 
 
 @pytest.mark.parametrize("seed", range(4))
