@@ -59,9 +59,9 @@ _UNPREDICTED = 1.5
 """Nor is one that misses levels not fitted by so many standard deviations, root mean square."""
 
 _NEVER, _SELDOM = 2.0, 0.03
-"""The baseline may miss them by as many as the first of these, where a larger share of its own runs
-than the second does so, too: that something is missing wants better proof than that a cause does
-not fit."""
+"""The baseline, or a single cause, may miss them by as many as the first of these, where a larger
+share of its own runs than the second does so, too: a payload of four parameters, and chatter at
+low drive, are not easily told from other levels."""
 
 _WELL_PREDICTED = 1.0
 """Several causes together can fit nearly anything: where they miss levels not fitted by more than
@@ -156,11 +156,12 @@ def _is_adequate(
     candidate: Candidate, held_out: HeldOut, misfit: float, rng: np.random.Generator
 ) -> bool:
     causes, missed = len(candidate.hypothesis.effects), held_out.rms_sigma
-    if misfit > _UNLIKE or missed > (_UNPREDICTED if causes else _NEVER):
+    several = causes > 1
+    if misfit > _UNLIKE or missed > (_UNPREDICTED if several else _NEVER):
         return False
-    if missed <= (_WELL_PREDICTED if causes > 1 else _UNPREDICTED):
+    if missed <= (_WELL_PREDICTED if several else _UNPREDICTED):
         return True
-    return judge_misses(candidate, held_out, rng) > (0.0 if causes else _SELDOM)
+    return judge_misses(candidate, held_out, rng) > (0.0 if several else _SELDOM)
 
 
 def _may_be_chance(baseline: Judged, best: Judged, rng: np.random.Generator) -> bool:

@@ -1,11 +1,13 @@
 """The rules of judgement, in a world whose answers are known."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from synthetic import BASE, LEVELS, ROWS, candidate, observation, read, shape
 
+import analysis.verdict as rules
 from analysis.adequacy import judge_adequacy
 from analysis.holdout import hold_out
 from analysis.misfit import describe_departures, find_departures
@@ -96,6 +98,27 @@ def test_a_second_cause_is_not_named_where_one_does(seed):
     verdict = judge(observed, ((), TRUE, pair), 10 * seed)
     assert verdict.best.effects == TRUE
     assert verdict.word == "explained"
+
+
+@pytest.mark.parametrize(
+    ("effects", "missed", "share", "adequate"),
+    [
+        ((), 1.9, 0.04, True), ((), 1.9, 0.02, False), ((), 2.1, 1.0, False),
+        (TRUE, 1.4, 0.0, True), (TRUE, 1.6, 0.08, True), (TRUE, 1.6, 0.02, False),
+        (TRUE, 2.1, 1.0, False), (TRUE + WRONG, 0.9, 0.0, True),
+        (TRUE + WRONG, 1.1, 0.0, False), (TRUE + WRONG, 1.4, 0.02, True),
+        (TRUE + WRONG, 1.6, 1.0, False),
+    ],
+)  # fmt: skip
+def test_what_misses_other_levels_must_have_own_runs_that_do(
+    effects, missed, share, adequate, monkeypatch
+):
+    monkeypatch.setattr(rules, "judge_misses", lambda *given: share)
+    candidate = SimpleNamespace(hypothesis=SimpleNamespace(effects=effects))
+    rng = np.random.default_rng(0)
+    held_out = SimpleNamespace(rms_sigma=missed)
+    assert rules._is_adequate(candidate, held_out, 0.0, rng) is adequate
+    assert rules._is_adequate(candidate, held_out, 4.1, rng) is False
 
 
 def test_each_level_is_predicted_by_a_fit_that_has_not_seen_it():
