@@ -34,7 +34,10 @@ _PER_CAUSE = 10.0
 _AT_BOUND = 10.0
 """Cost of a parameter at the end of its plausible range: a sign that the cause is another."""
 
-_EDGE = 0.02
+_EDGE, _INWARDS = 0.02, 0.05
+"""How near its end that is, and how far inside a parameter is put to see whether it is pressed
+against it: whether that costs more than the heat, as it does not where the size says little."""
+
 _WITHIN_TOLERANCE = 40.0
 """Cost of a datasheet value so little off that its tolerance covers it: that is no cause."""
 
@@ -49,8 +52,11 @@ _BY_CHANCE = 0.04
 """Share of the baseline's own runs, with nothing hidden, that it may explain better by as much."""
 
 _TIE = 20.0
-"""Within so much of the best, a set is a rival: the scores of two sets that say the same about
-everything differ by about as much, as each has runs of its own."""
+"""The scores of two sets that say the same about everything differ by about as much, as each has
+runs of its own."""
+
+_RIVAL = 2.0 * HEAT
+"""Within so much of the best, a set is a rival."""
 
 _UNLIKE = 4.0
 """A fit worse than own runs' by more standard deviations than this is no explanation."""
@@ -102,7 +108,7 @@ class Verdict:
 
     @property
     def rivals(self) -> tuple[Judged, ...]:
-        """Sets within the margin of a tie that say something else than the best one.
+        """Sets near the best one that say something else.
 
         Among them that nothing is hidden, which has a wider margin.
         """
@@ -112,7 +118,7 @@ class Verdict:
         behind, best = self.best.score - one.score, set(self.best.effects)
         if not one.effects:
             return bool(best) and one.adequate and behind < _SURE
-        return behind < _TIE and not set(one.effects) <= best and not set(one.effects) >= best
+        return behind < _RIVAL and not set(one.effects) <= best and not set(one.effects) >= best
 
 
 def judge_candidates(
@@ -157,11 +163,23 @@ def _is_adequate(
 ) -> bool:
     causes, missed = len(candidate.hypothesis.effects), held_out.rms_sigma
     several = causes > 1
-    if misfit > _UNLIKE or missed > (_UNPREDICTED if several else _NEVER):
+    if misfit > _UNLIKE or _is_pressed(candidate) or missed > (_UNPREDICTED if several else _NEVER):
         return False
     if missed <= (_WELL_PREDICTED if several else _UNPREDICTED):
         return True
     return judge_misses(candidate, held_out, rng) > (0.0 if several else _SELDOM)
+
+
+def _is_pressed(candidate: Candidate) -> bool:
+    """Whether a parameter wants to be beyond its plausible range: then the cause is another."""
+    best = candidate.best
+    for at in range(1, len(best.place)):
+        inside = best.place.copy()
+        inside[at] += _INWARDS if inside[at] < 0.5 else -_INWARDS
+        at_end = min(best.place[at], 1.0 - best.place[at]) < _EDGE
+        if at_end and candidate.surface.fit(inside).log_likelihood < best.log_likelihood - HEAT:
+            return True
+    return False
 
 
 def _may_be_chance(baseline: Judged, best: Judged, rng: np.random.Generator) -> bool:

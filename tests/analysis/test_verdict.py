@@ -90,6 +90,36 @@ def test_that_nothing_is_hidden_is_a_rival_while_it_has_a_twentieth(lead, adequa
     assert [one.effects for one in verdict.rivals] == rivals
 
 
+@pytest.mark.parametrize(("behind", "rivals"), [(29.0, [WRONG]), (31.0, [])])
+def test_another_set_is_a_rival_while_it_has_a_seventh(behind, rivals):
+    found = judge(seen(TRUE, 1), ((), TRUE, WRONG), 1)
+    (wrong,) = (one for one in found.judged if one.effects == WRONG)
+    near = replace(wrong, score=found.best.score - behind)
+    verdict = replace(found, judged=(found.best, near, found.baseline))
+    assert [one.effects for one in verdict.rivals] == rivals
+
+
+@pytest.mark.parametrize(
+    ("size", "steep", "pressed"),
+    [(1.0, 400.0, True), (1.0, 200.0, False), (0.97, 400.0, False), (0.0, -400.0, True),
+     (0.01, -400.0, True), (0.03, -400.0, False), (0.5, 400.0, False)],
+)  # fmt: skip
+def test_a_size_that_wants_to_be_beyond_its_range_is_no_explanation(size, steep, pressed):
+    def fit(place):
+        # Falls off inwards by the heat of 15 within 0.05, or by less.
+        return SimpleNamespace(place=place, log_likelihood=steep * place[1])
+
+    surface = SimpleNamespace(fit=fit)
+    one = SimpleNamespace(
+        hypothesis=SimpleNamespace(effects=TRUE),
+        best=fit(np.array([0.4, size])),
+        surface=surface,
+    )
+    assert rules._is_pressed(one) is pressed
+    held_out = SimpleNamespace(rms_sigma=1.0)
+    assert rules._is_adequate(one, held_out, 0.0, np.random.default_rng(0)) is not pressed
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_a_second_cause_is_not_named_where_one_does(seed):
     pair = tuple(sorted((*TRUE, *WRONG)))
@@ -114,7 +144,8 @@ def test_what_misses_other_levels_must_have_own_runs_that_do(
     effects, missed, share, adequate, monkeypatch
 ):
     monkeypatch.setattr(rules, "judge_misses", lambda *given: share)
-    candidate = SimpleNamespace(hypothesis=SimpleNamespace(effects=effects))
+    best = SimpleNamespace(place=np.full(1 + len(effects), 0.5))
+    candidate = SimpleNamespace(hypothesis=SimpleNamespace(effects=effects), best=best)
     rng = np.random.default_rng(0)
     held_out = SimpleNamespace(rms_sigma=missed)
     assert rules._is_adequate(candidate, held_out, 0.0, rng) is adequate
