@@ -340,7 +340,7 @@ def _sentence(diagnosis: Diagnosis) -> str:
         return "Something is missing that no cause known here explains."
     if word == "ambiguous":
         sets = (" with ".join(one.effects) for one in diagnosis.verdict.rivals)
-        rivals = " or ".join(names or "nothing beyond tolerance" for names in sets)
+        rivals = " or ".join(one or "nothing beyond tolerance" for one in sets)
         return f"{names} ({where}) explains it, but so may {rivals}."
     return f"{names} ({where}) explains it."
 
