@@ -71,8 +71,12 @@ def read_families(
 
     Raises
     ------
+    ValueError
+        If there are no families.
     AnalysisError
         If a motion grew without bound even at the shortest step.
     """
+    if not families:
+        raise ValueError("there are no families to read")
     parts = (executor or LocalExecutor()).each(read_family, families, progress)
     return np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])

@@ -93,6 +93,8 @@ def simulate_groups(
     AnalysisError
         If a motion grew without bound even at the shortest step.
     """
+    if not groups:
+        return {}
     families: list[Family] = []
     deviations: list[NDArray[np.float64]] = []
     for group, signs in zip(groups, list(_signs(groups, rng)), strict=True):

@@ -30,6 +30,11 @@ def test_runs_are_kept_by_hypothesis_with_their_places():
     assert np.abs(found[()].mean - found[("load-inertia",)].mean).min() > 1e-5
 
 
+def test_no_groups_are_no_runs():
+    # A search asks for the pairs that are worth a closer look, and there may be none.
+    assert runs([]) == {}
+
+
 def test_neighbouring_groups_deviate_in_opposite_ways_by_one_tolerance():
     found = runs([Group(Hypothesis(ADSS), RATIOS, np.empty(0))] * 14)
     off = found[()].deviations[:: len(RATIOS)]
