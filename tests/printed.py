@@ -159,7 +159,8 @@ class Newcomer:
         free = [w if words[i - 1] not in ports else "0" for i, w in enumerate(words)]
         _bound(free)
         if self._full:
-            served = self._stack.enter_context(serving(*free, "--speed", "fast"))
+            pace = [] if "--speed" in free else ["--speed", "fast"]
+            served = self._stack.enter_context(serving(*free[1:], *pace))
         else:
             wires = {option.lstrip("-").replace("-", "_") for option in ports}
             served = {w: self._stack.enter_context(served_here(w)) for w in wires}
