@@ -50,7 +50,8 @@ def test_error_is_the_spread_seen_in_draws(seed, arf, rf, arf_std, rf_std):
     told = error_index(arf, rf, 0.0, 0.0, arf_s_std_hz=arf_std, rf_s_std_hz=rf_std).std_hz
     # 20,000 draws know a standard deviation to half a percent;
     # quadrature at a kink is off by up to 4.5 % (against 200,000 draws).
-    assert told == pytest.approx(seen, rel=0.07, abs=1e-8)
+    # A kink three errors away is met by thirty draws, which know its small share to a fifth.
+    assert told == pytest.approx(seen, rel=0.07, abs=1e-8 + 0.01 * (arf_std + rf_std))
 
 
 def test_arrays_broadcast_and_an_unknown_error_stays_unknown():

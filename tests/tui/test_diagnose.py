@@ -56,7 +56,8 @@ def calls(monkeypatch):
 
     made = []
 
-    def known(response, unit, *, cache, progress):
+    def known(response, unit, *, cache, executor, progress):
+        assert executor is None
         made.append((response, unit, cache))
         return Told()
 
