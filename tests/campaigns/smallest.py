@@ -92,6 +92,11 @@ def worded(effect: str, strength: float) -> str:
     return f"{parameter.name} = {value:.2g}{symbol}"
 
 
+def _within(effect: str, strength: float) -> str:
+    """The same, or that it is more than the largest that is looked for."""
+    return worded(effect, strength) if strength <= 1.0 else f"over {worded(effect, 1.0)}"
+
+
 def is_named(effect: str, setting: EffectSetting, rng: np.random.Generator) -> bool:
     """Hide it, and say whether it and nothing else is named."""
     machine, ratio = off_datasheet(UNIT, rng), float(rng.uniform(0.05, 0.95))
@@ -150,12 +155,9 @@ def block(trials: Mapping[str, Sequence[Trial]], seeds: str) -> list[str]:
     ]
     found = thresholds(list(asked.values()))
     for (effect, tried), (at, std) in zip(asked.items(), found, strict=True):
-        low, high = (worded(effect, end) for end in (at - std, at + std))
-        beyond = ", beyond its range" if at > 1.0 else ""
+        where, low, high = (_within(effect, end) for end in (at, at - std, at + std))
         named = sum(found for _, found in tried)
-        lines.append(
-            f"| {effect} | {worded(effect, at)}{beyond} | {low}; {high} | {named} of {len(tried)} |"
-        )
+        lines.append(f"| {effect} | {where} | {low}; {high} | {named} of {len(tried)} |")
     return lines
 
 
