@@ -43,11 +43,20 @@ class ClusterExecutor:
     def __init__(self, address: str) -> None:
         try:
             from distributed import Client
+            from distributed.comm import parse_address, parse_host_port
+            from distributed.comm.registry import get_backend
         except ImportError as error:
             raise InputError(
                 "--cluster needs Dask; install the extra: pip install 'lashbench[cluster]'"
             ) from error
         self.address = address
+        try:
+            # A client of an address that is none takes 20 s to give up, and then says so itself.
+            scheme, place = parse_address(address)
+            get_backend(scheme)
+            parse_host_port(place)
+        except ValueError as error:
+            raise InputError(f"{address!r} is no address of a Dask scheduler: {error}") from error
         try:
             self._client: Any = Client(address, timeout=_CONNECT_S, set_as_default=False)
         except (OSError, TimeoutError) as error:
@@ -55,8 +64,6 @@ class ClusterExecutor:
                 f"no Dask scheduler answers at {address} within {_CONNECT_S:g} s; start one with: "
                 "dask scheduler"
             ) from error
-        except ValueError as error:
-            raise InputError(f"{address!r} is no address of a Dask scheduler: {error}") from error
         try:
             self._client.wait_for_workers(1, timeout=_WORKERS_S)
         except TimeoutError as error:
