@@ -26,13 +26,14 @@ from yardsticks.page import replace_block
 
 from analysis.candidate import Candidate, form_candidates
 from analysis.diagnosis import Diagnosis, diagnose_response
+from analysis.likelihood import HEAT
 from analysis.observation import observe
 from analysis.placement import groups_along
 from analysis.population import simulate_groups
 
 LEVEL_VPK = 2.5
 GROUPS = 6
-CLEAR = 20.0
+CLEAR = 2.0 * HEAT
 """Log-likelihood from which on the diagnosis itself calls a lead no tie."""
 
 
