@@ -28,7 +28,6 @@ from sim.unit import Unit
 
 __all__ = ["Estimate", "Uncertain", "estimate_features", "estimate_response"]
 
-
 _WIDE_RESIDUAL = 1.35
 """Robust residual, in standard deviations, from which the model is said to lack something."""
 

@@ -60,7 +60,7 @@ def read_families(
     executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Readings:
-    """Readings of the machines of many families, in their order.
+    """Readings of the machines of families, one or more, in their order.
 
     Parameters
     ----------
@@ -71,12 +71,8 @@ def read_families(
 
     Raises
     ------
-    ValueError
-        If there are no families.
     AnalysisError
         If a motion grew without bound even at the shortest step.
     """
-    if not families:
-        raise ValueError("there are no families to read")
     parts = (executor or LocalExecutor()).each(read_family, families, progress)
     return np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
