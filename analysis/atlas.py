@@ -46,10 +46,10 @@ _COSTLY = {"shaft-hardening": 3}
 _LEAST_FREQUENCIES = 20
 
 
-def coarse_stride(observation: Observation) -> int:
-    """Every how many frequencies the atlas holds one."""
+def coarse_stride(observation: Observation, least: int = _LEAST_FREQUENCIES) -> int:
+    """Every how many frequencies a coarse look holds one, an atlas above all, to hold so many."""
     longest = max(block.stop - block.start for block in observation.blocks)
-    return max(longest // _LEAST_FREQUENCIES, 1)
+    return max(longest // least, 1)
 
 
 def make_atlas(

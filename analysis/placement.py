@@ -22,7 +22,8 @@ __all__ = ["groups_about", "groups_along", "groups_around"]
 _RATIOS = 10
 """Machines in a group; a second five cost a fifth more time than the first."""
 
-_FIRST_RATIO_REACH, _FIRST_SIZE_REACH = 0.14, 0.06
+_CLOSE, _FAR = (0.14, 0.06), (0.3, 0.12)
+"""Reach in ratio and in sizes about a place that the coarse look knows well, and about a pair's."""
 _RATIO_REACH, _JITTER = 0.1, 0.01
 _WIDE, _LEAST_STD = 3.0, 0.015
 """Reach about a learned answer in its standard deviations, and the least of those."""
@@ -34,12 +35,16 @@ _BEYOND, _CLOUD = 0.3, 250
 def groups_about(
     hypothesis: Hypothesis, best: NDArray[np.float64], groups: int, rng: np.random.Generator
 ) -> Iterator[Group]:
-    """Groups about a place (d,), the first of their sizes spread evenly."""
-    for step in rng.permutation(groups):
-        offset = rng.uniform(-1.0, 1.0, hypothesis.d - 1)
-        offset[:1] = 2.0 * (step + rng.uniform()) / groups - 1.0
-        sizes = np.clip(best[1:] + _FIRST_SIZE_REACH * offset, 0.0, 1.0)
-        yield Group(hypothesis, _ratios(best[0], _FIRST_RATIO_REACH, rng), sizes)
+    """Groups about a place (d,), each of their sizes spread evenly.
+
+    They reach further for several causes, whose place is put together from what each does alone.
+    """
+    ratio_reach, size_reach = _FAR if len(hypothesis.effects) > 1 else _CLOSE
+    steps = np.array([rng.permutation(groups) for _ in range(hypothesis.d - 1)])
+    for step in steps.T.reshape(groups, hypothesis.d - 1):
+        offset = 2.0 * (step + rng.uniform(size=len(step))) / groups - 1.0
+        sizes = np.clip(best[1:] + size_reach * offset, 0.0, 1.0)
+        yield Group(hypothesis, _ratios(best[0], ratio_reach, rng), sizes)
 
 
 def groups_along(candidate: Candidate, groups: int, rng: np.random.Generator) -> Iterator[Group]:

@@ -1,22 +1,24 @@
 """The first look: how well each cause, and each pair, agrees anywhere in its range.
 
 Owns the comparison of an atlas with a thinned observation. Pairs are not in
-the atlas: what the second cause adds is taken from its own runs, less those of
-the baseline, and laid over the first. That is wrong in detail and good enough
-to decide what to simulate. It simulates nothing itself.
+the atlas: what each of two causes adds to the baseline at the same ratio is
+added up. That is wrong in detail and good enough to decide what to simulate,
+and it asks nothing of either cause alone: the best place of one of a pair by
+itself is seldom its place within the pair. It simulates nothing itself.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.atlas import Atlas
 from analysis.branches import Motions
-from analysis.candidate import Candidate, Effects
+from analysis.candidate import Effects
 from analysis.observation import Observation
 from analysis.population import Population
 from analysis.surface import Surface, differences
@@ -29,8 +31,8 @@ _WIDTHS = {1: (0.06,), 2: (0.1, 0.13), 3: (0.12, 0.15, 0.2), 4: (0.15, 0.25, 0.0
 _COUNTS = {1: (31,), 2: (21, 25), 3: (13, 9, 5), 4: (11, 4, 15, 2)}
 """Places looked at along each coordinate."""
 
-_PAIR_RATIOS = np.linspace(-0.2, 0.2, 5)
-_PAIR_SIZES = np.linspace(-0.1, 0.1, 3)
+_PAIR_COUNTS = {2: (15, 13), 3: (15, 9, 3), 4: (15, 4, 15, 2)}
+"""The same for each cause of a pair; the ratio is common to both."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,71 +54,51 @@ def screen_singles(coarse: Observation, atlas: Atlas) -> dict[Effects, Place]:
     return found
 
 
-def screen_pairs(
-    coarse: Observation, atlas: Atlas, parents: Mapping[Effects, Candidate]
-) -> dict[Effects, Place]:
-    """The best place of every pair of a parent (a single cause looked at closely) and another."""
+def screen_pairs(coarse: Observation, atlas: Atlas) -> dict[Effects, Place]:
+    """The best place of every pair of single causes of an atlas."""
     surfaces = {effects: _surface(coarse, population) for effects, population in atlas.items()}
-    found: dict[Effects, Place] = {}
-    for parent, candidate in parents.items():
-        alone = _about_best(candidate)
-        for other in atlas:
-            if not other or other == parent:
-                continue
-            place = _best_pair(parent, alone, other, surfaces[other], surfaces[()])
-            key = tuple(sorted((*parent, *other)))
-            known = found.get(key)
-            if known is None or place.log_likelihood > known.log_likelihood:
-                found[key] = place
-    return found
+    ratios = _centres(_PAIR_COUNTS[2][0])
+    plain = np.array([surfaces[()].expected(np.array([ratio])) for ratio in ratios])
+    added = {e: _added(surface, plain[:, 0]) for e, surface in surfaces.items() if e}
+    return {
+        (*first, *second): _best_pair(plain[:, 0], added[first], added[second])
+        for first, second in combinations(sorted(added), 2)
+    }
 
 
-_Expected = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+@dataclass(frozen=True, slots=True, eq=False)
+class _Added:
+    """What a cause adds to the baseline.
+
+    `sizes` (count, d - 1); `shift`, `std` (ratios, count, 3, rows): by how much it
+    moves the mean, and the scatter of single runs with it.
+    """
+
+    sizes: NDArray[np.float64]
+    shift: NDArray[np.float64]
+    std: NDArray[np.float64]
 
 
-def _about_best(candidate: Candidate) -> list[_Expected]:
-    """Places about a candidate's best one, with the mean and the scatter expected there."""
-    best = candidate.best.place
-    # The atlas, which is laid over it, is too thin to tell states of motion apart.
-    nothing = Motions.unknown(*candidate.surface.difference.shape[::2])
-    surface = replace(candidate.surface, tailed=False, motions=nothing)
-    places = [
-        np.array([ratio, *np.clip(best[1:] + step, 0.0, 1.0)])
-        for ratio in np.unique(np.clip(best[0] + _PAIR_RATIOS, 0.0, 1.0))
-        for step in _PAIR_SIZES
-    ]
-    return [(place, *surface.expected(place)) for place in places]
+def _added(surface: Surface, plain: NDArray[np.float64]) -> _Added:
+    ratios, *counts = _PAIR_COUNTS[surface.places.shape[1]]
+    sizes = _mesh([_centres(count) for count in counts])
+    expected = np.array(
+        [[surface.expected(np.array([r, *size])) for size in sizes] for r in _centres(ratios)]
+    )
+    return _Added(sizes, expected[:, :, 0] - plain[:, None], expected[:, :, 1])
 
 
-def _best_pair(
-    parent: Effects, alone: Sequence[_Expected], other: Effects, second: Surface, none: Surface
-) -> Place:
-    top, where = -np.inf, alone[0][0]
-    added = _grid(second.places.shape[1], ratios=1)[:, 1:]
-    for ratio in {float(place[0]) for place, _, _ in alone}:
-        plain, _ = none.expected(np.array([ratio]))
-        extra = [second.expected(np.array([ratio, *sizes])) for sizes in added]
-        for place, mean, std in alone:
-            if place[0] != ratio:
-                continue
-            for more, (moved, wide) in zip(added, extra, strict=True):
-                shifted = mean + moved - plain
-                value = float(Surface.log_density(shifted, np.maximum(std, wide)).sum())
-                if value > top:
-                    top, where = value, _joined(parent, other, ratio, place[1:], more)
+def _best_pair(plain: NDArray[np.float64], first: _Added, second: _Added) -> Place:
+    top, where = -np.inf, np.empty(0)
+    for at, ratio in enumerate(_centres(len(plain))):
+        mean = plain[at] + first.shift[at][:, None] + second.shift[at]
+        std = np.maximum(first.std[at][:, None], second.std[at])
+        likelihood = Surface.log_density(mean, std).sum(axis=(2, 3))
+        one, other = np.unravel_index(np.argmax(likelihood), likelihood.shape)
+        if likelihood[one, other] > top:
+            top = float(likelihood[one, other])
+            where = np.array([ratio, *first.sizes[one], *second.sizes[other]])
     return Place(where, top)
-
-
-def _joined(
-    parent: Effects,
-    other: Effects,
-    ratio: float,
-    sizes: NDArray[np.float64],
-    more: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """The place of a pair: coordinates follow its effects, which are sorted."""
-    parts: Sequence[NDArray[np.float64]] = (sizes, more) if parent < other else (more, sizes)
-    return np.concatenate([[ratio], *parts])
 
 
 def _surface(coarse: Observation, population: Population) -> Surface:
@@ -129,7 +111,14 @@ def _surface(coarse: Observation, population: Population) -> Surface:
     )
 
 
-def _grid(d: int, ratios: int | None = None) -> NDArray[np.float64]:
-    counts = _COUNTS[d] if ratios is None else (ratios, *_COUNTS[d][1:])
-    lines = [np.linspace(0.0, 1.0, count) for count in counts]
+def _grid(d: int) -> NDArray[np.float64]:
+    return _mesh([np.linspace(0.0, 1.0, count) for count in _COUNTS[d]])
+
+
+def _centres(count: int) -> NDArray[np.float64]:
+    """Middles of so many equal parts of 0 to 1."""
+    return (np.arange(count) + 0.5) / count
+
+
+def _mesh(lines: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     return np.stack([m.ravel() for m in np.meshgrid(*lines, indexing="ij")], axis=1)

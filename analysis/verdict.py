@@ -46,7 +46,9 @@ _FALSE_ALARM = 20.0
 
 _SURE = 3.0 * HEAT
 """While it leads by less than this, that nothing is hidden has a twentieth of its probability or
-more, and is a rival: causes that nobody thought of are blamed on others by leads like these."""
+more, and is a rival: causes that nobody thought of are blamed on others by leads like these.
+Sets further behind are not held against runs of their own, which takes seconds and changes
+nothing; the baseline always is."""
 
 _BY_CHANCE = 0.04
 """Share of the baseline's own runs, with nothing hidden, that it may explain better by as much."""
@@ -81,7 +83,8 @@ class Judged:
     """A candidate with its score, its probability among those judged and how adequate it is.
 
     `misfit`: standard deviations by which it is fitted worse than runs of its
-    own. `adequate`: whether the observation looks like one of them.
+    own, NaN where that was not asked of a set far behind. `adequate`: whether
+    the observation looks like one of them, as far as that was asked.
     """
 
     candidate: Candidate
@@ -135,11 +138,12 @@ def judge_candidates(
     held = [hold_out(candidate, observation) for candidate in chosen]
     scores = np.array([_score(c, h) for c, h in zip(chosen, held, strict=True)])
     weight = np.exp((scores - scores.max()) / HEAT)
-    misfits = [judge_adequacy(candidate, rng).sigma for candidate in chosen]
-    judged = [
-        Judged(c, h, float(s), m, float(p), _is_adequate(c, h, m, rng))
-        for c, h, s, m, p in zip(chosen, held, scores, misfits, weight / weight.sum(), strict=True)
-    ]
+    judged = []
+    for c, h, score, share in zip(chosen, held, scores, weight / weight.sum(), strict=True):
+        asked = score > scores.max() - _SURE or not c.hypothesis.effects
+        misfit = judge_adequacy(c, rng).sigma if asked else np.nan
+        adequate = asked and _is_adequate(c, h, misfit, rng)
+        judged.append(Judged(c, h, float(score), misfit, float(share), adequate))
     judged.sort(key=lambda one: -one.score)
     (baseline,) = (one for one in judged if not one.effects)
     best = _simplest(judged)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import synthetic
 
-from analysis import atlas, population, search
+from analysis import atlas, hunt, population, search
+from analysis.causes import Hypothesis
 from analysis.executor import LocalExecutor
 from analysis.observation import USUAL_NOISE_V
 from analysis.population import Population
@@ -20,7 +21,7 @@ def read(effects, place, rng, deviations=None, scatter=1.0):
     sizes, at = {}, 1
     for effect in effects:
         sizes[effect] = place[at]
-        at += search.Hypothesis(ADSS, (effect,)).d - 1
+        at += Hypothesis(ADSS, (effect,)).d - 1
     plain = synthetic.read((), place[:1], rng, deviations, scatter)
     return plain + sum(synthetic.effect_slope((e,)) * size for e, size in sizes.items())
 
@@ -43,7 +44,10 @@ def runs(monkeypatch):
         count.executors.add(executor)
         for group, signs in zip(groups, population._signs(groups, rng), strict=True):
             key, off = group.hypothesis.effects, signs * synthetic.SIGMAS
-            channels = np.array([read(key, place, rng, off) for place in group.places])
+            rows = np.isin(
+                np.tile(synthetic.FREQUENCIES, len(synthetic.LEVELS)), observation.frequency_hz
+            )
+            channels = np.array([read(key, place, rng, off)[:, rows] for place in group.places])
             mean = np.exp(channels[:, 0] + 1j * channels[:, 1])
             made = Population(
                 group.places,
@@ -60,7 +64,7 @@ def runs(monkeypatch):
         count.clear()
         return made
 
-    monkeypatch.setattr(search, "simulate_groups", simulate)
+    monkeypatch.setattr(hunt, "simulate_groups", simulate)
     monkeypatch.setattr(atlas, "simulate_groups", quietly)
     return count
 
@@ -87,6 +91,21 @@ def test_two_causes_are_found_together(runs, seed):
     pair = ("amplifier-lag", "load-inertia")
     _, verdict = diagnosed(pair, [0.8, 0.3], seed)
     assert (verdict.word, verdict.best.effects) == ("explained", pair)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_second_cause_is_found_behind_one_that_nobody_doubts(runs, monkeypatch, seed):
+    monkeypatch.setattr(search, "_is_doubtful", lambda candidate, rng: candidate.hypothesis.d == 1)
+    pair = ("amplifier-lag", "load-inertia")
+    _, verdict = diagnosed(pair, [0.8, 0.3], seed)
+    assert verdict.best.effects == pair
+
+
+def test_nothing_is_looked_for_behind_a_cause_that_explains_all(runs):
+    found, verdict = diagnosed(("load-inertia",), [0.8], 1)
+    assert verdict.best.effects == ("load-inertia",)
+    # Twenty runs of a few pairs, forty more of two of them; what does no better goes no further.
+    assert all(count <= 60 for key, count in runs.items() if len(key) > 1)
 
 
 def test_every_run_is_made_where_the_caller_says(runs):

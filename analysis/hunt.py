@@ -1,0 +1,139 @@
+"""A hunt: the candidates on the rows of one observation, and all runs made for them so far.
+
+Owns the bookkeeping of a search: what was simulated for which hypothesis, the
+candidates that it gives, and the reading noise that they are held against. It
+does not decide what to look at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.candidate import Candidate, Effects, form_candidates
+from analysis.causes import Hypothesis
+from analysis.executor import Executor
+from analysis.observation import Observation
+from analysis.placement import groups_about, groups_along, groups_around
+from analysis.population import Group, Population, simulate_groups
+from analysis.reading_noise import likeliest_noise, possible_noises
+from analysis.sizing import size_candidate
+from sim.unit import Unit
+
+__all__ = ["Hunt", "Starts"]
+
+Starts = Mapping[Effects, NDArray[np.float64]]
+"""Places (d,) from which hypotheses are looked at."""
+
+
+class Hunt:
+    """Candidates on the rows of one observation, and the runs made for them so far."""
+
+    def __init__(
+        self,
+        unit: Unit,
+        observation: Observation,
+        rng: np.random.Generator,
+        executor: Executor | None,
+        progress: Callable[[float], None] | None,
+        noise_v: float | None = None,
+    ) -> None:
+        heard = observation if noise_v is None else observation.with_noise(noise_v)
+        self._unit, self.observation, self._rng = unit, heard, rng
+        self._noises = possible_noises(observation)
+        self._executor, self._progress, self._left = executor, progress, 1.0
+        self._runs: dict[Effects, Population] = {}
+        self.found: dict[Effects, Candidate] = {}
+
+    @property
+    def best(self) -> Candidate:
+        """The most likely candidate."""
+        return max(self.found.values(), key=lambda c: c.best.log_likelihood)
+
+    @property
+    def best_single(self) -> Effects:
+        """The most likely single cause."""
+        single: list[Effects] = [key for key in self.found if len(key) == 1]
+        return max(single, key=lambda key: self.found[key].best.log_likelihood)
+
+    def leading(self, most: int, behind: float = np.inf) -> list[Effects]:
+        """The most likely hypotheses, none too far behind the first."""
+        likelihood = {key: c.best.log_likelihood for key, c in self.found.items()}
+        ranked = sorted(likelihood, key=lambda key: -likelihood[key])
+        return [k for k in ranked[:most] if likelihood[k] >= likelihood[ranked[0]] - behind]
+
+    def thinned(self, stride: int) -> Hunt:
+        """A hunt on every so manieth of the frequencies, with nothing simulated yet."""
+        few, noise_v = self.observation.thinned(stride), self.observation.noise_v
+        return Hunt(self._unit, few, self._rng, self._executor, self._report(), noise_v)
+
+    def start(self, places: Starts, groups: int) -> None:
+        """Simulate hypotheses about places."""
+        self._simulate(
+            [
+                group
+                for key, place in places.items()
+                for group in groups_about(Hypothesis(self._unit, key), place, groups, self._rng)
+            ]
+        )
+        self._form(places)
+
+    def take_over(self, candidates: Sequence[Candidate], groups: int) -> None:
+        """Simulate candidates that were formed on other rows."""
+        self._simulate([g for c in candidates for g in groups_along(c, groups, self._rng)])
+        self._form({c.hypothesis.effects: c.best.place for c in candidates})
+
+    def settle(self, chosen: Sequence[Effects], groups: int) -> None:
+        """Simulate more of some candidates, about what their runs tell of their parameters."""
+        found = [self.found[key] for key in chosen]
+        self._simulate(
+            [
+                group
+                for c in found
+                for group in groups_around(
+                    c.hypothesis, size_candidate(c, self.observation, self._rng), groups, self._rng
+                )
+            ]
+        )
+        self._form({key: self.found[key].best.place for key in chosen})
+
+    def hear(self) -> None:
+        """Take the reading for as noisy as the most likely candidate would have it."""
+        best = self.best
+        key = best.hypothesis.effects
+
+        def likelihood(seen: Observation) -> float:
+            starts, runs = {key: best.best.place}, {key: self._runs[key]}
+            return form_candidates(self._unit, seen, runs, starts)[key].best.log_likelihood
+
+        heard = likeliest_noise(self._noises, likelihood)
+        if heard.noise_v != self.observation.noise_v:
+            self.observation = heard
+            self._form({effects: c.best.place for effects, c in self.found.items()})
+
+    def look_closer(self, chosen: Sequence[Effects], groups: int) -> None:
+        """Simulate more of some candidates, along the places that agree."""
+        self.take_over([self.found[key] for key in chosen], groups)
+
+    def _simulate(self, groups: Sequence[Group]) -> None:
+        made = simulate_groups(
+            self._unit, groups, self.observation, self._rng, self._executor, self._report()
+        )
+        for key, population in made.items():
+            known = self._runs.get(key)
+            self._runs[key] = population if known is None else known.joined(population)
+
+    def _form(self, starts: Starts) -> None:
+        runs = {key: self._runs[key] for key in starts}
+        self.found |= form_candidates(self._unit, self.observation, runs, starts)
+
+    def _report(self) -> Callable[[float], None] | None:
+        """Half of what is left of the bar, as nobody knows how many rounds are to come."""
+        if self._progress is None:
+            return None
+        progress, begin = self._progress, 1.0 - self._left
+        self._left *= 0.5
+        half = self._left
+        return lambda share: progress(begin + half * share)

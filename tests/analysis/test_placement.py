@@ -1,0 +1,45 @@
+"""Where groups of runs go about a place."""
+
+import numpy as np
+import pytest
+import synthetic
+
+from analysis.causes import Hypothesis
+from analysis.placement import groups_about
+
+
+@pytest.mark.parametrize(
+    ("effects", "ratio_reach", "size_reach"),
+    [
+        (("load-inertia",), 0.14, 0.06),
+        (("payload-flexibility",), 0.14, 0.06),
+        (("load-inertia", "mesh1-damping"), 0.3, 0.12),
+    ],
+)
+@pytest.mark.parametrize("seed", range(3))
+def test_every_size_and_the_ratio_are_spread_evenly_over_the_reach(
+    effects, ratio_reach, size_reach, seed
+):
+    hypothesis = Hypothesis(synthetic.ADSS, effects)
+    best = np.full(hypothesis.d, 0.5)
+    groups = list(groups_about(hypothesis, best, 4, np.random.default_rng(seed)))
+    for sizes in np.array([group.sizes for group in groups]).T:
+        quarters = np.floor((sizes - 0.5 + size_reach) / (size_reach / 2.0))
+        assert sorted(quarters) == [0, 1, 2, 3]
+    for group in groups:
+        offset = group.ratios - 0.5 + ratio_reach
+        assert list(np.floor(offset / (ratio_reach / 5.0))) == list(range(10))
+
+
+def test_groups_stay_inside_the_plausible_range():
+    hypothesis = Hypothesis(synthetic.ADSS, ("amplifier-lag", "load-inertia"))
+    rng = np.random.default_rng(1)
+    for group in groups_about(hypothesis, np.array([1.0, 0.0, 1.0]), 8, rng):
+        assert np.all((group.places >= 0.0) & (group.places <= 1.0))
+
+
+def test_the_plain_model_has_no_sizes_to_spread():
+    groups = list(
+        groups_about(Hypothesis(synthetic.ADSS), np.array([0.4]), 3, np.random.default_rng(2))
+    )
+    assert [group.sizes.shape for group in groups] == [(0,)] * 3
