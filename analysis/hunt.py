@@ -70,7 +70,7 @@ class Hunt:
         return Hunt(self._unit, few, self._rng, self._executor, self._report(), noise_v)
 
     def start(self, places: Starts, groups: int) -> None:
-        """Simulate hypotheses about places."""
+        """Simulate hypotheses about places, or more of them than before about other places."""
         self._simulate(
             [
                 group
@@ -78,7 +78,13 @@ class Hunt:
                 for group in groups_about(Hypothesis(self._unit, key), place, groups, self._rng)
             ]
         )
+        known = {key: self.found[key].best.place for key in places if key in self.found}
         self._form(places)
+        there = {key: self.found[key] for key in known}
+        self._form(known)
+        for key, one in there.items():
+            if one.best.log_likelihood > self.found[key].best.log_likelihood:
+                self.found[key] = one
 
     def take_over(self, candidates: Sequence[Candidate], groups: int) -> None:
         """Simulate candidates that were formed on other rows."""

@@ -11,10 +11,12 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.adequacy import judge_adequacy, judge_chance
 from analysis.atlas import Atlas, coarse_stride, make_atlas
 from analysis.candidate import Candidate, Effects
+from analysis.causes import Hypothesis
 from analysis.executor import Executor
 from analysis.holdout import hold_out
 from analysis.hunt import Hunt, Starts
@@ -67,6 +69,10 @@ each other the first is blind, and the second is not."""
 
 _LITTLE = 10.0
 """Log-likelihood in the coarse look that a pair may lack of its leading part, and be looked at."""
+
+_PREDICTED, _NOT_PREDICTED, _MORE_ROUNDS = 1.3, 2.5, 3
+"""What a leader misses of levels not fitted, in standard deviations, from which it gets more runs
+and up to which that may help; and how many times it gets them."""
 
 _COMMON = 0.2
 """Share of the baseline's own runs that the leader explains better by as much, from which on there
@@ -146,6 +152,7 @@ def search_causes(
             break
     if not doubted:
         _look_beside(rough, fine, atlas, rng)
+    _see_it_predict(fine)
     return sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
 
 
@@ -170,6 +177,17 @@ def _look_beside(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator
         fine.take_over([rough.found[key] for key in kept[:_BESIDE_CLOSER]], _THIRD_GROUPS)
         if fine.best.hypothesis.effects != leader:
             _compare(fine, rng)
+
+
+def _see_it_predict(fine: Hunt) -> None:
+    """Give a leader, and who is close to it, more runs where it predicts badly: few runs do."""
+    for _ in range(_MORE_ROUNDS):
+        missed = hold_out(fine.best, fine.observation).rms_sigma
+        if not fine.best.hypothesis.effects or not _PREDICTED < missed < _NOT_PREDICTED:
+            break
+        close = [key for key in fine.leading(_CHANCES, _CLOSE) if key]
+        fine.settle(close, _LAST_GROUPS)
+        fine.hear()
 
 
 def _compare(fine: Hunt, rng: np.random.Generator) -> None:
@@ -198,12 +216,17 @@ def _search_pairs(rough: Hunt, atlas: Atlas) -> None:
     places = screen_pairs(rough.observation, atlas)
     ranked, leader = _ranked(places), rough.best_single[0]
     partners = [key for key in ranked if leader in key]
+    if not ranked:
+        return
     glance = rough.thinned(coarse_stride(rough.observation, _GLANCE_FREQUENCIES))
     chosen = dict.fromkeys([*ranked[:_PAIRS], *partners[:_PARTNERS]])
     glance.start({key: places[key].place for key in chosen}, _GLANCE_GROUPS)
     closer = [glance.found[key] for key in glance.leading(_PAIRS_CLOSER)]
     rough.take_over(closer, _PAIR_GROUPS[0])
     rough.look_closer(_among(rough, chosen)[:_PAIRS_AFTER], _PAIR_GROUPS[1])
+    # A part may do as well where the pair has it, and only have been looked at elsewhere.
+    best = rough.found[_among(rough, chosen)[0]]
+    rough.start(_places_of_parts(best), _PAIR_GROUPS[1])
     rough.hear()
 
 
@@ -236,6 +259,17 @@ def _third(rough: Hunt) -> list[Effects]:
     others = [*_parts(leading[0], rough.found), rough.best_single]
     hopeful = set(rough.leading(len(rough.found), _HOPELESS))
     return _with_baseline([*leading, *(key for key in others if key in hopeful)])
+
+
+def _places_of_parts(pair: Candidate) -> Starts:
+    """Where the causes of a pair are by its best fit, each for itself."""
+    place, at = pair.best.place, 1
+    found: dict[Effects, NDArray[np.float64]] = {}
+    for effect in pair.hypothesis.effects:
+        end = at + Hypothesis(pair.hypothesis.unit, (effect,)).d - 1
+        found[(effect,)] = np.array([place[0], *place[at:end]])
+        at = end
+    return found
 
 
 def _earns(key: Effects, found: Mapping[Effects, Candidate]) -> bool:
