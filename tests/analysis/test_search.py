@@ -1,6 +1,7 @@
 """The search in a world whose answers are known: everything but the simulations is real."""
 
 from collections import Counter
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -106,6 +107,69 @@ def test_nothing_is_looked_for_behind_a_cause_that_explains_all(runs):
     assert verdict.best.effects == ("load-inertia",)
     # Twenty runs of a few pairs, forty more of two of them; what does no better goes no further.
     assert all(count <= 60 for key, count in runs.items() if len(key) > 1)
+
+
+def hunted(sizes, seed):
+    """A hunt for one cause of a known size, with nothing simulated yet."""
+    rng = np.random.default_rng(seed)
+    observed = synthetic.observation(read(("load-inertia",), np.array([0.4, *sizes]), rng))
+    return hunt.Hunt(ADSS, observed, rng, None, None)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_second_look_elsewhere_does_not_lose_what_the_first_found(runs, seed):
+    key = ("load-inertia",)
+    looking = hunted([0.8], seed)
+    looking.start({key: np.array([0.4, 0.8])}, 4)
+    looking.start({key: np.array([0.9, 0.1])}, 4)
+    assert looking.found[key].best.place == pytest.approx([0.4, 0.8], abs=0.1)
+    assert len(looking.found[key].population) == 80
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_look_at_the_right_place_mends_one_at_a_wrong_place(runs, seed):
+    key = ("load-inertia",)
+    looking = hunted([0.8], seed)
+    looking.start({key: np.array([0.9, 0.1])}, 4)
+    wrong = looking.found[key].best.log_likelihood
+    looking.start({key: np.array([0.4, 0.8])}, 4)
+    assert looking.found[key].best.log_likelihood > wrong + 100.0
+    assert looking.found[key].best.place == pytest.approx([0.4, 0.8], abs=0.1)
+
+
+def test_the_parts_of_a_pair_stand_where_the_pair_has_them():
+    pair = Hypothesis(ADSS, ("amplifier-lag", "payload-flexibility"))
+    place = np.array([0.4, 0.1, 0.2, 0.3, 0.5])
+    best = SimpleNamespace(hypothesis=pair, best=SimpleNamespace(place=place))
+    found = search._places_of_parts(best)
+    assert found[("amplifier-lag",)].tolist() == [0.4, 0.1]
+    assert found[("payload-flexibility",)].tolist() == [0.4, 0.2, 0.3, 0.5]
+
+
+@pytest.mark.parametrize(
+    ("missed", "rounds"),
+    [
+        ([1.0], 0),
+        ([1.29], 0),
+        ([1.6, 1.1], 1),
+        ([1.6, 1.5, 1.2], 2),
+        ([1.6, 1.6, 1.6, 1.6], 3),
+        ([2.6], 0),
+    ],
+)
+def test_a_leader_that_predicts_badly_gets_more_runs(monkeypatch, missed, rounds):
+    settled, left = [], iter(missed)
+    best = SimpleNamespace(hypothesis=Hypothesis(ADSS, ("load-inertia",)))
+    fine = SimpleNamespace(
+        best=best,
+        observation=None,
+        leading=lambda most, behind: [("load-inertia",), ()],
+        settle=lambda chosen, groups: settled.append(chosen),
+        hear=lambda: None,
+    )
+    monkeypatch.setattr(search, "hold_out", lambda *_: SimpleNamespace(rms_sigma=next(left)))
+    search._see_it_predict(fine)
+    assert settled == [[("load-inertia",)]] * rounds
 
 
 def test_every_run_is_made_where_the_caller_says(runs):
