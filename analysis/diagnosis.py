@@ -166,7 +166,7 @@ class Diagnosis:
         lines.append("  sets judged, by probability:")
         for one in self.verdict.judged:
             name = " + ".join(one.effects) or "nothing hidden"
-            unlike = "" if one.adequate else "  (does not look like its own runs)"
+            unlike = "  (does not look like its own runs)" if one.unlike else ""
             lines.append(f"    {one.probability:6.3f}  {name}{unlike}")
         if self.next_measurement is not None:
             proposal = self.next_measurement

@@ -96,7 +96,7 @@ def probability_figure(diagnosis: Diagnosis) -> Figure:
             row,
             max(one.probability, _NARROWEST_SHARE),
             color=_EXTENDED if one is diagnosis.verdict.best else "#999999",
-            hatch=None if one.adequate else "///",
+            hatch="///" if one.unlike else None,
         )
         axes.text(1.02, row, f"{one.probability:.3f}", va="center", fontsize=8)
     axes.set_yticks(range(len(judged)), names, fontsize=8)

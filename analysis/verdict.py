@@ -99,6 +99,11 @@ class Judged:
         """Identifiers of its effects."""
         return self.candidate.hypothesis.effects
 
+    @property
+    def unlike(self) -> bool:
+        """Whether it was asked, and the observation does not look like one of its own runs."""
+        return not self.adequate and not np.isnan(self.misfit)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Verdict:

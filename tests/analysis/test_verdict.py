@@ -34,6 +34,19 @@ def test_a_cause_that_is_there_is_named(seed):
     assert verdict.best.probability > 0.95
 
 
+def test_sets_far_behind_are_not_held_against_runs_of_their_own_but_the_baseline_is():
+    verdict = judge(seen(TRUE, 1, size=0.9), seed=10)
+    far = [one for one in verdict.judged if one.score < verdict.best.score - rules._SURE]
+    asked = [one for one in verdict.judged if not np.isnan(one.misfit)]
+    assert verdict.baseline in asked
+    assert [one for one in far if one is not verdict.baseline]
+    for one in verdict.judged:
+        assert (one in asked) == (one is verdict.baseline or one not in far)
+        if one not in asked:
+            assert not one.adequate
+            assert not one.unlike, "nobody asked whether it looks like its own runs"
+
+
 @pytest.mark.parametrize("seed", range(10))
 def test_nothing_is_named_where_nothing_is_hidden(seed):
     verdict = judge(seen((), seed, size=0.0), seed=10 * seed)
