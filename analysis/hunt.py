@@ -8,6 +8,7 @@ does not decide what to look at.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,12 +80,12 @@ class Hunt:
             ]
         )
         known = {key: self.found[key].best.place for key in places if key in self.found}
-        self._form(places)
-        there = {key: self.found[key] for key in known}
-        self._form(known)
-        for key, one in there.items():
-            if one.best.log_likelihood > self.found[key].best.log_likelihood:
-                self.found[key] = one
+        self._form({**places, **known})
+        for key in known:
+            one = self.found[key]
+            there = one.surface.climb(places[key])
+            if there.log_likelihood > one.best.log_likelihood:
+                self.found[key] = replace(one, best=there)
 
     def take_over(self, candidates: Sequence[Candidate], groups: int) -> None:
         """Simulate candidates that were formed on other rows."""

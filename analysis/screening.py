@@ -31,8 +31,8 @@ _WIDTHS = {1: (0.06,), 2: (0.1, 0.13), 3: (0.12, 0.15, 0.2), 4: (0.15, 0.25, 0.0
 _COUNTS = {1: (31,), 2: (21, 25), 3: (13, 9, 5), 4: (11, 4, 15, 2)}
 """Places looked at along each coordinate."""
 
-_PAIR_COUNTS = {2: (15, 13), 3: (15, 9, 3), 4: (15, 4, 15, 2)}
-"""The same for each cause of a pair; the ratio is common to both."""
+_PAIR_RATIOS, _PAIR_SIZES = 15, {2: (13,), 3: (9, 3), 4: (4, 15, 2)}
+"""The same for pairs, whose ratio is common to both, and for each cause by its coordinates."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,15 +54,16 @@ def screen_singles(coarse: Observation, atlas: Atlas) -> dict[Effects, Place]:
     return found
 
 
-def screen_pairs(coarse: Observation, atlas: Atlas) -> dict[Effects, Place]:
-    """The best place of every pair of single causes of an atlas."""
+def screen_pairs(coarse: Observation, atlas: Atlas, beside: Effects = ()) -> dict[Effects, Place]:
+    """The best place of every pair of causes of an atlas, or of those with one of `beside`."""
     surfaces = {effects: _surface(coarse, population) for effects, population in atlas.items()}
-    ratios = _centres(_PAIR_COUNTS[2][0])
+    ratios = _centres(_PAIR_RATIOS)
     plain = np.array([surfaces[()].expected(np.array([ratio])) for ratio in ratios])
     added = {e: _added(surface, plain[:, 0]) for e, surface in surfaces.items() if e}
     return {
         (*first, *second): _best_pair(plain[:, 0], added[first], added[second])
         for first, second in combinations(sorted(added), 2)
+        if not beside or set(beside) & {*first, *second}
     }
 
 
@@ -80,17 +81,17 @@ class _Added:
 
 
 def _added(surface: Surface, plain: NDArray[np.float64]) -> _Added:
-    ratios, *counts = _PAIR_COUNTS[surface.places.shape[1]]
-    sizes = _mesh([_centres(count) for count in counts])
+    sizes = _mesh([_centres(count) for count in _PAIR_SIZES[surface.places.shape[1]]])
+    ratios = _centres(_PAIR_RATIOS)
     expected = np.array(
-        [[surface.expected(np.array([r, *size])) for size in sizes] for r in _centres(ratios)]
+        [[surface.expected(np.array([ratio, *size])) for size in sizes] for ratio in ratios]
     )
     return _Added(sizes, expected[:, :, 0] - plain[:, None], expected[:, :, 1])
 
 
 def _best_pair(plain: NDArray[np.float64], first: _Added, second: _Added) -> Place:
     top, where = -np.inf, np.empty(0)
-    for at, ratio in enumerate(_centres(len(plain))):
+    for at, ratio in enumerate(_centres(_PAIR_RATIOS)):
         mean = plain[at] + first.shift[at][:, None] + second.shift[at]
         std = np.maximum(first.std[at][:, None], second.std[at])
         likelihood = Surface.log_density(mean, std).sum(axis=(2, 3))

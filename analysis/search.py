@@ -11,12 +11,10 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.adequacy import judge_adequacy, judge_chance
 from analysis.atlas import Atlas, coarse_stride, make_atlas
 from analysis.candidate import Candidate, Effects
-from analysis.causes import Hypothesis
 from analysis.executor import Executor
 from analysis.holdout import hold_out
 from analysis.hunt import Hunt, Starts
@@ -147,27 +145,25 @@ def search_causes(
             # Parameters trade off in ways that evenly placed runs miss: a second chance.
             leading = [key for key in fine.leading(len(fine.found), _HOPELESS) if key]
             fine.settle(leading[:_CHANCES], _LAST_GROUPS)
-        _compare(fine, rng)
+        missing = _compare(fine, rng)
         if doubted or not _is_doubtful(fine.best, rng):
             break
-    if not doubted:
-        _look_beside(rough, fine, atlas, rng)
-    _see_it_predict(fine)
+    if missing:
+        if not doubted:
+            _look_beside(rough, fine, atlas, rng)
+        _see_it_predict(fine)
     return sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
 
 
 def _look_beside(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator) -> None:
     """See whether a second cause hides behind a single one that is not doubted."""
     leader = fine.best.hypothesis.effects
-    if len(leader) != 1 or _is_nothing_missing(fine, rng):
+    if len(leader) != 1:
         return
     alone = screen_singles(rough.observation, {leader: atlas[leader]})[leader]
-    places = screen_pairs(rough.observation, atlas)
-    ranked = [
-        key
-        for key in _ranked(places)
-        if leader[0] in key and places[key].log_likelihood > alone.log_likelihood - _LITTLE
-    ]
+    places = screen_pairs(rough.observation, atlas, leader)
+    enough = alone.log_likelihood - _LITTLE
+    ranked = [key for key in _ranked(places) if places[key].log_likelihood > enough]
     if not ranked:
         return
     rough.start({key: places[key].place for key in ranked[:_BESIDE]}, _BESIDE_GROUPS[0])
@@ -190,10 +186,15 @@ def _see_it_predict(fine: Hunt) -> None:
         fine.hear()
 
 
-def _compare(fine: Hunt, rng: np.random.Generator) -> None:
-    """Give whoever is compared with the leader as many runs: more runs fit better."""
+def _compare(fine: Hunt, rng: np.random.Generator) -> bool:
+    """Give whoever is compared with the leader as many runs: more runs fit better.
+
+    Returns whether something is missing from the plain model.
+    """
+    missing = True
     for most, behind in _LAST_ROUNDS:
-        if _is_nothing_missing(fine, rng):
+        missing = not _is_nothing_missing(fine, rng)
+        if not missing:
             break
         leader, *near = fine.leading(most, behind)
         if behind == _CLOSE and not near:
@@ -203,6 +204,7 @@ def _compare(fine: Hunt, rng: np.random.Generator) -> None:
         near += [key for key in (*_parts(leader, fine.found), ()) if key in close]
         fine.settle(list(dict.fromkeys([leader, *near])), _LAST_GROUPS)
     fine.hear()
+    return missing
 
 
 def _singles(coarse: Observation, atlas: Atlas) -> Starts:
@@ -263,13 +265,11 @@ def _third(rough: Hunt) -> list[Effects]:
 
 def _places_of_parts(pair: Candidate) -> Starts:
     """Where the causes of a pair are by its best fit, each for itself."""
-    place, at = pair.best.place, 1
-    found: dict[Effects, NDArray[np.float64]] = {}
-    for effect in pair.hypothesis.effects:
-        end = at + Hypothesis(pair.hypothesis.unit, (effect,)).d - 1
-        found[(effect,)] = np.array([place[0], *place[at:end]])
-        at = end
-    return found
+    ratio, *sizes = pair.best.place
+    places: dict[Effects, list[float]] = {(one,): [ratio] for one in pair.hypothesis.effects}
+    for (effect, _), size in zip(pair.hypothesis.parameters, sizes, strict=True):
+        places[(effect,)].append(size)
+    return {effects: np.array(place) for effects, place in places.items()}
 
 
 def _earns(key: Effects, found: Mapping[Effects, Candidate]) -> bool:

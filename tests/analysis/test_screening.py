@@ -62,16 +62,31 @@ def test_every_pair_is_looked_at_once_in_the_order_of_its_effects(atlas):
         assert place.place.shape == (Hypothesis(synthetic.ADSS, key).d,)
 
 
-def test_a_pair_does_not_ask_its_parts_to_lead_alone(atlas):
-    """Two causes that cancel in part look like a third, and neither of them leads by itself."""
-    sizes = {"load-inertia": 0.95, "shaft-stiffness": 0.9}
+@pytest.mark.parametrize(
+    ("sizes", "stands_in"),
+    [
+        ({"amplifier-lag": 0.3, "load-inertia": 0.7}, "mesh1-damping"),
+        ({"amplifier-lag": 0.7, "mesh1-damping": 0.9}, "shaft-stiffness"),
+        ({"load-inertia": 0.7, "tachometer-gain": 0.9}, "shaft-stiffness"),
+    ],
+)
+def test_a_pair_does_not_ask_its_parts_to_lead_alone(atlas, sizes, stands_in):
+    """Two causes together may look like a third, which leads by itself."""
     observed = seen(sizes, 0.3, 3)
     singles = screen_singles(observed, atlas)
-    alone = max(singles[(e,)].log_likelihood for e in sizes)
+    alone = max(singles, key=lambda key: singles[key].log_likelihood)
+    assert alone == (stands_in,)
     found = screen_pairs(observed, atlas)
     best = max(found, key=lambda key: found[key].log_likelihood)
     assert best == tuple(sizes)
-    assert found[best].log_likelihood > alone + 50.0
+    assert found[best].log_likelihood > singles[alone].log_likelihood + 200.0
+
+
+def test_pairs_beside_a_cause_are_those_that_hold_it(atlas):
+    observed = seen({"load-inertia": 0.8}, 0.3, 4)
+    every, some = screen_pairs(observed, atlas), screen_pairs(observed, atlas, ("load-inertia",))
+    assert set(some) == {key for key in every if "load-inertia" in key}
+    assert all(some[k].log_likelihood == every[k].log_likelihood for k in some)
 
 
 def test_a_population_without_any_cause_gives_no_pairs(atlas):
