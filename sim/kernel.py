@@ -13,18 +13,20 @@ over the step it does the work W(y1) - W(y0) whatever the motion inside the
 step was: no energy appears or vanishes, at any step.
 
 Lanes lie along the last axis everywhere, so that each loop over them is one
-run of vector operations. Three things keep these loops fast: rows lie a fixed
-distance apart (`MOST_LANES`), known to the compiler, which then need not test
-at run time whether they overlap; a loop over lanes holds no branch and no call
-that is left after inlining; and the parts are inlined by the machine's
-compiler, not by numba, which would rename arrays inside the step loop and
-count references in every step.
+run of vector operations. Three things keep these loops fast: the compiler need
+not test at run time whether rows overlap, because those of an array lie a fixed
+distance apart (`MOST_LANES`), their numbers cannot be negative (`& _ROW`), and
+it is told that the arrays of a part are different ones (`_Apart`); a loop over
+lanes holds no branch and no call that is left after inlining; and the parts are
+inlined by the machine's compiler, not by numba, which would rename arrays
+inside the step loop and count references in every step.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numba.core.compiler import Compiler
 
 __all__ = ["FORCES_AT_ONCE", "MOST_LANES", "PAIR", "ROWS_AT_ONCE", "STRIBECK", "step_cycles"]
 
@@ -53,6 +55,9 @@ _CORRECTIONS = 2
 """How often a play's share of the step is corrected; each leaves about 3 % of the error."""
 
 _FIRST_SWEEPS = 8
+
+_ROW = 1023
+"""All bits that the number of a row can have."""
 
 _law = njit(inline="always", fastmath=_FLAGS, error_model="numpy")
 
@@ -175,13 +180,22 @@ def cubic_pair(y0, z0, y_ahead, z_ahead, p, r, k_y, k_z, yy, yz, zy, zz):
     return cubic_mean(y0, y, k), cubic_mean(z0, z, n)
 
 
-_part = njit(forceinline=True, fastmath=_FLAGS, error_model="numpy")
+class _Apart(Compiler):
+    """Compiles functions whose array arguments do not overlap, as a promise and unchecked."""
+
+    def define_pipelines(self):
+        self.state.flags.noalias = True
+        return super().define_pipelines()
+
+
+_part = njit(pipeline_class=_Apart, forceinline=True, fastmath=_FLAGS, error_model="numpy")
 
 
 @_part
 def _turn(carry, push, drift, q, force, lanes):
     """Coordinates in pairs of rows: the forces of the last step push them, then they turn."""
-    for i in range(0, carry.shape[0], 2):
+    for row in range(0, carry.shape[0], 2):
+        i = row & _ROW
         _push_further(push, i, q, force, lanes)
         a0, a1, a2, a3 = push[i, 0], push[i, 1], push[i, 2], push[i, 3]
         b0, b1, b2, b3 = push[i + 1, 0], push[i + 1, 1], push[i + 1, 2], push[i + 1, 3]
@@ -196,7 +210,8 @@ def _turn(carry, push, drift, q, force, lanes):
 
 @_part
 def _push_further(push, i, q, force, lanes):
-    for k in range(FORCES_AT_ONCE, push.shape[1], 2):
+    for column in range(FORCES_AT_ONCE, push.shape[1], 2):
+        k = column & _ROW
         a0, a1, b0, b1 = push[i, k], push[i, k + 1], push[i + 1, k], push[i + 1, k + 1]
         for s in range(lanes):
             q[i, s] += a0 * force[k, s] + a1 * force[k + 1, s]
@@ -205,7 +220,8 @@ def _push_further(push, i, q, force, lanes):
 
 @_part
 def _push(push, q, force, lanes):
-    for i in range(0, push.shape[0], 2):
+    for row in range(0, push.shape[0], 2):
+        i = row & _ROW
         a0, a1, a2, a3 = push[i, 0], push[i, 1], push[i, 2], push[i, 3]
         b0, b1, b2, b3 = push[i + 1, 0], push[i + 1, 1], push[i + 1, 2], push[i + 1, 3]
         for s in range(lanes):
@@ -235,7 +251,8 @@ def _multiply(carry, push, drift, q, force, spare, lanes):
 @_part
 def _look(look, rows, waves, cosine, sine, q, free, lanes):
     """What the laws, and the output in the last row, would see at the end without any force."""
-    for j in range(rows):
+    for row in range(rows):
+        j = row & _ROW
         l0, l1, l2, l3 = look[j, 0], look[j, 1], look[j, 2], look[j, 3]
         l4, l5, l6, l7 = look[j, 4], look[j, 5], look[j, 6], look[j, 7]
         l8, l9, l10, l11 = look[j, 8], look[j, 9], look[j, 10], look[j, 11]
@@ -249,7 +266,8 @@ def _look(look, rows, waves, cosine, sine, q, free, lanes):
                 + l8 * q[8, s] + l9 * q[9, s] + l10 * q[10, s] + l11 * q[11, s]
                 + l12 * q[12, s] + l13 * q[13, s]
             )  # fmt: skip
-        for k in range(ROWS_AT_ONCE, look.shape[1], 2):
+        for column in range(ROWS_AT_ONCE, look.shape[1], 2):
+            k = column & _ROW
             l0, l1 = look[j, k], look[j, k + 1]
             for s in range(lanes):
                 free[j, s] += l0 * q[k, s] + l1 * q[k + 1, s]
@@ -258,12 +276,14 @@ def _look(look, rows, waves, cosine, sine, q, free, lanes):
 @_part
 def _feel(gain, j, force, free, y, to, lanes):
     """Row `to` of y: what row j sees with the forces as they stand."""
+    j, to = j & _ROW, to & _ROW
     g0, g1, g2, g3 = gain[j, 0], gain[j, 1], gain[j, 2], gain[j, 3]
     for s in range(lanes):
         y[to, s] = (
             free[j, s] + g0 * force[0, s] + g1 * force[1, s] + g2 * force[2, s] + g3 * force[3, s]
         )
-    for k in range(FORCES_AT_ONCE, gain.shape[1], 2):
+    for column in range(FORCES_AT_ONCE, gain.shape[1], 2):
+        k = column & _ROW
         g0, g1 = gain[j, k], gain[j, k + 1]
         for s in range(lanes):
             y[to, s] += g0 * force[k, s] + g1 * force[k + 1, s]
@@ -272,6 +292,7 @@ def _feel(gain, j, force, free, y, to, lanes):
 @_part
 def _solve(kind, stiffness, damping, own, parameters, j, y, ahead, force, lanes):
     """The force of law j, from what it saw at the start and would see ahead."""
+    j &= _ROW
     at = 3 * j
     if kind == _PLAY:
         for s in range(lanes):
@@ -299,6 +320,7 @@ def _solve(kind, stiffness, damping, own, parameters, j, y, ahead, force, lanes)
 @_part
 def _solve_pair(gain, parameters, j, y, ahead, force, lanes):
     """The forces of laws j and j + 1, two hardening springs."""
+    j &= _ROW
     at, yy, yz, zy, zz = 3 * j, gain[j, j], gain[j, j + 1], gain[j + 1, j], gain[j + 1, j + 1]
     for s in range(lanes):
         force[j, s], force[j + 1, s] = cubic_pair(
@@ -310,6 +332,7 @@ def _solve_pair(gain, parameters, j, y, ahead, force, lanes):
 @_part
 def _accumulate(table, tick, y, m, total, lanes):
     """Add the output, row m of y, to the Fourier sums and keep its largest magnitude."""
+    m &= _ROW
     c1, s1, c2 = table[tick, 0], table[tick, 1], table[tick, 2]
     s2, c3, s3 = table[tick, 3], table[tick, 4], table[tick, 5]
     for s in range(lanes):
