@@ -49,16 +49,16 @@ to be looked at further; a further cause costs three times as much in the end.""
 _CLOSE = 30.0
 _LAST_ROUNDS, _LAST_GROUPS = ((4, 120.0), (3, 60.0), (3, _CLOSE), (3, _CLOSE)), 4
 """Rounds in which the leader and those as close behind it as that log-likelihood are looked at
-once more: at most so many, and the baseline, in so many groups each. Where none is close the
-last two are spared.
+once more: at most so many, and the baseline, in so many groups each. Where none is close all but
+the first are spared.
 """
 
 _CHANCES = 4
 """Hypotheses that are looked at once more where none fits yet."""
 
 _TOO_FAR, _HOPELESS = 200.0, 300.0
-"""Log-likelihood behind the leader from which the third round leaves one out, and from which
-there is no second chance."""
+"""Log-likelihood behind the leader from which the second and the third round leave one out, and
+from which there is no second chance."""
 
 _DOUBT = 2.0
 """Misfit of the best single cause, in standard deviations, from which pairs are tried; and the
@@ -114,7 +114,7 @@ def search_causes(
     rough = Hunt(unit, coarse, rng, executor, part_of(progress, 0.4, 0.6, "narrowing down"))
     rough.start(_singles(coarse, atlas), _FIRST_GROUPS)
     rough.hear()
-    rough.look_closer(_with_baseline(rough.leading(_SECOND)), _SECOND_GROUPS)
+    rough.look_closer(_with_baseline(rough.leading(_SECOND, _TOO_FAR)), _SECOND_GROUPS)
     rough.hear()
     if _is_doubtful(rough.best, rng):
         # A cause with several parameters may only want a closer look.
@@ -192,12 +192,12 @@ def _compare(fine: Hunt, rng: np.random.Generator) -> bool:
     Returns whether something is missing from the plain model.
     """
     missing = True
-    for most, behind in _LAST_ROUNDS:
+    for done, (most, behind) in enumerate(_LAST_ROUNDS):
         missing = not _is_nothing_missing(fine, rng)
         if not missing:
             break
         leader, *near = fine.leading(most, behind)
-        if behind == _CLOSE and not near:
+        if done and not near:
             break
         # The parts of a pair and the plain model count even where others lie before them.
         close = set(fine.leading(len(fine.found), behind))
