@@ -93,16 +93,15 @@ class Hypothesis:
         if len(self.parameters) != 1:
             return False
         (_, parameter), (low, high) = self.parameters[0], np.exp(self.logs[0])
-        known = {**self.unit.parameters, "scale": 1.0}.get(parameter.name)
+        known = parameter.nominal(self.unit)
         return known is not None and 0.5 * known**2 < low * high < 2.0 * known**2
 
     def within_tolerance(self, place: NDArray[np.float64]) -> list[bool]:
         """Whether each parameter is a datasheet value (or a factor on some) hardly off it."""
-        known = {**self.unit.parameters, "scale": 1.0}
-        values = zip(self.parameters, self.values(place), strict=True)
+        nominal = [parameter.nominal(self.unit) for _, parameter in self.parameters]
         return [
-            p.name in known and abs(value / known[p.name] - 1.0) < _TOLERANCE
-            for (_, p), value in values
+            known is not None and abs(value / known - 1.0) < _TOLERANCE
+            for known, value in zip(nominal, self.values(place), strict=True)
         ]
 
     @property

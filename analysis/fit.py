@@ -83,11 +83,6 @@ class Posterior:
     match: Match
     draws: Draws
 
-    def marginal(self, axis: int) -> NDArray[np.float64]:
-        """Weights along one axis, summing to one."""
-        others = tuple(i for i in range(self.weight.ndim) if i != axis)
-        return np.asarray(self.weight.sum(axis=others))
-
 
 def fit_posterior(
     unit: Unit,

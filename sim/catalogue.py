@@ -42,6 +42,13 @@ class EffectParameter:
     range: Callable[[Unit], tuple[float, float]]
     allowed: tuple[float, float] = (0.0, math.inf)
 
+    def nominal(self, unit: Unit) -> float | None:
+        """What a unit without the effect has: its datasheet's value, or 1 of a factor on some.
+
+        None where the effect adds what the datasheet does not know.
+        """
+        return 1.0 if self.name == "scale" else unit.parameters.get(self.name)
+
 
 @dataclass(frozen=True, slots=True)
 class Effect:

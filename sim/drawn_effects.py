@@ -61,7 +61,7 @@ def _draw_value(
     rng: np.random.Generator,
 ) -> float:
     low, high = parameter.range(unit)
-    known = {**unit.parameters, "scale": 1.0}.get(parameter.name)
+    known = parameter.nominal(unit)
     if parameter.name == "f_p":
         return float(rng.uniform(*band_hz))
     if known is not None and low > 0.0:

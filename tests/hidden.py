@@ -60,16 +60,16 @@ def off_datasheet(unit: Unit, rng: np.random.Generator) -> Unit:
 def drawn_effect(unit: Unit, effect: str, rng: np.random.Generator) -> EffectSetting:
     """An effect at a size that a bench would meet."""
     hypothesis = Hypothesis(unit, (effect,))
-    known = {**unit.parameters, "scale": 1.0}
     values = {}
     for index, (_, parameter) in enumerate(hypothesis.parameters):
         low, high = hypothesis.logs[index]
+        known = parameter.nominal(unit)
         if hypothesis.centred:
             off = rng.uniform(*SHARES) * rng.choice([-1.0, 1.0])
-            values[parameter.name] = known[parameter.name] * (1.0 + off)
-        elif parameter.name in known:
+            values[parameter.name] = known * (1.0 + off)
+        elif known is not None:
             # Friction of the datasheet: what wear or cold grease make of it.
-            values[parameter.name] = float(known[parameter.name] * np.exp(rng.uniform(*GROWTH)))
+            values[parameter.name] = float(known * np.exp(rng.uniform(*GROWTH)))
         elif parameter.name == "f_p":
             # A payload that resonates in or near the band that is measured.
             values[parameter.name] = float(rng.uniform(0.8, 1.2)) * rng.uniform(*_band(unit))

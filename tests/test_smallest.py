@@ -11,6 +11,7 @@ sys.path.insert(0, str(Path(__file__).parent / "campaigns"))
 from hidden import EVERY_EFFECT
 from smallest import UNIT, next_strength, sized, thresholds
 
+from sim.catalogue import CATALOGUE
 from sim.effects import drivetrain_with
 
 FOUR_IN_FIVE = np.log(4.0)
@@ -49,7 +50,7 @@ def test_every_cause_can_be_hidden_at_any_strength_and_grows_with_it(effect):
         system = drivetrain_with(UNIT, 0.4, [setting]).system()
         assert system.A.shape[0] >= plain.A.shape[0]
         value = next(iter(setting.values.values()))
-        known = {**UNIT.parameters, "scale": 1.0}.get(next(iter(setting.values)))
+        known = CATALOGUE[effect].parameters[0].nominal(UNIT)
         size = abs(np.log(value / known)) if known else np.log(value)
         sizes.append(-size if effect == "amplifier-saturation" else size)
     assert sizes[0] < sizes[1] < sizes[2]

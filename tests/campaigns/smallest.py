@@ -70,22 +70,22 @@ def sized(unit: Unit, effect: str, strength: float, rng: np.random.Generator) ->
 
 def _first_value(hypothesis: Hypothesis, strength: float, sign: float = 1.0) -> float:
     """Of the first parameter, which says how large an effect is."""
-    name, unit = hypothesis.parameters[0][1].name, hypothesis.unit
-    if hypothesis.centred:
-        known = {**unit.parameters, "scale": 1.0}[name]
+    parameter = hypothesis.parameters[0][1]
+    known = parameter.nominal(hypothesis.unit)
+    if known is not None and hypothesis.centred:
         return known * float(np.exp(sign * _between(OFF, strength)))
-    if name in unit.parameters:
-        return unit.parameters[name] * float(np.exp(_between(GROWTH, strength)))
+    if known is not None:
+        return known * float(np.exp(_between(GROWTH, strength)))
     low, high = np.exp(hypothesis.logs[0])
     # An amplifier saturates the more the lower its limit is.
-    return _between((high, low) if name == "V_sat" else (low, high), strength)
+    return _between((high, low) if parameter.name == "V_sat" else (low, high), strength)
 
 
 def worded(effect: str, strength: float) -> str:
     """A size in the words of a bench."""
     hypothesis = Hypothesis(UNIT, (effect,))
     parameter, value = hypothesis.parameters[0][1], _first_value(hypothesis, strength)
-    known = {**UNIT.parameters, "scale": 1.0}.get(parameter.name)
+    known = parameter.nominal(UNIT)
     if known is not None:
         return f"{parameter.name} off by {100 * (value / known - 1.0):.0f} %"
     symbol = "" if parameter.unit_symbol == "1" else f" {parameter.unit_symbol}"
