@@ -88,13 +88,18 @@ class Hypothesis:
         return Machine(ratio, seed, None, deviations, self.settings(place))
 
     @property
+    def amid(self) -> list[bool]:
+        """Whether each parameter is a datasheet value that lies amid its range."""
+        nominal = [parameter.nominal(self.unit) for _, parameter in self.parameters]
+        return [
+            known is not None and bool(0.5 * known**2 < low * high < 2.0 * known**2)
+            for known, (low, high) in zip(nominal, np.exp(self.logs), strict=True)
+        ]
+
+    @property
     def centred(self) -> bool:
-        """Whether the one parameter is a datasheet value that lies amid its range."""
-        if len(self.parameters) != 1:
-            return False
-        (_, parameter), (low, high) = self.parameters[0], np.exp(self.logs[0])
-        known = parameter.nominal(self.unit)
-        return known is not None and 0.5 * known**2 < low * high < 2.0 * known**2
+        """Whether there is one parameter, and that is a datasheet value amid its range."""
+        return self.amid == [True]
 
     def within_tolerance(self, place: NDArray[np.float64]) -> list[bool]:
         """Whether each parameter is a datasheet value (or a factor on some) hardly off it."""

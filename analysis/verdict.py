@@ -38,6 +38,11 @@ _EDGE, _INWARDS = 0.02, 0.05
 """How near its end that is, and how far inside a parameter is put to see whether it is pressed
 against it: whether that costs more than the heat, as it does not where the size says little."""
 
+_TOWARDS, _AS_GOOD = 0.15, 2.0 * HEAT
+"""How near to an end of its range a datasheet value is that may as well be there, half or twice of
+what it should be, and the log-likelihood by which the end must be worse (two standard
+deviations). A shaft that hardens is taken for one that is twice as stiff, or more."""
+
 _WITHIN_TOLERANCE = 40.0
 """Cost of a datasheet value so little off that its tolerance covers it: that is no cause."""
 
@@ -181,12 +186,15 @@ def _is_adequate(
 
 def _is_pressed(candidate: Candidate) -> bool:
     """Whether a parameter wants to be beyond its plausible range: then the cause is another."""
-    best = candidate.best
-    for at in range(1, len(best.place)):
-        inside = best.place.copy()
+    best, fit = candidate.best, candidate.surface.fit
+    for at, amid in enumerate(candidate.hypothesis.amid, start=1):
+        inside, beyond = best.place.copy(), best.place.copy()
         inside[at] += _INWARDS if inside[at] < 0.5 else -_INWARDS
-        at_end = min(best.place[at], 1.0 - best.place[at]) < _EDGE
-        if at_end and candidate.surface.fit(inside).log_likelihood < best.log_likelihood - HEAT:
+        beyond[at] = round(best.place[at])
+        off = abs(best.place[at] - beyond[at])
+        if off < _EDGE and fit(inside).log_likelihood < best.log_likelihood - HEAT:
+            return True
+        if amid and off < _TOWARDS and fit(beyond).log_likelihood > best.log_likelihood - _AS_GOOD:
             return True
     return False
 

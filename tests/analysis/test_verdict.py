@@ -124,13 +124,33 @@ def test_a_size_that_wants_to_be_beyond_its_range_is_no_explanation(size, steep,
 
     surface = SimpleNamespace(fit=fit)
     one = SimpleNamespace(
-        hypothesis=SimpleNamespace(effects=TRUE),
+        hypothesis=SimpleNamespace(effects=TRUE, amid=[False]),
         best=fit(np.array([0.4, size])),
         surface=surface,
     )
     assert rules._is_pressed(one) is pressed
     held_out = SimpleNamespace(rms_sigma=1.0)
     assert rules._is_adequate(one, held_out, 0.0, np.random.default_rng(0)) is not pressed
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize(
+    ("size", "lost", "pressed"),
+    [(0.93, 29.0, True), (0.93, 31.0, False), (0.84, 0.0, False), (0.99, 29.0, True)],
+)
+def test_a_datasheet_value_that_may_be_half_or_twice_is_no_explanation(
+    size, lost, pressed, mirrored
+):
+    def fit(place):
+        return SimpleNamespace(place=place, log_likelihood=-lost if place[1] in (0.0, 1.0) else 0.0)
+
+    def judged(amid):
+        hypothesis = SimpleNamespace(effects=TRUE, amid=[amid])
+        best = fit(np.array([0.4, 1.0 - size if mirrored else size]))
+        return SimpleNamespace(hypothesis=hypothesis, best=best, surface=SimpleNamespace(fit=fit))
+
+    assert rules._is_pressed(judged(True)) is pressed
+    assert not rules._is_pressed(judged(False))
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -158,7 +178,8 @@ def test_what_misses_other_levels_must_have_own_runs_that_do(
 ):
     monkeypatch.setattr(rules, "judge_misses", lambda *given: share)
     best = SimpleNamespace(place=np.full(1 + len(effects), 0.5))
-    candidate = SimpleNamespace(hypothesis=SimpleNamespace(effects=effects), best=best)
+    hypothesis = SimpleNamespace(effects=effects, amid=[])
+    candidate = SimpleNamespace(hypothesis=hypothesis, best=best, surface=SimpleNamespace(fit=None))
     rng = np.random.default_rng(0)
     held_out = SimpleNamespace(rms_sigma=missed)
     assert rules._is_adequate(candidate, held_out, 0.0, rng) is adequate
