@@ -53,6 +53,9 @@ once more: at most so many, and the baseline, in so many groups each. Where none
 the first are spared.
 """
 
+_ENOUGH = 320
+"""Runs of a hypothesis from which on it gets no more to be compared by."""
+
 _CHANCES = 4
 """Hypotheses that are looked at once more where none fits yet."""
 
@@ -68,9 +71,10 @@ each other the first is blind, and the second is not."""
 _LITTLE = 10.0
 """Log-likelihood in the coarse look that a pair may lack of its leading part, and be looked at."""
 
-_PREDICTED, _NOT_PREDICTED, _MORE_ROUNDS = 1.3, 2.5, 3
+_PREDICTED, _NOT_PREDICTED, _MORE_ROUNDS, _ROUNDS_ALONE = 1.3, 2.5, 3, 7
 """What a leader misses of levels not fitted, in standard deviations, from which it gets more runs
-and up to which that may help; and how many times it gets them."""
+and up to which that may help; and how many times it gets them, or one that leaves all others
+far behind: a pair with four parameters took six rounds to be seen as the truth that it was."""
 
 _COMMON = 0.2
 """Share of the baseline's own runs that the leader explains better by as much, from which on there
@@ -144,7 +148,7 @@ def search_causes(
         if _is_doubtful(fine.best, rng):
             # Parameters trade off in ways that evenly placed runs miss: a second chance.
             leading = [key for key in fine.leading(len(fine.found), _HOPELESS) if key]
-            fine.settle(leading[:_CHANCES], _LAST_GROUPS)
+            _settle(fine, leading[:_CHANCES])
         missing = _compare(fine, rng)
         if doubted or not _is_doubtful(fine.best, rng):
             break
@@ -177,13 +181,23 @@ def _look_beside(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator
 
 def _see_it_predict(fine: Hunt) -> None:
     """Give a leader, and who is close to it, more runs where it predicts badly: few runs do."""
-    for _ in range(_MORE_ROUNDS):
+    for done in range(_ROUNDS_ALONE):
         missed = hold_out(fine.best, fine.observation).rms_sigma
         if not fine.best.hypothesis.effects or not _PREDICTED < missed < _NOT_PREDICTED:
             break
-        close = [key for key in fine.leading(_CHANCES, _CLOSE) if key]
-        fine.settle(close, _LAST_GROUPS)
+        if len(fine.leading(2, _TOO_FAR)) == 1:
+            fine.settle([fine.best.hypothesis.effects], _LAST_GROUPS)
+        elif done < _MORE_ROUNDS:
+            _settle(fine, [key for key in fine.leading(_CHANCES, _CLOSE) if key])
+        else:
+            break
         fine.hear()
+
+
+def _settle(fine: Hunt, chosen: Sequence[Effects]) -> None:
+    few = [key for key in chosen if len(fine.found[key].population) < _ENOUGH]
+    if few:
+        fine.settle(few, _LAST_GROUPS)
 
 
 def _compare(fine: Hunt, rng: np.random.Generator) -> bool:
@@ -202,7 +216,7 @@ def _compare(fine: Hunt, rng: np.random.Generator) -> bool:
         # The parts of a pair and the plain model count even where others lie before them.
         close = set(fine.leading(len(fine.found), behind))
         near += [key for key in (*_parts(leader, fine.found), ()) if key in close]
-        fine.settle(list(dict.fromkeys([leader, *near])), _LAST_GROUPS)
+        _settle(fine, list(dict.fromkeys([leader, *near])))
     fine.hear()
     return missing
 

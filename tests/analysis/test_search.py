@@ -147,29 +147,45 @@ def test_the_parts_of_a_pair_stand_where_the_pair_has_them():
 
 
 @pytest.mark.parametrize(
-    ("missed", "rounds"),
+    ("missed", "second", "rounds"),
     [
-        ([1.0], 0),
-        ([1.29], 0),
-        ([1.6, 1.1], 1),
-        ([1.6, 1.5, 1.2], 2),
-        ([1.6, 1.6, 1.6, 1.6], 3),
-        ([2.6], 0),
+        ([1.0], 10.0, 0),
+        ([1.29], 10.0, 0),
+        ([1.6, 1.1], 10.0, 1),
+        ([1.6, 1.5, 1.2], 10.0, 2),
+        ([1.6] * 4, 10.0, 3),
+        ([1.6] * 4, 199.0, 3),
+        ([1.6] * 5 + [1.2], 201.0, 5),
+        ([1.6] * 9, 201.0, 7),
+        ([2.6], 10.0, 0),
     ],
 )
-def test_a_leader_that_predicts_badly_gets_more_runs(monkeypatch, missed, rounds):
-    settled, left = [], iter(missed)
-    best = SimpleNamespace(hypothesis=Hypothesis(ADSS, ("load-inertia",)))
+def test_a_leader_that_predicts_badly_gets_more_runs(monkeypatch, missed, second, rounds):
+    settled, left, leader = [], iter(missed), ("load-inertia",)
+    best = SimpleNamespace(hypothesis=Hypothesis(ADSS, leader))
     fine = SimpleNamespace(
         best=best,
+        found={leader: SimpleNamespace(population=range(40))},
         observation=None,
-        leading=lambda most, behind: [("load-inertia",), ()],
+        leading=lambda most, behind: [leader, ()] if second < behind else [leader],
         settle=lambda chosen, groups: settled.append(chosen),
         hear=lambda: None,
     )
     monkeypatch.setattr(search, "hold_out", lambda *_: SimpleNamespace(rms_sigma=next(left)))
     search._see_it_predict(fine)
-    assert settled == [[("load-inertia",)]] * rounds
+    assert settled == [[leader]] * rounds
+
+
+def test_who_has_runs_enough_gets_no_more_to_be_compared_by():
+    settled, few, enough = [], ("load-inertia",), ("amplifier-lag",)
+    found = {
+        few: SimpleNamespace(population=range(319)),
+        enough: SimpleNamespace(population=range(320)),
+    }
+    fine = SimpleNamespace(found=found, settle=lambda chosen, groups: settled.append(chosen))
+    search._settle(fine, [few, enough])
+    search._settle(fine, [enough])
+    assert settled == [[few]]
 
 
 def test_every_run_is_made_where_the_caller_says(runs):
