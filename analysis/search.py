@@ -39,8 +39,9 @@ What two causes do together is seldom the sum of what each does: of eleven true 
 look put seven among its first four, the others down to the 27th place.
 """
 
-_BESIDE, _BESIDE_CLOSER, _BESIDE_GROUPS = 5, 2, (2, 4)
-"""The same for pairs with a leader that is not doubted."""
+_BESIDE, _BESIDE_CLOSER, _BESIDE_GROUPS, _POOR = (5, 8), (2, 4), (2, 4), 1.15
+"""The same for pairs with a leader that is not doubted, and where it misses levels not fitted by
+more than so many standard deviations: alone, true causes miss them by 0.7 to 1.1."""
 
 _EARNED = 6.0
 """Log-likelihood on the rows of the rough look, a third of all, by which a pair must beat its parts
@@ -69,7 +70,8 @@ root mean square of what it misses of levels not fitted, in theirs: where few ru
 each other the first is blind, and the second is not."""
 
 _LITTLE = 10.0
-"""Log-likelihood in the coarse look that a pair may lack of its leading part, and be looked at."""
+"""Log-likelihood in the coarse look that a pair may lack of its leading part, and be looked at;
+any where that part predicts badly, for pairs are looked at in coarser steps."""
 
 _PREDICTED, _NOT_PREDICTED, _MORE_ROUNDS, _ROUNDS_ALONE = 1.3, 2.5, 3, 7
 """What a leader misses of levels not fitted, in standard deviations, from which it gets more runs
@@ -166,16 +168,18 @@ def _look_beside(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator
         return
     alone = screen_singles(rough.observation, {leader: atlas[leader]})[leader]
     places = screen_pairs(rough.observation, atlas, leader)
-    enough = alone.log_likelihood - _LITTLE
-    ranked = [key for key in _ranked(places) if places[key].log_likelihood > enough]
+    poor = hold_out(fine.best, fine.observation).rms_sigma > _POOR
+    enough = -np.inf if poor else alone.log_likelihood - _LITTLE
+    ranked = [k for k in _ranked(places)[: _BESIDE[poor]] if places[k].log_likelihood > enough]
     if not ranked:
         return
-    rough.start({key: places[key].place for key in ranked[:_BESIDE]}, _BESIDE_GROUPS[0])
-    rough.look_closer(_among(rough, ranked)[:_BESIDE_CLOSER], _BESIDE_GROUPS[1])
+    rough.start({key: places[key].place for key in ranked}, _BESIDE_GROUPS[0])
+    rough.look_closer(_among(rough, ranked)[: _BESIDE_CLOSER[poor]], _BESIDE_GROUPS[1])
     kept = [key for key in _among(rough, ranked) if _earns(key, rough.found)]
     if kept:
-        fine.take_over([rough.found[key] for key in kept[:_BESIDE_CLOSER]], _THIRD_GROUPS)
-        if fine.best.hypothesis.effects != leader:
+        kept = kept[: _BESIDE_CLOSER[0]]
+        fine.take_over([rough.found[key] for key in kept], _THIRD_GROUPS)
+        if set(kept) & set(fine.leading(len(fine.found), _CLOSE)):
             _compare(fine, rng)
 
 
