@@ -50,8 +50,8 @@ to be looked at further; a further cause costs three times as much in the end.""
 _CLOSE = 30.0
 _LAST_ROUNDS, _LAST_GROUPS = ((4, 120.0), (3, 60.0), (3, _CLOSE), (3, _CLOSE)), 4
 """Rounds in which the leader and those as close behind it as that log-likelihood are looked at
-once more: at most so many, and the baseline, in so many groups each. Where none is close all but
-the first are spared.
+once more: at most so many, the parts of a leading pair and the baseline, in so many groups each.
+Where none is close all but the first are spared.
 """
 
 _ENOUGH = 320
@@ -215,11 +215,13 @@ def _compare(fine: Hunt, rng: np.random.Generator) -> bool:
         if not missing:
             break
         leader, *near = fine.leading(most, behind)
+        # The parts of a pair count in every round, even where others lie before them: with few runs
+        # a true cause of several parameters has been beaten by itself and another.
+        parts = set(_parts(leader, fine.found))
+        near += sorted(parts & set(fine.leading(len(fine.found), _LAST_ROUNDS[0][1])))
         if done and not near:
             break
-        # The parts of a pair and the plain model count even where others lie before them.
-        close = set(fine.leading(len(fine.found), behind))
-        near += [key for key in (*_parts(leader, fine.found), ()) if key in close]
+        near += [key for key in fine.leading(len(fine.found), behind) if not key]
         _settle(fine, list(dict.fromkeys([leader, *near])))
     fine.hear()
     return missing

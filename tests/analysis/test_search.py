@@ -109,6 +109,34 @@ def test_nothing_is_looked_for_behind_a_cause_that_explains_all(runs):
     assert all(count <= 60 for key, count in runs.items() if len(key) > 1)
 
 
+@pytest.mark.parametrize(("missed", "tried", "closer"), [(1.1, 2, 2), (1.2, 8, 4)])
+def test_more_pairs_are_tried_behind_a_cause_that_predicts_badly(
+    monkeypatch, missed, tried, closer
+):
+    """In the coarse look two are nearly as good as their part; none earns its place."""
+    looked, leader = [], ("load-inertia",)
+
+    def standing(likelihood):
+        return SimpleNamespace(place=None, log_likelihood=likelihood)
+
+    pairs = {(*leader, f"partner-{i}"): standing(95.0 - 4.0 * i) for i in range(12)}
+    found = {key: SimpleNamespace(best=standing(90.0)) for key in pairs}
+    found[leader] = SimpleNamespace(best=standing(90.0), hypothesis=Hypothesis(ADSS, leader))
+    rough = SimpleNamespace(
+        observation=None,
+        found=found,
+        leading=lambda most: list(found),
+        start=lambda places, groups: looked.append(list(places)),
+        look_closer=lambda keys, groups: looked.append(keys),
+    )
+    fine = SimpleNamespace(best=found[leader], observation=None)
+    monkeypatch.setattr(search, "screen_singles", lambda *_: {leader: standing(100.0)})
+    monkeypatch.setattr(search, "screen_pairs", lambda *_: pairs)
+    monkeypatch.setattr(search, "hold_out", lambda *_: SimpleNamespace(rms_sigma=missed))
+    search._look_beside(rough, fine, {leader: None}, None)
+    assert looked == [list(pairs)[:tried], list(pairs)[:closer]]
+
+
 def hunted(sizes, seed):
     """A hunt for one cause of a known size, with nothing simulated yet."""
     rng = np.random.default_rng(seed)
@@ -174,6 +202,21 @@ def test_a_leader_that_predicts_badly_gets_more_runs(monkeypatch, missed, second
     monkeypatch.setattr(search, "hold_out", lambda *_: SimpleNamespace(rms_sigma=next(left)))
     search._see_it_predict(fine)
     assert settled == [[leader]] * rounds
+
+
+@pytest.mark.parametrize(("gap", "rounds"), [(50.0, 4), (119.0, 4), (121.0, 1)])
+def test_a_pair_is_compared_with_its_parts_in_every_round(monkeypatch, gap, rounds):
+    pair, part, settled = ("amplifier-lag", "load-inertia"), ("load-inertia",), []
+    standing = {pair: 300.0, part: 300.0 - gap, (): 0.0}
+
+    def leading(most, behind):
+        return [key for key in list(standing)[:most] if standing[key] >= 300.0 - behind]
+
+    fine = SimpleNamespace(found=standing, leading=leading, hear=lambda: None)
+    monkeypatch.setattr(search, "_is_nothing_missing", lambda *_: False)
+    monkeypatch.setattr(search, "_settle", lambda _, chosen: settled.append(chosen))
+    assert search._compare(fine, None)
+    assert settled == ([[pair, part]] if gap < 120.0 else [[pair]]) * rounds
 
 
 def test_who_has_runs_enough_gets_no_more_to_be_compared_by():
