@@ -7,10 +7,11 @@ practice set was judged by them. It simulates nothing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.adequacy import judge_adequacy, judge_chance, judge_misses
 from analysis.candidate import Candidate
@@ -57,6 +58,10 @@ nothing; the baseline always is."""
 
 _BY_CHANCE = 0.04
 """Share of the baseline's own runs, with nothing hidden, that it may explain better by as much."""
+
+_PART = 150.0
+"""Within so much of a leading pair its parts are held against runs of their own, and the pair, too:
+with more parameters and no more runs it may fit what is chance."""
 
 _TIE = 20.0
 """The scores of two sets that say the same about everything differ by about as much, as each has
@@ -147,16 +152,17 @@ def judge_candidates(
     chosen += [c for c in candidates[_JUDGED:] if not c.hypothesis.effects]
     held = [hold_out(candidate, observation) for candidate in chosen]
     scores = np.array([_score(c, h) for c, h in zip(chosen, held, strict=True)])
-    weight = np.exp((scores - scores.max()) / HEAT)
+    leader = set(chosen[int(scores.argmax())].hypothesis.effects)
     judged = []
-    for c, h, score, share in zip(chosen, held, scores, weight / weight.sum(), strict=True):
-        asked = score > scores.max() - _SURE or not c.hypothesis.effects
+    for c, h, score, share in zip(chosen, held, scores, _shares(scores), strict=True):
+        near = _PART if set(c.hypothesis.effects) < leader else _SURE
+        asked = score > scores.max() - near or not c.hypothesis.effects
         misfit = judge_adequacy(c, rng).sigma if asked else np.nan
         adequate = asked and _is_adequate(c, h, misfit, rng)
         judged.append(Judged(c, h, float(score), misfit, float(share), adequate))
     judged.sort(key=lambda one: -one.score)
     (baseline,) = (one for one in judged if not one.effects)
-    best = _simplest(judged)
+    best = _simplest(judged, rng)
     if (
         not best.effects
         or best.score < baseline.score + _FALSE_ALARM
@@ -164,6 +170,9 @@ def judge_candidates(
     ):
         word: Word = "consistent" if baseline.adequate else "unexplained"
         return Verdict(word, baseline, tuple(judged), baseline)
+    judged = _put_behind(judged, best)
+    (best,) = (one for one in judged if one.effects == best.effects)
+    (baseline,) = (one for one in judged if not one.effects)
     verdict = Verdict("explained", best, tuple(judged), baseline)
     if not best.adequate:
         return Verdict("unexplained", best, verdict.judged, baseline)
@@ -199,15 +208,17 @@ def _is_pressed(candidate: Candidate) -> bool:
     return False
 
 
-def _may_be_chance(baseline: Judged, best: Judged, rng: np.random.Generator) -> bool:
+def _may_be_chance(simpler: Judged, best: Judged, rng: np.random.Generator) -> bool:
     # Own runs say nothing about an observation that is unlike all of them.
-    if baseline.misfit > _UNLIKE:
+    if simpler.misfit > _UNLIKE:
         return False
-    return judge_chance(baseline.candidate, best.candidate, rng) > _BY_CHANCE
+    return judge_chance(simpler.candidate, best.candidate, rng) > _BY_CHANCE
 
 
-def _simplest(judged: Sequence[Judged]) -> Judged:
+def _simplest(judged: Sequence[Judged], rng: np.random.Generator) -> Judged:
     """The best set, or the part of it that does nearly as well: a further cause must earn it.
+
+    So does one that leads by no more than it leads in runs of the part alone.
 
     Where the best set does not look like its own runs and another that ties with it does, it is
     the other that is believed.
@@ -216,9 +227,28 @@ def _simplest(judged: Sequence[Judged]) -> Judged:
     best = tied[0] if tied else judged[0]
     for one in judged:
         part = one.effects and set(one.effects) < set(best.effects)
-        if part and one.adequate and one.score > judged[0].score - _FALSE_ALARM:
+        if not part or not one.adequate:
+            continue
+        if one.score > judged[0].score - _FALSE_ALARM or _may_be_chance(one, best, rng):
             return one
     return best
+
+
+def _put_behind(judged: Sequence[Judged], best: Judged) -> list[Judged]:
+    """Sets that hold the best one, and lead it, are as far behind as they would have to lead."""
+    held = [set(one.effects) > set(best.effects) and one.score > best.score for one in judged]
+    scores = np.array([one.score for one in judged])
+    scores[held] = best.score - _FALSE_ALARM
+    moved = [
+        replace(one, score=float(score), probability=float(share))
+        for one, score, share in zip(judged, scores, _shares(scores), strict=True)
+    ]
+    return sorted(moved, key=lambda one: -one.score)
+
+
+def _shares(scores: NDArray[np.float64]) -> NDArray[np.float64]:
+    weight = np.exp((scores - scores.max()) / HEAT)
+    return np.asarray(weight / weight.sum())
 
 
 def _score(candidate: Candidate, held_out: HeldOut) -> float:

@@ -153,6 +153,29 @@ def test_a_datasheet_value_that_may_be_half_or_twice_is_no_explanation(
     assert not rules._is_pressed(judged(False))
 
 
+@pytest.mark.parametrize(("share", "named"), [(0.05, TRUE), (0.03, (*TRUE, *WRONG))])
+def test_a_pair_that_leads_as_much_in_runs_of_its_part_is_not_believed(monkeypatch, share, named):
+    found = judge(seen(TRUE, 1), ((), TRUE, (*TRUE, *WRONG)), 1)
+    pair, part = (next(o for o in found.judged if o.effects == e) for e in (TRUE + WRONG, TRUE))
+    pair = replace(pair, score=part.score + 60.0, adequate=True)
+    part = replace(part, misfit=0.0, adequate=True)
+
+    def chance(simpler, alleged, rng):
+        assert (simpler, alleged) == (part.candidate, pair.candidate)
+        return share
+
+    monkeypatch.setattr(rules, "judge_chance", chance)
+    rng = np.random.default_rng(0)
+    best = rules._simplest([pair, part, found.baseline], rng)
+    assert best.effects == named
+    # A part that looks like none of its own runs has nothing to say on that.
+    assert rules._simplest([pair, replace(part, misfit=4.1)], rng) is pair
+    first, second = rules._put_behind([pair, part], best)
+    assert first.effects == named
+    assert first.probability > 0.75
+    assert first.score - second.score == pytest.approx(20.0 if named == TRUE else 60.0)
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_a_second_cause_is_not_named_where_one_does(seed):
     pair = tuple(sorted((*TRUE, *WRONG)))
