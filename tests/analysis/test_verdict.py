@@ -153,12 +153,25 @@ def test_a_datasheet_value_that_may_be_half_or_twice_is_no_explanation(
     assert not rules._is_pressed(judged(False))
 
 
-@pytest.mark.parametrize(("share", "named"), [(0.05, TRUE), (0.03, (*TRUE, *WRONG))])
-def test_a_pair_that_leads_as_much_in_runs_of_its_part_is_not_believed(monkeypatch, share, named):
+@pytest.mark.parametrize(
+    ("share", "missed", "lead", "named"),
+    [
+        (0.05, 1.2, 60.0, TRUE),
+        (0.03, 1.2, 60.0, TRUE + WRONG),
+        (0.03, 1.2, 19.0, TRUE),
+        (0.03, 1.1, 74.0, TRUE),
+        (0.03, 1.1, 76.0, TRUE + WRONG),
+        (0.05, 1.1, 76.0, TRUE),
+    ],
+)
+def test_a_pair_that_nothing_calls_for_or_that_leads_by_chance_is_not_believed(
+    monkeypatch, share, missed, lead, named
+):
     found = judge(seen(TRUE, 1), ((), TRUE, (*TRUE, *WRONG)), 1)
     pair, part = (next(o for o in found.judged if o.effects == e) for e in (TRUE + WRONG, TRUE))
-    pair = replace(pair, score=part.score + 60.0, adequate=True)
-    part = replace(part, misfit=0.0, adequate=True)
+    pair = replace(pair, score=part.score + lead, adequate=True)
+    predicted = SimpleNamespace(rms_sigma=missed)
+    part = replace(part, misfit=0.0, adequate=True, held_out=predicted)
 
     def chance(simpler, alleged, rng):
         assert (simpler, alleged) == (part.candidate, pair.candidate)
@@ -169,11 +182,11 @@ def test_a_pair_that_leads_as_much_in_runs_of_its_part_is_not_believed(monkeypat
     best = rules._simplest([pair, part, found.baseline], rng)
     assert best.effects == named
     # A part that looks like none of its own runs has nothing to say on that.
-    assert rules._simplest([pair, replace(part, misfit=4.1)], rng) is pair
+    assert rules._simplest([pair, replace(part, misfit=4.1, adequate=False)], rng) is pair
     first, second = rules._put_behind([pair, part], best)
     assert first.effects == named
     assert first.probability > 0.75
-    assert first.score - second.score == pytest.approx(20.0 if named == TRUE else 60.0)
+    assert first.score - second.score == pytest.approx(20.0 if named == TRUE else lead)
 
 
 @pytest.mark.parametrize("seed", range(4))
