@@ -16,7 +16,7 @@ from analysis.adequacy import judge_adequacy, judge_chance
 from analysis.atlas import Atlas, coarse_stride, make_atlas
 from analysis.candidate import Candidate, Effects
 from analysis.executor import Executor
-from analysis.holdout import hold_out
+from analysis.holdout import AT_NOISE, hold_out
 from analysis.hunt import Hunt, Starts
 from analysis.observation import Observation
 from analysis.progress import Progress, part_of
@@ -39,16 +39,16 @@ What two causes do together is seldom the sum of what each does: of eleven true 
 look put seven among its first four, the others down to the 27th place.
 """
 
-_BESIDE, _BESIDE_CLOSER, _BESIDE_GROUPS, _POOR = (5, 8), (2, 4), (2, 4), 1.15
-"""The same for pairs with a leader that is not doubted, and where it misses levels not fitted by
-more than so many standard deviations: alone, true causes miss them by 0.7 to 1.1."""
+_BESIDE, _BESIDE_CLOSER, _BESIDE_GROUPS = (5, 8), (2, 4), (2, 4)
+"""The same for pairs with a leader that is not doubted, and where it predicts worse than true
+causes do."""
 
 _EARNED = 6.0
 """Log-likelihood on the rows of the rough look, a third of all, by which a pair must beat its parts
 to be looked at further; a further cause costs three times as much in the end."""
 
-_CLOSE = 30.0
-_LAST_ROUNDS, _LAST_GROUPS = ((4, 120.0), (3, 60.0), (3, _CLOSE), (3, _CLOSE)), 4
+_NEAR, _CLOSE = 120.0, 30.0
+_LAST_ROUNDS, _LAST_GROUPS = ((4, _NEAR), (3, 60.0), (3, _CLOSE), (3, _CLOSE)), 4
 """Rounds in which the leader and those as close behind it as that log-likelihood are looked at
 once more: at most so many, the parts of a leading pair and the baseline, in so many groups each.
 Where none is close all but the first are spared.
@@ -168,16 +168,15 @@ def _look_beside(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator
         return
     alone = screen_singles(rough.observation, {leader: atlas[leader]})[leader]
     places = screen_pairs(rough.observation, atlas, leader)
-    poor = hold_out(fine.best, fine.observation).rms_sigma > _POOR
+    poor = hold_out(fine.best, fine.observation).rms_sigma > AT_NOISE
     enough = -np.inf if poor else alone.log_likelihood - _LITTLE
     ranked = [k for k in _ranked(places)[: _BESIDE[poor]] if places[k].log_likelihood > enough]
     if not ranked:
         return
     rough.start({key: places[key].place for key in ranked}, _BESIDE_GROUPS[0])
     rough.look_closer(_among(rough, ranked)[: _BESIDE_CLOSER[poor]], _BESIDE_GROUPS[1])
-    kept = [key for key in _among(rough, ranked) if _earns(key, rough.found)]
+    kept = [key for key in _among(rough, ranked) if _earns(key, rough.found)][: _BESIDE_CLOSER[0]]
     if kept:
-        kept = kept[: _BESIDE_CLOSER[0]]
         fine.take_over([rough.found[key] for key in kept], _THIRD_GROUPS)
         if set(kept) & set(fine.leading(len(fine.found), _CLOSE)):
             _compare(fine, rng)
@@ -218,7 +217,7 @@ def _compare(fine: Hunt, rng: np.random.Generator) -> bool:
         # The parts of a pair count in every round, even where others lie before them: with few runs
         # a true cause of several parameters has been beaten by itself and another.
         parts = set(_parts(leader, fine.found))
-        near += sorted(parts & set(fine.leading(len(fine.found), _LAST_ROUNDS[0][1])))
+        near += sorted(parts & set(fine.leading(len(fine.found), _NEAR)))
         if done and not near:
             break
         near += [key for key in fine.leading(len(fine.found), behind) if not key]

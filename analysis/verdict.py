@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from analysis.adequacy import judge_adequacy, judge_chance, judge_misses
 from analysis.candidate import Candidate
-from analysis.holdout import HeldOut, hold_out
+from analysis.holdout import AT_NOISE, HeldOut, hold_out
 from analysis.likelihood import HEAT
 from analysis.observation import Observation
 
@@ -54,7 +54,7 @@ _SURE = 3.0 * HEAT
 """While it leads by less than this, that nothing is hidden has a twentieth of its probability or
 more, and is a rival: causes that nobody thought of are blamed on others by leads like these.
 Sets further behind are not held against runs of their own, which takes seconds and changes
-nothing; the baseline always is."""
+nothing; the baseline always is, and parts of the leader are to `_PART`."""
 
 _BY_CHANCE = 0.04
 """Share of the baseline's own runs, with nothing hidden, that it may explain better by as much."""
@@ -63,10 +63,10 @@ _PART = 150.0
 """Within so much of a leading pair its parts are held against runs of their own, and the pair, too:
 with more parameters and no more runs it may fit what is chance."""
 
-_NOT_CALLED_FOR, _AT_NOISE = 75.0, 1.15
+_NOT_CALLED_FOR = 75.0
 """By so much must a further cause do better where a part alone looks like its own runs and misses
-levels not fitted by no more than true causes do, in standard deviations: nothing then calls for
-it, and the scores of sharp resonances are that far off."""
+levels not fitted by no more than true causes do: nothing then calls for it, and the scores of
+sharp resonances are that far off."""
 
 _TIE = 20.0
 """The scores of two sets that say the same about everything differ by about as much, as each has
@@ -234,7 +234,7 @@ def _simplest(judged: Sequence[Judged], rng: np.random.Generator) -> Judged:
         part = one.effects and set(one.effects) < set(best.effects)
         if not part or not one.adequate:
             continue
-        enough = one.held_out.rms_sigma <= _AT_NOISE
+        enough = one.held_out.rms_sigma <= AT_NOISE
         earned = _NOT_CALLED_FOR if enough else _FALSE_ALARM
         if one.score > judged[0].score - earned or _may_be_chance(one, best, rng):
             return one

@@ -9,7 +9,7 @@ How one step goes. Between switchings the system is linear, so its modes are
 carried exactly (`sim.propagator`). Each law's force is held over the step at
 the mean that the law has along it: with y0 and y1 what the law sees at both
 ends, y1 = ahead + beta p(y0, y1) is one scalar equation, solved in closed form
-(`sim.laws`, `sim.kernel`). The scheme is second order, the same forwards and
+(`sim.kernel`). The scheme is second order, the same forwards and
 backwards in time, and conserves the energy of springs and play; friction
 stops the motion at the end of a step or turns where the velocity passes zero.
 """

@@ -72,7 +72,7 @@ def _first_value(hypothesis: Hypothesis, strength: float, sign: float = 1.0) -> 
     """Of the first parameter, which says how large an effect is."""
     parameter = hypothesis.parameters[0][1]
     known = parameter.nominal(hypothesis.unit)
-    if known is not None and hypothesis.centred:
+    if hypothesis.centred:
         return known * float(np.exp(sign * _between(OFF, strength)))
     if known is not None:
         return known * float(np.exp(_between(GROWTH, strength)))
