@@ -16,7 +16,7 @@ Lanes lie along the last axis everywhere, so that each loop over them is one
 run of vector operations. Three things keep these loops fast: the compiler need
 not test at run time whether rows overlap, because those of an array lie a fixed
 distance apart (`MOST_LANES`), their numbers cannot be negative (`& _ROW`), and
-it is told that the arrays of a part are different ones (`_Apart`); a loop over
+it is told that the arrays of a part are different ones (`sim.compiling`); a loop over
 lanes holds no branch and no call that is left after inlining; and the parts are
 inlined by the machine's compiler, not by numba, which would rename arrays
 inside the step loop and count references in every step.
@@ -25,8 +25,8 @@ inside the step loop and count references in every step.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
-from numba.core.compiler import Compiler
+
+from sim.compiling import law, loop, part
 
 __all__ = ["FORCES_AT_ONCE", "MOST_LANES", "PAIR", "ROWS_AT_ONCE", "STRIBECK", "step_cycles"]
 
@@ -47,10 +47,6 @@ PAIR = 5
 
 _PLAY, _FRICTION, _EXCESS = 0, 1, 2
 
-_FLAGS = {"contract"}
-"""Fused multiply-add, but no re-ordering: a lane's result does not depend on its neighbours, and
-NaN stays NaN."""
-
 _CORRECTIONS = 2
 """How often a play's share of the step is corrected; each leaves about 3 % of the error."""
 
@@ -59,10 +55,8 @@ _FIRST_SWEEPS = 8
 _ROW = 1023
 """All bits that the number of a row can have."""
 
-_law = njit(inline="always", fastmath=_FLAGS, error_model="numpy")
 
-
-@_law
+@law
 def play_force(y0, ahead, d, k, c, beta):
     """Mean of k clip(y, -d, d) over the step, and the damper c taken out while inside the play.
 
@@ -95,7 +89,7 @@ def play_force(y0, ahead, d, k, c, beta):
     return 0.5 * k * (c0 + c1 + q * (e0 + e1)) + c * (c1 - c0)
 
 
-@_law
+@law
 def friction_force(w0, ahead, most, beta):
     """Force that opposes the motion w with `most`, stops it dead, or turns with it.
 
@@ -114,7 +108,7 @@ def friction_force(w0, ahead, most, beta):
     return -most * sign if slid >= 0.0 else crossing
 
 
-@_law
+@law
 def peaked_friction(w, T, T_s, w_s):
     """Stribeck's curve T + T_s exp(-(w/w_s)^2), to 1e-5 of its peak."""
     u = w / w_s
@@ -130,7 +124,7 @@ def peaked_friction(w, T, T_s, w_s):
     return T + T_s * power
 
 
-@_law
+@law
 def excess_force(y0, y1, limit):
     """Mean of clip(y, -limit, limit) - y over the step; y itself does not feel it."""
     c0, c1 = min(max(y0, -limit), limit), min(max(y1, -limit), limit)
@@ -139,19 +133,19 @@ def excess_force(y0, y1, limit):
     return -0.5 * (1.0 - q) * (y0 - c0 + y1 - c1)
 
 
-@_law
+@law
 def cubic_mean(y0, y1, quarter):
     """Mean of -k y^3 over the step; `quarter` is k/4."""
     return -quarter * (y0 * y0 + y1 * y1) * (y0 + y1)
 
 
-@_law
+@law
 def cubic_slope(y0, y1, quarter):
     """How fast that mean falls with y1."""
     return quarter * (y0 * y0 + 2.0 * y0 * y1 + 3.0 * y1 * y1)
 
 
-@_law
+@law
 def cubic_force(y0, ahead, last, k, beta):
     """Mean of -k y^3 over the step, by two Newton steps from the last force."""
     quarter = 0.25 * k
@@ -162,7 +156,7 @@ def cubic_force(y0, ahead, last, k, beta):
     return cubic_mean(y0, y1, quarter)
 
 
-@_law
+@law
 def cubic_pair(y0, z0, y_ahead, z_ahead, p, r, k_y, k_z, yy, yz, zy, zz):
     """Forces of two hardening springs, by one Newton step for both from the last, p and r.
 
@@ -180,18 +174,7 @@ def cubic_pair(y0, z0, y_ahead, z_ahead, p, r, k_y, k_z, yy, yz, zy, zz):
     return cubic_mean(y0, y, k), cubic_mean(z0, z, n)
 
 
-class _Apart(Compiler):
-    """Compiles functions whose array arguments do not overlap, as a promise and unchecked."""
-
-    def define_pipelines(self):
-        self.state.flags.noalias = True
-        return super().define_pipelines()
-
-
-_part = njit(pipeline_class=_Apart, forceinline=True, fastmath=_FLAGS, error_model="numpy")
-
-
-@_part
+@part
 def _turn(carry, push, drift, q, force, lanes):
     """Coordinates in pairs of rows: the forces of the last step push them, then they turn."""
     for row in range(0, carry.shape[0], 2):
@@ -208,7 +191,7 @@ def _turn(carry, push, drift, q, force, lanes):
             q[i + 1, s] = drift[i + 1, s] + c10 * one + c11 * other
 
 
-@_part
+@part
 def _push_further(push, i, q, force, lanes):
     for column in range(FORCES_AT_ONCE, push.shape[1], 2):
         k = column & _ROW
@@ -218,7 +201,7 @@ def _push_further(push, i, q, force, lanes):
             q[i + 1, s] += b0 * force[k, s] + b1 * force[k + 1, s]
 
 
-@_part
+@part
 def _push(push, q, force, lanes):
     for row in range(0, push.shape[0], 2):
         i = row & _ROW
@@ -231,7 +214,7 @@ def _push(push, q, force, lanes):
         _push_further(push, i, q, force, lanes)
 
 
-@_part
+@part
 def _multiply(carry, push, drift, q, force, spare, lanes):
     """The same where every coordinate feels every other; slower, and rarely needed."""
     p = carry.shape[0]
@@ -248,7 +231,7 @@ def _multiply(carry, push, drift, q, force, spare, lanes):
             q[i, s] = spare[i, s]
 
 
-@_part
+@part
 def _look(look, rows, waves, cosine, sine, q, free, lanes):
     """What the laws, and the output in the last row, would see at the end without any force."""
     for row in range(rows):
@@ -273,7 +256,7 @@ def _look(look, rows, waves, cosine, sine, q, free, lanes):
                 free[j, s] += l0 * q[k, s] + l1 * q[k + 1, s]
 
 
-@_part
+@part
 def _feel(gain, j, force, free, y, to, lanes):
     """Row `to` of y: what row j sees with the forces as they stand."""
     j, to = j & _ROW, to & _ROW
@@ -289,7 +272,7 @@ def _feel(gain, j, force, free, y, to, lanes):
             y[to, s] += g0 * force[k, s] + g1 * force[k + 1, s]
 
 
-@_part
+@part
 def _solve(kind, stiffness, damping, own, parameters, j, y, ahead, force, lanes):
     """The force of law j, from what it saw at the start and would see ahead."""
     j &= _ROW
@@ -317,7 +300,7 @@ def _solve(kind, stiffness, damping, own, parameters, j, y, ahead, force, lanes)
             force[j, s] = cubic_force(y[j, s], ahead[0, s], force[j, s], parameters[at, s], own)
 
 
-@_part
+@part
 def _solve_pair(gain, parameters, j, y, ahead, force, lanes):
     """The forces of laws j and j + 1, two hardening springs."""
     j &= _ROW
@@ -329,7 +312,7 @@ def _solve_pair(gain, parameters, j, y, ahead, force, lanes):
         )  # fmt: skip
 
 
-@_part
+@part
 def _accumulate(table, tick, y, m, total, lanes):
     """Add the output, row m of y, to the Fourier sums and keep its largest magnitude."""
     m &= _ROW
@@ -347,7 +330,7 @@ def _accumulate(table, tick, y, m, total, lanes):
         total[7, s] = max(total[7, s], abs(output))
 
 
-@njit(cache=True, fastmath=_FLAGS, error_model="numpy", nogil=True)
+@loop
 def step_cycles(carry, push, drift_in, look, gain, kinds, fixed, parameters, waves, table,
                 order, settle_cycles, start, seen, sums, peak):  # fmt: skip
     """Step coordinates through settle and kept cycles.

@@ -17,9 +17,9 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from sim.compiling import njit
 from sim.unit import StageBacklash, Unit
 
 __all__ = ["PAPER_LEVEL_VPK", "PAPER_STEP_S", "paper_gains"]

@@ -13,8 +13,9 @@ import time
 from pathlib import Path
 
 import numpy as np
-from numba import njit
 from yardsticks.matrices import OUTPUT, SAMPLES, Matrices, gains
+
+from sim.compiling import njit
 
 Drive = tuple[float, int, float]
 """Frequency in Hz, cycles, source level in V peak."""

@@ -11,10 +11,10 @@ import time
 from collections import Counter
 
 import numpy as np
-from numba import njit
 
 from sim import kernel
 from sim.assembly import Law
+from sim.compiling import njit
 
 
 class Counted(float):

@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from side_by_side import half_plays
 from yardsticks.matrices import OUTPUT, STATES
+
+from sim.compiling import njit
 
 
 def constants(unit, ratio: float, c_s1: float = 0.0) -> tuple[float, ...]:
