@@ -100,6 +100,8 @@ class Surface:
         (k,): prior standard deviations of the deviations.
     motions
         States of the runs and of the observation: where they differ a run tells nothing.
+    enough
+        How many runs a regression takes, by their weights.
     tailed
         Whether scatter is fitted as Student's t (slower) or as a mean square.
     """
@@ -111,6 +113,7 @@ class Surface:
     slopes: NDArray[np.float64]
     sigmas: NDArray[np.float64]
     motions: Motions
+    enough: float
     tailed: bool = True
 
     def scan(self, grid: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -243,10 +246,7 @@ class Surface:
 
     def _reach(self, totals: NDArray[np.float64]) -> NDArray[np.intp]:
         """The first reach whose weights (reaches, ...) suffice, or the last."""
-        # As few as there are slopes leave a plane that turns with every run: of pairs with four
-        # sizes runs left out were predicted worse by hundreds in log density.
-        needed = (len(self.width) + 1) ** 2
-        enough = totals >= needed
+        enough = totals >= self.enough
         enough[-1] = True
         return np.argmax(enough, axis=0)
 
