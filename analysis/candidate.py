@@ -72,7 +72,7 @@ def _surface(observation: Observation, population: Population, hypothesis: Hypot
         none,
         np.empty(0),
         find_motions(observation, population),
-        # As few as there are slopes leave a plane that turns with every run: of pairs with four
+        # As few as there are slopes leave a plane that turns with every group: of pairs with four
         # sizes runs left out were predicted worse by hundreds in log density.
         enough=(hypothesis.d + 1) ** 2,
     )

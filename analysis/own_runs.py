@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from analysis.candidate import Candidate
 from analysis.surface import Surface
 
-__all__ = ["OwnRun", "own_runs"]
+__all__ = ["MOST_RUNS", "OwnRun", "own_runs"]
 
-_RUNS = 48
+MOST_RUNS = 48
 """Runs that are taken in turn: the nearest to the best place."""
 
 _LOST = 0.02
@@ -61,7 +61,7 @@ def own_runs(candidate: Candidate, rng: np.random.Generator) -> Iterator[OwnRun]
     halves = candidate.population.deviations[:, 0]
     taken = 0
     for i in np.argsort(distance, kind="stable"):
-        if taken == _RUNS:
+        if taken == MOST_RUNS:
             return
         others = halves != halves[i]
         if not np.any(others):

@@ -31,7 +31,7 @@ _THIRD, _THIRD_GROUPS = 4, 4
 """How many hypotheses are looked at in each round, and in how many groups of runs each."""
 
 _PAIRS, _PARTNERS, _GLANCE_FREQUENCIES, _GLANCE_GROUPS = 20, 10, 10, 2
-_PAIRS_CLOSER, _PAIRS_AFTER, _PAIR_GROUPS = 12, 5, (2, 3)
+_PAIRS_CLOSER, _PAIRS_AFTER, _PAIR_GROUPS = 12, 8, (2, 3)
 """Pairs that the atlas favours, and more of those with the leader in them; at how many frequencies
 they are simulated at first, and in how many groups; how many are looked at closer, twice.
 

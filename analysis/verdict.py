@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.adequacy import judge_adequacy, judge_chance, judge_misses
+from analysis.adequacy import judge_adequacy, judge_chance, misses_alike
 from analysis.candidate import Candidate
 from analysis.holdout import AT_NOISE, HeldOut, hold_out
 from analysis.likelihood import HEAT
@@ -195,7 +195,7 @@ def _is_adequate(
         return False
     if missed <= (_WELL_PREDICTED if several else _UNPREDICTED):
         return True
-    return judge_misses(candidate, held_out, rng) > (0.0 if several else _SELDOM)
+    return misses_alike(candidate, held_out, 0.0 if several else _SELDOM, rng)
 
 
 def _is_pressed(candidate: Candidate) -> bool:

@@ -212,7 +212,7 @@ def test_a_second_cause_is_not_named_where_one_does(seed):
 def test_what_misses_other_levels_must_have_own_runs_that_do(
     effects, missed, share, adequate, monkeypatch
 ):
-    monkeypatch.setattr(rules, "judge_misses", lambda *given: share)
+    monkeypatch.setattr(rules, "misses_alike", lambda one, held, least, rng: share > least)
     best = SimpleNamespace(place=np.full(1 + len(effects), 0.5))
     hypothesis = SimpleNamespace(effects=effects, amid=[])
     candidate = SimpleNamespace(hypothesis=hypothesis, best=best, surface=SimpleNamespace(fit=None))
