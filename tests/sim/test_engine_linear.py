@@ -113,4 +113,5 @@ def test_modes_or_not_the_motion_with_play_and_friction_is_the_same(monkeypatch)
     monkeypatch.setattr(propagator, "_WORST_CONDITION", 0.0)
     again, other = drive(system, start, 130.0, 2, amplitude=2.5)
     assert np.abs(again - kept).max() < 1e-7
-    assert other[:, 0] == pytest.approx(state[:, 0], rel=1e-6, abs=1e-6)
+    # Rounding, which differs between processors, grows where the meshes hit: 1.4e-6 on one.
+    assert other[:, 0] == pytest.approx(state[:, 0], rel=1e-5, abs=1e-6)
