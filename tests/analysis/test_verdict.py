@@ -8,6 +8,7 @@ import pytest
 from synthetic import BASE, LEVELS, ROWS, candidate, observation, read, shape
 
 import analysis.verdict as rules
+from analysis import adequacy
 from analysis.adequacy import judge_adequacy
 from analysis.holdout import hold_out
 from analysis.misfit import describe_departures, find_departures
@@ -220,6 +221,24 @@ def test_what_misses_other_levels_must_have_own_runs_that_do(
     held_out = SimpleNamespace(rms_sigma=missed)
     assert rules._is_adequate(candidate, held_out, 0.0, rng) is adequate
     assert rules._is_adequate(candidate, held_out, 4.1, rng) is False
+
+
+@pytest.mark.parametrize(
+    ("missed", "share", "alike", "asked"),
+    [(0.1, 0.0, True, 1), (0.1, 0.03, True, 2), (9.0, 0.0, False, 48), (0.1, 1.0, False, 48)],
+)
+def test_own_runs_are_asked_about_other_levels_until_they_decide(
+    missed, share, alike, asked, monkeypatch
+):
+    """Own runs miss other levels by one standard deviation or so: never by 0.1 or 9."""
+    count, held_out = [], adequacy.hold_out_surface
+    monkeypatch.setattr(
+        adequacy, "hold_out_surface", lambda *given: count.append(1) or held_out(*given)
+    )
+    own = candidate(seen(TRUE, 2), TRUE)
+    asks = SimpleNamespace(rms_sigma=missed)
+    assert adequacy.misses_alike(own, asks, share, np.random.default_rng(0)) is alike
+    assert len(count) == asked
 
 
 def test_each_level_is_predicted_by_a_fit_that_has_not_seen_it():
