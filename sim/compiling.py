@@ -1,8 +1,9 @@
 """What the machine's compiler is told about the engine's loops.
 
 Owns the decorators of compiled code, and the promises and wishes behind them. It
-holds no loop itself. (numba's cache on disk does not look at this file: after a
-change here, empty the `__pycache__` folders.)
+holds no loop itself. Whoever compiles takes `njit` from here too, which is numba's own:
+the wishes count only if they are told before anything is compiled. (numba's cache on
+disk does not look at this file: after a change here, empty the `__pycache__` folders.)
 """
 
 from __future__ import annotations
