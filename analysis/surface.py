@@ -147,32 +147,32 @@ class Surface:
     ) -> tuple[NDArray, NDArray]:
         """Value and variance (3, some rows) at offset 0, with weights (n, 1 or some rows)."""
         near = weight.max(axis=1) > 0.0
-        weight, offset = weight[near], offset[near]
-        values = self._values[near][:, :, rows]
-        basis = np.column_stack([np.ones(len(offset)), offset])
-        terms = basis.shape[1]
-        products = (basis[:, :, None] * basis[:, None, :]).reshape(len(basis), -1)
-        normal = (products.T @ weight).T.reshape(-1, terms, terms)
-        ridge = np.zeros((len(reach), terms))
+        w, offset = weight[near].T[:, None], offset[near]
+        values = self._values[rows][:, :, near]
+        if len(w) == 1:
+            # Weighted alike, all rows are one problem.
+            values = values.reshape(1, -1, len(offset))
+        basis = np.column_stack([np.ones(len(offset)), offset]).T
+        weighed = basis * w
+        ridge = np.zeros((len(reach), len(basis)))
         ridge[:, 0] = 1e-9
         # The ridge is for slopes in units of the kernel's reach.
         ridge[:, 1:] = _CURVATURE * reach[:, None] ** 2
-        hat = np.linalg.solve(normal + ridge[:, :, None] * np.eye(terms), basis.T[None])
-        hat = hat * weight.T[:, None]
-        coefficients = np.einsum(
-            "rpn,ncr->pcr", np.broadcast_to(hat, (values.shape[2], *hat.shape[1:])), values
-        )
-        total = weight.sum(axis=0)
-        used = np.einsum("rpn,np,nr->r", hat, basis, weight)
-        squares = (values - np.einsum("np,pcr->ncr", basis, coefficients)) ** 2
-        w = weight[:, None]
-        variance = (w * squares).sum(axis=0) / total
+        inverse = np.linalg.inv(weighed @ basis.T + ridge[:, :, None] * np.eye(len(basis)))
+        coefficients = values @ weighed.transpose(0, 2, 1) @ inverse
+        squares = (values - coefficients @ basis) ** 2
+        total, most = w.sum(axis=2), w * squares
+        variance = most.sum(axis=2) / total
         for _ in range(_TAIL_ITERATIONS if self.tailed else 0):
             # The scale of Student's t, which a few runs far out do not blow up.
-            trust = (_TAIL + 1.0) / (_TAIL + squares / (_SCALE**2 * variance + 1e-12))
-            variance = (w * trust * squares).sum(axis=0) / (_SCALE**2 * total)
+            bound = _TAIL * (_SCALE**2 * variance + 1e-12)
+            share = most / (squares + bound[:, :, None])
+            variance = (_TAIL + 1.0) * variance * share.sum(axis=2) / total
+        used = (inverse * (weighed @ weighed.transpose(0, 2, 1))).sum(axis=(1, 2))[:, None]
         variance *= total / np.maximum(total - used, 0.3 * total)
-        return coefficients[0], variance * (1.0 + (hat[:, 0] ** 2).sum(axis=1))
+        leverage = ((inverse[:, :1] @ weighed) ** 2).sum(axis=2)
+        variance *= 1.0 + leverage
+        return coefficients[:, :, 0].reshape(-1, 3).T, variance.reshape(-1, 3).T
 
     def fit(self, place: NDArray[np.float64], rows: NDArray[np.bool_] | None = None) -> Fit:
         """Agreement at a place, deviations fitted to some rows (all where None)."""
@@ -276,5 +276,5 @@ class Surface:
 
     @cached_property
     def _values(self) -> NDArray[np.float64]:
-        """(n, 3, rows): the differences, 0 where nothing was observed."""
-        return np.nan_to_num(self.difference)
+        """(rows, 3, n): the differences, 0 where nothing was observed."""
+        return np.ascontiguousarray(np.nan_to_num(self.difference).transpose(2, 1, 0))

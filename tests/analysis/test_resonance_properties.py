@@ -177,7 +177,9 @@ def test_noise_widens_the_bars_of_any_pair():
     assert np.mean(np.array(ratios) > 2) > 0.95
 
 
-def test_one_level_of_61_points_takes_less_than_30_ms():
+def test_one_level_of_61_points_costs_no_more_than_900_small_least_squares():
+    """That is 30 ms where such a problem takes 33 us; 630 were measured. Machines differ, and so
+    does one from minute to minute: the ratio is taken of neighbours."""
     # The slowest kind: scattering, so that every linear fit is tried and refused.
     rng = np.random.default_rng(2)
     f = np.linspace(100, 180, 61)
@@ -185,9 +187,13 @@ def test_one_level_of_61_points_takes_less_than_30_ms():
     h = base[0] / base[1] * np.exp(0.15 * rng.standard_t(2, 61) + 0.15j * rng.standard_t(2, 61))
     response = FrequencyResponse.from_arrays(f, 2.5, h, unit="", gain_std_db=0.3)
     assert extract(response)[0].arf.method != "rational"
-    times = []
+    matrix, asked = rng.normal(size=(122, 10)), rng.normal(size=122)
+    ratios = []
     for _ in range(15):
         start = time.process_time()
         extract(response)
-        times.append(time.process_time() - start)
-    assert min(times) < 0.030
+        middle = time.process_time()
+        for _ in range(100):
+            np.linalg.lstsq(matrix, asked, rcond=None)
+        ratios.append((middle - start) / (time.process_time() - middle) * 100.0)
+    assert min(ratios) < 900.0
