@@ -28,6 +28,11 @@ __all__ = ["Place", "screen_pairs", "screen_singles"]
 _WIDTHS = {1: (0.06,), 2: (0.1, 0.13), 3: (0.12, 0.15, 0.2), 4: (0.15, 0.25, 0.08, 1.0)}
 """Distances over which a coarse surface reaches, by number of coordinates."""
 
+_ENOUGH = {1: 4.0, 2: 5.0, 3: 6.0, 4: 25.0}
+"""How many runs a regression takes, by number of coordinates: so few of so coarse an atlas, lest
+what is far away counts; the many parameters of a resonance need more. True pairs then rank best.
+"""
+
 _COUNTS = {1: (31,), 2: (21, 25), 3: (13, 9, 5), 4: (11, 4, 15, 2)}
 """Places looked at along each coordinate."""
 
@@ -103,12 +108,21 @@ def _best_pair(plain: NDArray[np.float64], first: _Added, second: _Added) -> Pla
 
 
 def _surface(coarse: Observation, population: Population) -> Surface:
-    width = np.array(_WIDTHS[population.places.shape[1]])
+    d = population.places.shape[1]
+    width = np.array(_WIDTHS[d])
     none = np.empty((0, 3, len(coarse)))
     difference = differences(coarse, population)
     nothing = Motions.unknown(*difference.shape[::2])
     return Surface(
-        coarse, population.places, difference, width, none, np.empty(0), nothing, tailed=False
+        coarse,
+        population.places,
+        difference,
+        width,
+        none,
+        np.empty(0),
+        nothing,
+        _ENOUGH[d],
+        tailed=False,
     )
 
 

@@ -165,6 +165,35 @@ def test_a_look_at_the_right_place_mends_one_at_a_wrong_place(runs, seed):
     assert looking.found[key].best.place == pytest.approx([0.4, 0.8], abs=0.1)
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_part_that_was_looked_at_elsewhere_is_weighed_where_the_pair_has_it(runs, seed):
+    pair, part = ("amplifier-lag", "load-inertia"), ("load-inertia",)
+    looking = hunted([0.8], seed)
+    looking.start({part: np.array([0.9, 0.1])}, 4)
+    looking.start({pair: np.array([0.4, 0.0, 0.8])}, 6)
+    looking.settle([pair], 4)
+    assert looking.best.hypothesis.effects == pair
+    behind = looking.best.best.log_likelihood - looking.found[part].best.log_likelihood
+    search._weigh_parts(looking)
+    assert len(looking.found[part].population) >= len(looking.found[pair].population)
+    assert looking.found[part].best.place == pytest.approx([0.4, 0.8], abs=0.1)
+    left = looking.found[pair].best.log_likelihood - looking.found[part].best.log_likelihood
+    assert left < min(20.0, behind - 100.0)
+
+
+def test_nothing_more_is_simulated_where_no_pair_leads_or_its_parts_have_runs_enough(runs):
+    pair, part = ("amplifier-lag", "load-inertia"), ("load-inertia",)
+    looking = hunted([0.8], 1)
+    looking.start({part: np.array([0.4, 0.8])}, 8)
+    runs.clear()
+    search._weigh_parts(looking)
+    assert not runs
+    looking.start({pair: np.array([0.4, 0.0, 0.8])}, 2)
+    runs.clear()
+    search._weigh_parts(looking)
+    assert not runs
+
+
 def test_the_parts_of_a_pair_stand_where_the_pair_has_them():
     pair = Hypothesis(ADSS, ("amplifier-lag", "payload-flexibility"))
     place = np.array([0.4, 0.1, 0.2, 0.3, 0.5])
