@@ -4,7 +4,8 @@ Owns the comparison of an atlas with a thinned observation. Pairs are not in
 the atlas: what each of two causes adds to the baseline at the same ratio is
 added up. That is wrong in detail and good enough to decide what to simulate,
 and it asks nothing of either cause alone: the best place of one of a pair by
-itself is seldom its place within the pair. It simulates nothing itself.
+itself is seldom its place within the pair. A third cause is added to what runs
+of a pair showed. It simulates nothing itself.
 """
 
 from __future__ import annotations
@@ -18,12 +19,13 @@ from numpy.typing import NDArray
 
 from analysis.atlas import Atlas
 from analysis.branches import Motions
-from analysis.candidate import Effects
+from analysis.candidate import Candidate, Effects
+from analysis.causes import Hypothesis
 from analysis.observation import Observation
 from analysis.population import Population
 from analysis.surface import Surface, differences
 
-__all__ = ["Place", "screen_pairs", "screen_singles"]
+__all__ = ["Place", "screen_further", "screen_pairs", "screen_singles"]
 
 _WIDTHS = {1: (0.06,), 2: (0.1, 0.13), 3: (0.12, 0.15, 0.2), 4: (0.15, 0.25, 0.08, 1.0)}
 """Distances over which a coarse surface reaches, by number of coordinates."""
@@ -61,15 +63,45 @@ def screen_singles(coarse: Observation, atlas: Atlas) -> dict[Effects, Place]:
 
 def screen_pairs(coarse: Observation, atlas: Atlas, beside: Effects = ()) -> dict[Effects, Place]:
     """The best place of every pair of causes of an atlas, or of those with one of `beside`."""
-    surfaces = {effects: _surface(coarse, population) for effects, population in atlas.items()}
-    ratios = _centres(_PAIR_RATIOS)
-    plain = np.array([surfaces[()].expected(np.array([ratio])) for ratio in ratios])
-    added = {e: _added(surface, plain[:, 0]) for e, surface in surfaces.items() if e}
+    plain, added = _every_added(coarse, atlas)
     return {
-        (*first, *second): _best_pair(plain[:, 0], added[first], added[second])
+        (*first, *second): _best_pair(plain, added[first], added[second])
         for first, second in combinations(sorted(added), 2)
         if not beside or set(beside) & {*first, *second}
     }
+
+
+def screen_further(coarse: Observation, atlas: Atlas, known: Candidate) -> dict[Effects, Place]:
+    """The best place of every set that has one cause more than a candidate.
+
+    What a cause adds to the baseline is added to the candidate wherever there are runs of it,
+    for with a further cause its best place is another.
+    """
+    rows = np.isin(known.surface.observation.frequency_hz, coarse.frequency_hz)
+    shown = [np.array(known.surface.expected(p))[..., rows] for p in known.population.places]
+    _, added = _every_added(coarse, atlas)
+    ratios = _centres(_PAIR_RATIOS)
+    nearest = [int(np.argmin(abs(ratios - p[0]))) for p in known.population.places]
+    found = {}
+    for effects, further in added.items():
+        if set(effects) <= set(known.hypothesis.effects):
+            continue
+        likelihood = np.array(
+            [
+                Surface.log_density(mean + further.shift[at], np.maximum(std, further.std[at])).sum(
+                    axis=(1, 2)
+                )
+                for (mean, std), at in zip(shown, nearest, strict=True)
+            ]
+        )
+        one, size = np.unravel_index(np.argmax(likelihood), likelihood.shape)
+        both, place = known.hypothesis.joined(
+            known.population.places[one],
+            Hypothesis(known.hypothesis.unit, effects),
+            further.sizes[size],
+        )
+        found[both.effects] = Place(place, float(likelihood[one, size]))
+    return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,6 +115,16 @@ class _Added:
     sizes: NDArray[np.float64]
     shift: NDArray[np.float64]
     std: NDArray[np.float64]
+
+
+def _every_added(
+    coarse: Observation, atlas: Atlas
+) -> tuple[NDArray[np.float64], dict[Effects, _Added]]:
+    """What the baseline shows at every ratio (ratios, 3, rows), and what each cause adds."""
+    surfaces = {effects: _surface(coarse, population) for effects, population in atlas.items()}
+    ratios = _centres(_PAIR_RATIOS)
+    plain = np.array([surfaces[()].expected(np.array([ratio]))[0] for ratio in ratios])
+    return plain, {e: _added(surface, plain) for e, surface in surfaces.items() if e}
 
 
 def _added(surface: Surface, plain: NDArray[np.float64]) -> _Added:

@@ -22,6 +22,11 @@ SHORT = SweepPlan(
 )
 
 
+@pytest.fixture(scope="session")
+def cache(tmp_path_factory):
+    return tmp_path_factory.mktemp("machines")
+
+
 def on_a_bench(response, seed, noise_v=5e-4):
     """A simulated response as a bench reads it: noise added, errors stated as a bench does."""
     rng = np.random.default_rng(seed)
@@ -37,13 +42,13 @@ def within(found, truth, sigmas):
 
 
 @pytest.mark.parametrize("ratio", [0.15, 0.6])
-def test_a_short_sweep_tells_the_ratio_of_a_machine_off_its_datasheet(ratio):
+def test_a_short_sweep_tells_the_ratio_of_a_machine_off_its_datasheet(ratio, cache):
     unit = load_unit("adss")
     machine = unit.with_parameters(
         R_m=1.004 * unit.motor.R_m, J_L=0.995 * unit.load.J_L, k_ts=1.005 * unit.electronics.k_ts
     )
     measured = on_a_bench(simulate(machine, ratio, SHORT, seed=77), seed=1)
-    found = estimate_response(measured, unit)
+    found = estimate_response(measured, unit, cache=cache)
     # Four standard deviations: missed by chance in one of some thousand runs.
     assert within(found.contribution_ratio, ratio, 4.0)
     assert 0.002 < found.contribution_ratio.std < 0.15
@@ -56,7 +61,7 @@ def test_a_short_sweep_tells_the_ratio_of_a_machine_off_its_datasheet(ratio):
     assert (found.b_t_deg.value, found.b_t_deg.std) == (b_t, 0.0)
 
 
-def test_without_phase_and_errors_it_still_answers_and_is_not_surer():
+def test_without_phase_and_errors_it_still_answers_and_is_not_surer(cache):
     unit = load_unit("adss")
     measured = on_a_bench(simulate(unit, 0.5, SHORT, seed=5), seed=2)
     bare = FrequencyResponse.from_arrays(
@@ -68,17 +73,20 @@ def test_without_phase_and_errors_it_still_answers_and_is_not_surer():
         settle_cycles=10,
         integrate_cycles=12,
     )
-    full, less = estimate_response(measured, unit), estimate_response(bare, unit)
+    full, less = (estimate_response(one, unit, cache=cache) for one in (measured, bare))
     assert within(less.contribution_ratio, 0.5, 4.0)
     assert less.contribution_ratio.std > 0.8 * full.contribution_ratio.std
 
 
-def test_the_same_seed_gives_the_same_answer():
+def test_the_same_seed_gives_the_same_answer_from_kept_machines_or_new_ones(tmp_path):
     unit = load_unit("adss")
     measured = on_a_bench(simulate(unit, 0.4, SHORT, seed=9), seed=3)
-    one, two = (estimate_response(measured, unit, seed=4).to_json() for _ in range(2))
-    assert one == two
-    json.dumps(one, allow_nan=False)
+    new, kept = (
+        estimate_response(measured, unit, seed=4, cache=tmp_path).to_json() for _ in range(2)
+    )
+    assert kept.pop("simulated_s") < 0.5 * new.pop("simulated_s")
+    assert new == kept
+    json.dumps(new, allow_nan=False)
 
 
 @pytest.mark.parametrize(

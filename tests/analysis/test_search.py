@@ -95,6 +95,13 @@ def test_two_causes_are_found_together(runs, seed):
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
+def test_three_causes_are_found_together(runs, seed):
+    three = ("amplifier-lag", "load-inertia", "mesh1-damping")
+    _, verdict = diagnosed(three, [0.8, 0.3, 0.7], seed)
+    assert (verdict.word, verdict.best.effects) == ("explained", three)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_second_cause_is_found_behind_one_that_nobody_doubts(runs, monkeypatch, seed):
     monkeypatch.setattr(search, "_is_doubtful", lambda candidate, rng: candidate.hypothesis.d == 1)
     pair = ("amplifier-lag", "load-inertia")
@@ -201,6 +208,54 @@ def test_the_parts_of_a_pair_stand_where_the_pair_has_them():
     found = search._places_of_parts(best)
     assert found[("amplifier-lag",)].tolist() == [0.4, 0.1]
     assert found[("payload-flexibility",)].tolist() == [0.4, 0.2, 0.3, 0.5]
+
+
+def test_two_of_three_stand_where_the_three_have_them():
+    three = Hypothesis(ADSS, ("amplifier-lag", "load-inertia", "payload-flexibility"))
+    place = np.array([0.4, 0.1, 0.2, 0.3, 0.5, 0.6])
+    best = SimpleNamespace(hypothesis=three, best=SimpleNamespace(place=place))
+    found = search._places_of_parts(best)
+    assert {key: at.tolist() for key, at in found.items()} == {
+        ("amplifier-lag", "load-inertia"): [0.4, 0.1, 0.2],
+        ("amplifier-lag", "payload-flexibility"): [0.4, 0.1, 0.3, 0.5, 0.6],
+        ("load-inertia", "payload-flexibility"): [0.4, 0.2, 0.3, 0.5, 0.6],
+    }
+
+
+def test_two_of_three_causes_are_weighed_where_the_three_lead(monkeypatch):
+    """They may not have been looked at, and explain as much."""
+    pair, third = ("amplifier-lag", "load-inertia"), "mesh1-damping"
+    three = Hypothesis(ADSS, (*pair, third))
+
+    def standing(effects, likelihood):
+        hypothesis = Hypothesis(ADSS, effects)
+        best = SimpleNamespace(place=np.full(hypothesis.d, 0.3), log_likelihood=likelihood)
+        return SimpleNamespace(hypothesis=hypothesis, best=best)
+
+    found = {pair: standing(pair, 100.0)}
+    looked = []
+
+    def rough_start(places, groups):
+        found[three.effects] = standing(three.effects, 200.0)
+
+    rough = SimpleNamespace(
+        observation=None,
+        found=found,
+        leading=lambda most: list(found),
+        start=rough_start,
+        look_closer=lambda keys, groups: None,
+    )
+    fine = SimpleNamespace(
+        best=found[pair],
+        take_over=lambda candidates, groups: setattr(fine, "best", candidates[0]),
+        start=lambda places, groups: looked.append(set(places)),
+    )
+    monkeypatch.setattr(
+        search, "screen_further", lambda *_: {three.effects: standing(three.effects, 1.0).best}
+    )
+    monkeypatch.setattr(search, "_compare", lambda *_: True)
+    search._search_triples(rough, fine, {}, None)
+    assert looked == [{pair, ("amplifier-lag", third), ("load-inertia", third)}]
 
 
 @pytest.mark.parametrize(
