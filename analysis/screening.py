@@ -77,7 +77,7 @@ def screen_further(coarse: Observation, atlas: Atlas, known: Candidate) -> dict[
     What a cause adds to the baseline is added to the candidate wherever there are runs of it,
     for with a further cause its best place is another.
     """
-    rows = np.isin(known.surface.observation.frequency_hz, coarse.frequency_hz)
+    rows = _rows_of(coarse, known.surface.observation)
     shown = [np.array(known.surface.expected(p))[..., rows] for p in known.population.places]
     _, added = _every_added(coarse, atlas)
     ratios = _centres(_PAIR_RATIOS)
@@ -102,6 +102,15 @@ def screen_further(coarse: Observation, atlas: Atlas, known: Candidate) -> dict[
         )
         found[both.effects] = Place(place, float(likelihood[one, size]))
     return found
+
+
+def _rows_of(thinned: Observation, whole: Observation) -> NDArray[np.intp]:
+    """Where the rows of a thinned observation stand; levels may have frequencies of their own."""
+    found = [
+        every.start + np.flatnonzero(np.isin(whole.frequency_hz[every], thinned.frequency_hz[some]))
+        for every, some in zip(whole.blocks, thinned.blocks, strict=True)
+    ]
+    return np.concatenate(found)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

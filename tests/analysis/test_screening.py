@@ -1,5 +1,7 @@
 """The first look, in a world in which what two causes do adds up exactly."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import synthetic
@@ -8,7 +10,8 @@ from analysis.candidate import form_candidates
 from analysis.causes import Hypothesis
 from analysis.placement import _FAR
 from analysis.population import Population
-from analysis.screening import screen_further, screen_pairs, screen_singles
+from analysis.screening import _rows_of, screen_further, screen_pairs, screen_singles
+from daq.plan import SweepPlan
 
 SINGLE = ("amplifier-lag", "load-inertia", "mesh1-damping", "shaft-stiffness", "tachometer-gain")
 
@@ -117,6 +120,24 @@ def test_a_third_cause_is_seen_beside_a_pair_and_placed(atlas, seed):
     assert best == three
     assert found[best].place[0] == pytest.approx(ratio, abs=_FAR[0])
     assert found[best].place[1:] == pytest.approx(sizes, abs=2.0 * _FAR[1])
+
+
+@pytest.mark.parametrize("stride", [1, 2, 3])
+def test_rows_of_a_thinned_sweep_are_found_where_levels_have_their_own_frequencies(stride):
+    whole = seen({}, 0.4, 1)
+    low, high = whole.blocks
+    frequency = whole.frequency_hz.copy()
+    # The second level begins one point later: they share frequencies, at other places.
+    frequency[high] = np.append(frequency[low][1:], 190.0)
+    plans = tuple(
+        (SweepPlan(tuple(frequency[block]), (level,)), np.arange(block.start, block.stop))
+        for block, level in zip(whole.blocks, synthetic.LEVELS, strict=True)
+    )
+    whole = replace(whole, frequency_hz=frequency, plans=plans)
+    thinned = whole.thinned(stride)
+    rows = _rows_of(thinned, whole)
+    assert whole.frequency_hz[rows].tolist() == thinned.frequency_hz.tolist()
+    assert np.array_equal(whole.values[:, rows], thinned.values)
 
 
 def test_a_population_without_any_cause_gives_no_pairs(atlas):
