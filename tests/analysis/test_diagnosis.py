@@ -75,6 +75,7 @@ def test_nothing_is_blamed_where_nothing_is_hidden(cache):
     assert found.next_measurement is None
 
 
+@pytest.mark.study
 def test_a_cause_that_is_taken_out_is_not_blamed_with_confidence_on_another(cache):
     text = "filter-corner:scale=0.6"
     found = diagnose_response(
