@@ -111,6 +111,7 @@ def test_two_large_causes_are_named_as_a_pair(cache):
     assert not found.verdict.baseline.adequate
 
 
+@pytest.mark.study
 def test_one_level_without_phase_still_gets_a_verdict_and_asks_for_more(cache):
     plan = SweepPlan(SHORT.frequencies_hz[::2], (2.5,))
     whole = response_hiding(["load-inertia:J_L=0.0045"], 2, plan)
@@ -137,13 +138,23 @@ NEAR_TIES = {"01": {"ambiguous"}}
 """A heavily damped payload below the band acts much as the viscous damper that it is taken for."""
 
 
-@pytest.mark.study
-@pytest.mark.parametrize("number", [f"{i:02d}" for i in range(1, 13)])
+QUICK = ("09",)
+"""Sets of every test run; the others are judged by `make blind`."""
+
+
+@pytest.mark.parametrize(
+    "number",
+    [
+        pytest.param(f"{i:02d}", marks=() if f"{i:02d}" in QUICK else pytest.mark.study)
+        for i in range(1, 13)
+    ],
+)
 def test_practice_sets_of_another_program(number, tmp_path, practice_cache):
     response = read_response(PRACTICE / f"practice-{number}.csv")
     judge_practice(number, response, practice_cache, tmp_path)
 
 
+@pytest.mark.study
 def test_a_practice_set_with_half_of_its_points(tmp_path, practice_cache):
     response = read_response(PRACTICE / "practice-12.csv")
     frequencies = np.unique(response.frequency_hz)[::2]

@@ -94,7 +94,7 @@ def test_two_causes_are_found_together(runs, seed):
     assert (verdict.word, verdict.best.effects) == ("explained", pair)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1])
 def test_three_causes_are_found_together(runs, seed):
     three = ("amplifier-lag", "load-inertia", "mesh1-damping")
     _, verdict = diagnosed(three, [0.8, 0.3, 0.7], seed)
