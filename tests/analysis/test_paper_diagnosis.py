@@ -91,12 +91,16 @@ def test_a_hidden_cause_explains_its_own_features(
 def test_nothing_hidden_is_seldom_called_a_cause(
     explorer: Explorer, explored: list[Explored]
 ) -> None:
-    """The plain model's own runs: consistent in at least 8 of 10, never with confidence else."""
+    """The plain model's own runs: consistent in at least 36 of 60, confidently else in at most 2.
+
+    Of 3000 such readings 2560 were consistent and one was explained by a cause it did not have.
+    At these rates the test fails by chance about once in a million.
+    """
     words = [
-        believe(explored, reading, KNOWN).word for reading in read_hidden(explorer, None, 0.0, 10)
+        believe(explored, reading, KNOWN).word for reading in read_hidden(explorer, None, 0.0, 60)
     ]
-    assert words.count("consistent") >= 8
-    assert words.count("explained") == 0
+    assert words.count("consistent") >= 36
+    assert words.count("explained") <= 2
 
 
 def test_a_cause_left_out_is_not_explained_by_the_plain_model(
