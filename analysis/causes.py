@@ -70,6 +70,20 @@ class Hypothesis:
         low, high = self.logs[:, 0], self.logs[:, 1]
         return np.concatenate([[ratio], (np.log(np.asarray(values)) - low) / (high - low)])
 
+    def part(self, effects: tuple[str, ...], place: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Coordinates at a place (d,) of the hypothesis that holds some of the effects alone."""
+        kept = [effect in effects for effect, _ in self.parameters]
+        return np.asarray(place)[[True, *kept]]
+
+    def joined(
+        self, place: NDArray[np.float64], other: Hypothesis, sizes: NDArray[np.float64]
+    ) -> tuple[Hypothesis, NDArray[np.float64]]:
+        """The hypothesis that holds both, at this one's place (d,) and with the other's sizes."""
+        both = Hypothesis(self.unit, tuple(sorted((*self.effects, *other.effects))))
+        known = dict(zip(self.parameters, place[1:], strict=True))
+        known |= dict(zip(other.parameters, sizes, strict=True))
+        return both, np.array([place[0], *(known[one] for one in both.parameters)])
+
     def settings(self, place: NDArray[np.float64]) -> tuple[EffectSetting, ...]:
         """The effects with their values at a place (d,)."""
         found: dict[str, dict[str, float]] = {effect: {} for effect in self.effects}

@@ -29,6 +29,10 @@ Starts = Mapping[Effects, NDArray[np.float64]]
 """Places (d,) from which hypotheses are looked at."""
 
 
+_MANY = 4
+"""Coordinates from which on half of further runs lie along the places that agree."""
+
+
 class Hunt:
     """Candidates on the rows of one observation, and the runs made for them so far."""
 
@@ -94,16 +98,14 @@ class Hunt:
 
     def settle(self, chosen: Sequence[Effects], groups: int) -> None:
         """Simulate more of some candidates, about what their runs tell of their parameters."""
-        found = [self.found[key] for key in chosen]
-        self._simulate(
-            [
-                group
-                for c in found
-                for group in groups_around(
-                    c.hypothesis, size_candidate(c, self.observation, self._rng), groups, self._rng
-                )
-            ]
-        )
+        more: list[Group] = []
+        for c in (self.found[key] for key in chosen):
+            # What is learned of many parameters is far wider than a resonance is sharp.
+            along = groups // 2 if c.hypothesis.d >= _MANY else 0
+            learned = size_candidate(c, self.observation, self._rng)
+            more += groups_around(c.hypothesis, learned, groups - along, self._rng)
+            more += groups_along(c, along, self._rng)
+        self._simulate(more)
         self._form({key: self.found[key].best.place for key in chosen})
 
     def hear(self) -> None:

@@ -1,13 +1,15 @@
 """The search for what a model lacks: from every cause to a few that are looked at closely.
 
 Owns which hypotheses are simulated: an atlas of every single cause, then
-rounds with fewer and fewer of them, and pairs where no single cause will do.
+rounds with fewer and fewer of them, pairs where no single cause will do, and
+a third cause where no pair will.
 It compares hypotheses to decide where to look next, and passes no verdict.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from itertools import chain, combinations
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +22,7 @@ from analysis.holdout import AT_NOISE, hold_out
 from analysis.hunt import Hunt, Starts
 from analysis.observation import Observation
 from analysis.progress import Progress, part_of
-from analysis.screening import Place, screen_pairs, screen_singles
+from analysis.screening import Place, screen_further, screen_pairs, screen_singles
 from sim.unit import Unit
 
 __all__ = ["search_causes"]
@@ -31,7 +33,7 @@ _THIRD, _THIRD_GROUPS = 4, 4
 """How many hypotheses are looked at in each round, and in how many groups of runs each."""
 
 _PAIRS, _PARTNERS, _GLANCE_FREQUENCIES, _GLANCE_GROUPS = 20, 10, 10, 2
-_PAIRS_CLOSER, _PAIRS_AFTER, _PAIR_GROUPS = 12, 5, (2, 3)
+_PAIRS_CLOSER, _PAIRS_AFTER, _PAIR_GROUPS = 12, 8, (2, 3)
 """Pairs that the atlas favours, and more of those with the leader in them; at how many frequencies
 they are simulated at first, and in how many groups; how many are looked at closer, twice.
 
@@ -42,6 +44,9 @@ look put seven among its first four, the others down to the 27th place.
 _BESIDE, _BESIDE_CLOSER, _BESIDE_GROUPS = (5, 8), (2, 4), (2, 4)
 """The same for pairs with a leader that is not doubted, and where it predicts worse than true
 causes do."""
+
+_TRIPLES, _TRIPLES_CLOSER, _TRIPLE_GROUPS, _TRIPLES_AFTER = 8, 4, (2, 4), 2
+"""The same for sets with a third cause beside a leading pair that is doubted."""
 
 _EARNED = 6.0
 """Log-likelihood on the rows of the rough look, a third of all, by which a pair must beat its parts
@@ -68,6 +73,10 @@ _DOUBT = 2.0
 """Misfit of the best single cause, in standard deviations, from which pairs are tried; and the
 root mean square of what it misses of levels not fitted, in theirs: where few runs of its own fit
 each other the first is blind, and the second is not."""
+
+_LEAST_SURE = 1.5
+"""What a pair may miss of levels not fitted, in their standard deviations, before a third cause is
+tried: more of it is no explanation (`analysis.verdict`)."""
 
 _LITTLE = 10.0
 """Log-likelihood in the coarse look that a pair may lack of its leading part, and be looked at;
@@ -158,6 +167,10 @@ def search_causes(
         if not doubted:
             _look_beside(rough, fine, atlas, rng)
         _see_it_predict(fine)
+        _weigh_parts(fine)
+        if len(fine.best.hypothesis.effects) == 2 and _is_doubtful(fine.best, rng, _LEAST_SURE):
+            _search_triples(rough, fine, atlas, rng)
+            _see_it_predict(fine)
     return sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
 
 
@@ -182,6 +195,24 @@ def _look_beside(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator
             _compare(fine, rng)
 
 
+def _search_triples(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator) -> None:
+    """See whether a third cause makes up for what a leading pair leaves."""
+    places = screen_further(rough.observation, atlas, fine.best)
+    ranked = _ranked(places)[:_TRIPLES]
+    if not ranked:
+        return
+    rough.start({key: places[key].place for key in ranked}, _TRIPLE_GROUPS[0])
+    rough.look_closer(_among(rough, ranked)[:_TRIPLES_CLOSER], _TRIPLE_GROUPS[1])
+    kept = [key for key in _among(rough, ranked) if _earns(key, rough.found)][:_TRIPLES_AFTER]
+    if kept:
+        fine.take_over([rough.found[key] for key in kept], _THIRD_GROUPS)
+        _compare(fine, rng)
+    if len(fine.best.hypothesis.effects) > 2:
+        # Two of the three may do as well where they are now, and not have been looked at.
+        fine.start(_places_of_parts(fine.best), _LAST_GROUPS)
+        _compare(fine, rng)
+
+
 def _see_it_predict(fine: Hunt) -> None:
     """Give a leader, and who is close to it, more runs where it predicts badly: few runs do."""
     for done in range(_ROUNDS_ALONE):
@@ -194,6 +225,25 @@ def _see_it_predict(fine: Hunt) -> None:
             _settle(fine, [key for key in fine.leading(_CHANCES, _CLOSE) if key])
         else:
             break
+        fine.hear()
+
+
+def _weigh_parts(fine: Hunt) -> None:
+    """See what the causes of a leading pair do alone where it has them, with as many runs.
+
+    A resonance that had been looked at elsewhere lay 300 behind itself and a brake it has not.
+    """
+    leader = fine.best
+    if len(leader.hypothesis.effects) < 2:
+        return
+    places = {
+        part: place
+        for part, place in _places_of_parts(leader).items()
+        if part in fine.found and len(fine.found[part].population) < len(leader.population)
+    }
+    if places:
+        fine.start(places, _LAST_GROUPS)
+        fine.settle(list(places), _LAST_GROUPS)
         fine.hear()
 
 
@@ -260,10 +310,10 @@ def _among(hunt: Hunt, keys: Collection[Effects]) -> list[Effects]:
     return [key for key in hunt.leading(len(hunt.found)) if key in keys]
 
 
-def _is_doubtful(candidate: Candidate, rng: np.random.Generator) -> bool:
+def _is_doubtful(candidate: Candidate, rng: np.random.Generator, missed: float = _DOUBT) -> bool:
     if judge_adequacy(candidate, rng).sigma > _DOUBT:
         return True
-    return hold_out(candidate, candidate.surface.observation).rms_sigma > _DOUBT
+    return hold_out(candidate, candidate.surface.observation).rms_sigma > missed
 
 
 def _is_nothing_missing(fine: Hunt, rng: np.random.Generator) -> bool:
@@ -282,13 +332,11 @@ def _third(rough: Hunt) -> list[Effects]:
     return _with_baseline([*leading, *(key for key in others if key in hopeful)])
 
 
-def _places_of_parts(pair: Candidate) -> Starts:
-    """Where the causes of a pair are by its best fit, each for itself."""
-    ratio, *sizes = pair.best.place
-    places: dict[Effects, list[float]] = {(one,): [ratio] for one in pair.hypothesis.effects}
-    for (effect, _), size in zip(pair.hypothesis.parameters, sizes, strict=True):
-        places[(effect,)].append(size)
-    return {effects: np.array(place) for effects, place in places.items()}
+def _places_of_parts(leader: Candidate) -> Starts:
+    """Where sets of one cause less are by the best fit of several causes."""
+    whole, place = leader.hypothesis, leader.best.place
+    fewer = combinations(whole.effects, len(whole.effects) - 1)
+    return {effects: whole.part(effects, place) for effects in fewer}
 
 
 def _earns(key: Effects, found: Mapping[Effects, Candidate]) -> bool:
@@ -297,9 +345,10 @@ def _earns(key: Effects, found: Mapping[Effects, Candidate]) -> bool:
     return not parts or found[key].best.log_likelihood > max(parts) + _EARNED
 
 
-def _parts(key: Effects, found: Mapping[Effects, Candidate]) -> list[Effects]:
-    """The causes that a pair is made of, each for itself, as far as they were looked at."""
-    return [(effect,) for effect in key if len(key) > 1 and (effect,) in found]
+def _parts(key: Effects, found: Collection[Effects]) -> list[Effects]:
+    """Sets of fewer of the same causes, as far as they were looked at."""
+    fewer = (combinations(key, count) for count in range(1, len(key)))
+    return [part for part in chain.from_iterable(fewer) if part in found]
 
 
 def _with_baseline(keys: Sequence[Effects]) -> list[Effects]:

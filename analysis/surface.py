@@ -23,9 +23,10 @@ from analysis.population import Population
 
 __all__ = ["Fit", "Surface", "differences"]
 
-_WIDENINGS: NDArray[np.float64] = 1.3 ** np.arange(9, dtype=np.float64)
-_SPARE = 2.0
-_CURVATURE = 0.3
+_WIDENINGS: NDArray[np.float64] = 1.3 ** np.arange(-3, 9, dtype=np.float64)
+"""Reaches of the kernel, in widths: the first is taken that holds enough runs."""
+
+_RIDGE = 0.1
 """Ridge of the slopes, in units of the kernel's reach: few runs must not make a wild slope."""
 
 _BLUR = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0
@@ -99,6 +100,8 @@ class Surface:
         (k,): prior standard deviations of the deviations.
     motions
         States of the runs and of the observation: where they differ a run tells nothing.
+    enough
+        How many runs a regression takes, by their weights.
     tailed
         Whether scatter is fitted as Student's t (slower) or as a mean square.
     """
@@ -110,6 +113,7 @@ class Surface:
     slopes: NDArray[np.float64]
     sigmas: NDArray[np.float64]
     motions: Motions
+    enough: float
     tailed: bool = True
 
     def scan(self, grid: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -157,7 +161,7 @@ class Surface:
         ridge = np.zeros((len(reach), len(basis)))
         ridge[:, 0] = 1e-9
         # The ridge is for slopes in units of the kernel's reach.
-        ridge[:, 1:] = _CURVATURE * reach[:, None] ** 2
+        ridge[:, 1:] = _RIDGE * reach[:, None] ** 2
         inverse = np.linalg.inv(weighed @ basis.T + ridge[:, :, None] * np.eye(len(basis)))
         coefficients = values @ weighed.transpose(0, 2, 1) @ inverse
         squares = (values - coefficients @ basis) ** 2
@@ -242,8 +246,7 @@ class Surface:
 
     def _reach(self, totals: NDArray[np.float64]) -> NDArray[np.intp]:
         """The first reach whose weights (reaches, ...) suffice, or the last."""
-        needed = len(self.width) + 1 + _SPARE
-        enough = totals >= needed
+        enough = totals >= self.enough
         enough[-1] = True
         return np.argmax(enough, axis=0)
 

@@ -106,7 +106,7 @@ def candidate(
     difference = runs - seen.values - np.tensordot(deviations, slopes, axes=1)
     width = np.array([0.4] + [0.4] * (hypothesis.d - 1))
     motions = Motions.unknown(*difference.shape[::2])
-    surface = Surface(seen, places, difference, width, slopes, SIGMAS, motions)
+    surface = Surface(seen, places, difference, width, slopes, SIGMAS, motions, 9.0)
     nothing = np.zeros(runs[:, 0].shape)
     population = Population(places, deviations, nothing + 1.0 + 0j, nothing)
     return Candidate(hypothesis, population, surface, surface.climb(places.mean(axis=0)))

@@ -24,6 +24,26 @@ def test_places_and_physical_values_are_each_others_inverse(name, effects, ratio
     np.testing.assert_allclose(hypothesis.place(ratio, values), place, atol=1e-9)
 
 
+@given(
+    effects=st.lists(st.sampled_from(sorted(CATALOGUE)), min_size=2, max_size=4, unique=True),
+    cut=st.integers(1, 3),
+    seed=st.integers(0, 1000),
+)
+def test_what_is_joined_comes_apart_again(effects, cut, seed):
+    cut = min(cut, len(effects) - 1)
+    one, other = (
+        Hypothesis(UNITS["adss"], tuple(sorted(e))) for e in (effects[:cut], effects[cut:])
+    )
+    rng = np.random.default_rng(seed)
+    place, sizes = rng.uniform(size=one.d), rng.uniform(size=other.d - 1)
+    both, joined = one.joined(place, other, sizes)
+    assert both.effects == tuple(sorted(effects))
+    assert both.part(one.effects, joined).tolist() == place.tolist()
+    assert both.part(other.effects, joined).tolist() == [place[0], *sizes]
+    apart = (*one.settings(place), *other.settings(np.array([place[0], *sizes])))
+    assert both.settings(joined) == tuple(sorted(apart, key=lambda setting: setting.id))
+
+
 @pytest.mark.parametrize("name", sorted(UNITS))
 @pytest.mark.parametrize("corner", [0.0, 1.0])
 def test_every_cause_makes_a_machine_at_both_ends_of_its_range(name, corner):

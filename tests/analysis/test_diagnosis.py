@@ -15,6 +15,7 @@ from analysis.diagnosis import diagnose_response
 from analysis.diagnosis_figures import draw_diagnosis
 from daq.formats import read_response
 from daq.plan import SweepPlan, spaced_frequencies
+from sim.catalogue import CATALOGUE
 from sim.effects import parse_effect
 from sim.response import simulate
 from sim.unit import load_unit
@@ -122,7 +123,9 @@ def test_one_level_without_phase_still_gets_a_verdict_and_asks_for_more(cache):
         gain_std_db=whole.gain_std_db,
         phase_known=np.zeros(len(whole), dtype=bool),
     )
-    found = diagnose_response(poor, ADSS, cache=None)
+    # Among a few causes: what is asked here is how poor data are dealt with.
+    others = set(CATALOGUE) - {text.partition(":")[0] for text in LARGE}
+    found = diagnose_response(poor, ADSS, without=others, cache=None)
     document = found.to_json()
     assert document["verdict"] in ("consistent", "explained", "ambiguous", "unexplained")
     assert len(found.warnings) == 2
@@ -131,11 +134,9 @@ def test_one_level_without_phase_still_gets_a_verdict_and_asks_for_more(cache):
     json.dumps(document, allow_nan=False)
 
 
-WEAK_CHATTER = {"02": 1.6, "04": 1.6, "06": 1.7}
-"""Sets with a few points in a motion that few runs show: 1.47, 1.37 and 1.58 were measured."""
-
 NEAR_TIES = {"01": {"ambiguous"}}
 """A heavily damped payload below the band acts much as the viscous damper that it is taken for."""
+
 
 QUICK = ("09",)
 """Sets of every test run; the others are judged by `make blind`."""
@@ -149,10 +150,24 @@ QUICK = ("09",)
     ],
 )
 def test_practice_sets_of_another_program(number, tmp_path, practice_cache):
+    response = read_response(PRACTICE / f"practice-{number}.csv")
+    judge_practice(number, response, practice_cache, tmp_path)
+
+
+@pytest.mark.study
+def test_a_practice_set_with_half_of_its_points(tmp_path, practice_cache):
+    response = read_response(PRACTICE / "practice-12.csv")
+    frequencies = np.unique(response.frequency_hz)[::2]
+    half = response.take(np.isin(response.frequency_hz, frequencies))
+    assert len(half) == 3 * 31
+    judge_practice("12", half, practice_cache, tmp_path)
+
+
+def judge_practice(number, response, cache, folder):
+    """The right cause at the right size, levels not fitted predicted, text, document, pictures."""
     truth = TRUTH[f"practice-{number}"]
     unit = load_unit(truth["unit"].lower())
-    response = read_response(PRACTICE / f"practice-{number}.csv")
-    found = diagnose_response(response, unit, cache=practice_cache)
+    found = diagnose_response(response, unit, cache=cache)
     document = json.loads(json.dumps(found.to_json(), allow_nan=False))
     words = {"consistent"} if not truth["effects"] else {"explained"}
     assert document["verdict"] in words | NEAR_TIES.get(number, set())
@@ -163,9 +178,9 @@ def test_practice_sets_of_another_program(number, tmp_path, practice_cache):
             assert named[effect][name]["value"] == pytest.approx(value, rel=0.2)
     ratio = document["contribution_ratio"]["extended"]
     assert abs(ratio["value"] - truth["contribution_ratio"]) < max(0.06, 2.5 * ratio["std"])
-    assert document["extended"]["held_out_rms_sigma"] < WEAK_CHATTER.get(number, 1.3)
+    assert document["extended"]["held_out_rms_sigma"] < 1.3
     assert "\n".join(found.summary())
-    for path in draw_diagnosis(found, tmp_path):
+    for path in draw_diagnosis(found, folder):
         assert path.read_bytes().startswith(b"\x89PNG")
 
 

@@ -1,13 +1,17 @@
 """The first look, in a world in which what two causes do adds up exactly."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import synthetic
 
+from analysis.candidate import form_candidates
 from analysis.causes import Hypothesis
 from analysis.placement import _FAR
 from analysis.population import Population
-from analysis.screening import screen_pairs, screen_singles
+from analysis.screening import _rows_of, screen_further, screen_pairs, screen_singles
+from daq.plan import SweepPlan
 
 SINGLE = ("amplifier-lag", "load-inertia", "mesh1-damping", "shaft-stiffness", "tachometer-gain")
 
@@ -65,9 +69,9 @@ def test_every_pair_is_looked_at_once_in_the_order_of_its_effects(atlas):
 @pytest.mark.parametrize(
     ("sizes", "stands_in"),
     [
-        ({"amplifier-lag": 0.3, "load-inertia": 0.7}, "mesh1-damping"),
+        ({"amplifier-lag": 0.9, "shaft-stiffness": 0.9}, "mesh1-damping"),
         ({"amplifier-lag": 0.7, "mesh1-damping": 0.9}, "shaft-stiffness"),
-        ({"load-inertia": 0.7, "tachometer-gain": 0.9}, "shaft-stiffness"),
+        ({"mesh1-damping": 0.9, "shaft-stiffness": 0.7}, "tachometer-gain"),
     ],
 )
 def test_a_pair_does_not_ask_its_parts_to_lead_alone(atlas, sizes, stands_in):
@@ -87,6 +91,53 @@ def test_pairs_beside_a_cause_are_those_that_hold_it(atlas):
     every, some = screen_pairs(observed, atlas), screen_pairs(observed, atlas, ("load-inertia",))
     assert set(some) == {key for key in every if "load-inertia" in key}
     assert all(some[k].log_likelihood == every[k].log_likelihood for k in some)
+
+
+def candidate(observed, effects, place, rng):
+    """A pair that was simulated about a place, its sizes up to a quarter of their range off."""
+    runs, places = [], []
+    for _ in range(8):
+        sizes = place[1:] + rng.uniform(-0.25, 0.25, len(effects))
+        for ratio in np.clip(place[0] + rng.uniform(-0.2, 0.2, 10), 0.0, 1.0):
+            places.append([ratio, *sizes])
+            runs.append(channels(dict(zip(effects, sizes, strict=True)), ratio, rng))
+    mean, scatter = np.exp(np.array([r[0] + 1j * r[1] for r in runs])), np.array(runs)[:, 2]
+    made = Population(np.array(places), np.zeros((80, 5)), mean, np.exp(2.0 * scatter))
+    return form_candidates(synthetic.ADSS, observed, {effects: made}, {effects: place})[effects]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_third_cause_is_seen_beside_a_pair_and_placed(atlas, seed):
+    rng = np.random.default_rng([seed, 2])
+    three = tuple(sorted(map(str, rng.choice(SINGLE, 3, replace=False))))
+    sizes = 0.5 + rng.uniform(0.2, 0.4, 3) * rng.choice([-1.0, 1.0], 3)
+    ratio = rng.uniform(0.2, 0.8)
+    observed = seen(dict(zip(three, sizes, strict=True)), ratio, seed)
+    known = candidate(observed, three[:2], np.array([ratio, *sizes[:2]]), rng)
+    found = screen_further(observed, atlas, known)
+    assert set(found) == {tuple(sorted((*three[:2], e))) for e in SINGLE if e not in three[:2]}
+    best = max(found, key=lambda key: found[key].log_likelihood)
+    assert best == three
+    assert found[best].place[0] == pytest.approx(ratio, abs=_FAR[0])
+    assert found[best].place[1:] == pytest.approx(sizes, abs=2.0 * _FAR[1])
+
+
+@pytest.mark.parametrize("stride", [1, 2, 3])
+def test_rows_of_a_thinned_sweep_are_found_where_levels_have_their_own_frequencies(stride):
+    whole = seen({}, 0.4, 1)
+    low, high = whole.blocks
+    frequency = whole.frequency_hz.copy()
+    # The second level begins one point later: they share frequencies, at other places.
+    frequency[high] = np.append(frequency[low][1:], 190.0)
+    plans = tuple(
+        (SweepPlan(tuple(frequency[block]), (level,)), np.arange(block.start, block.stop))
+        for block, level in zip(whole.blocks, synthetic.LEVELS, strict=True)
+    )
+    whole = replace(whole, frequency_hz=frequency, plans=plans)
+    thinned = whole.thinned(stride)
+    rows = _rows_of(thinned, whole)
+    assert whole.frequency_hz[rows].tolist() == thinned.frequency_hz.tolist()
+    assert np.array_equal(whole.values[:, rows], thinned.values)
 
 
 def test_a_population_without_any_cause_gives_no_pairs(atlas):

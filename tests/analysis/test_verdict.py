@@ -15,6 +15,7 @@ from analysis.misfit import describe_departures, find_departures
 from analysis.verdict import judge_candidates
 
 TRUE, WRONG = ("load-inertia",), ("shaft-stiffness",)
+THREE = (*TRUE, *WRONG, "shaft-damping")
 SETS = ((), TRUE, WRONG, ("cable-stiffness",), ("amplifier-gain",))
 
 
@@ -207,7 +208,7 @@ def test_a_second_cause_is_not_named_where_one_does(seed):
         (TRUE, 1.4, 0.0, True), (TRUE, 1.6, 0.08, True), (TRUE, 1.6, 0.02, False),
         (TRUE, 2.1, 1.0, False), (TRUE + WRONG, 0.9, 0.0, True),
         (TRUE + WRONG, 1.1, 0.0, False), (TRUE + WRONG, 1.4, 0.02, True),
-        (TRUE + WRONG, 1.6, 1.0, False),
+        (TRUE + WRONG, 1.6, 1.0, False), (THREE, 0.9, 0.0, True), (THREE, 1.1, 1.0, False),
     ],
 )  # fmt: skip
 def test_what_misses_other_levels_must_have_own_runs_that_do(
