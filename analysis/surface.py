@@ -10,6 +10,7 @@ unwrapped: near the right place the difference is small.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from analysis.branches import Motions
 from analysis.emulator import GAIN_TOLERANCE
+from analysis.likelihood import HEAT
 from analysis.observation import Observation
 from analysis.population import Population
 
@@ -211,17 +213,41 @@ class Surface:
 
         `tries` per coordinate and step size.
         """
+        return max(self.walk(start, rows, tries), key=lambda fit: fit.log_likelihood)
+
+    def walk(
+        self, start: NDArray[np.float64], rows: NDArray[np.bool_] | None = None, tries: int = 12
+    ) -> list[Fit]:
+        """Every fit that a climb looks at, the start first."""
         low, high = self.places.min(axis=0), self.places.max(axis=0)
         span = np.maximum(high - low, 1e-9)
         rng = np.random.default_rng(0)
         best = self.fit(np.clip(start, low, high), rows)
+        fits = [best]
         for reach in _STRIDES:
             for _ in range(tries * len(start)):
                 step = span * reach * rng.uniform(-1.0, 1.0, len(start))
                 found = self.fit(np.clip(best.place + step, low, high), rows)
+                fits.append(found)
                 if found.log_likelihood > best.log_likelihood:
                     best = found
-        return best
+        return fits
+
+    def shares(self, fits: Sequence[Fit]) -> NDArray[np.float64]:
+        """How much each place (count,) of a walk is believed, by the rows it was fitted to.
+
+        Weights of importance: steps were drawn from ever smaller boxes about the best place, so
+        that near it there are more places than it is more likely.
+        """
+        best = max(fits, key=lambda fit: fit.log_likelihood)
+        span = np.maximum(np.ptp(self.places, axis=0), 1e-9)
+        far = np.array([np.max(np.abs(fit.place - best.place) / span) for fit in fits])
+        reaches = np.array(_STRIDES)
+        # A start, or an early step, may lie outside them all.
+        inside = np.minimum(far, reaches.max())[:, None] <= reaches
+        drawn = np.sum(inside / reaches ** len(span), axis=1)
+        weight = np.exp([(fit.log_likelihood - best.log_likelihood) / HEAT for fit in fits]) / drawn
+        return np.asarray(weight / weight.sum())
 
     @staticmethod
     def log_density(mean: NDArray[np.float64], std: NDArray[np.float64]) -> NDArray[np.float64]:

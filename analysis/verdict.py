@@ -135,9 +135,10 @@ class Verdict:
 
     @property
     def rivals(self) -> tuple[Judged, ...]:
-        """Sets near the best one that say something else.
+        """Sets near the best one that say something else, and might be the explanation.
 
-        Among them that nothing is hidden, which has a wider margin.
+        Among them that nothing is hidden, which has a wider margin. A set that would be no
+        explanation if it led is none as a rival.
         """
         return tuple(one for one in self.judged if self._is_rival(one))
 
@@ -145,7 +146,8 @@ class Verdict:
         behind, best = self.best.score - one.score, set(self.best.effects)
         if not one.effects:
             return bool(best) and one.adequate and behind < _SURE
-        return behind < _RIVAL and not set(one.effects) <= best and not set(one.effects) >= best
+        other = not set(one.effects) <= best and not set(one.effects) >= best
+        return other and one.adequate and behind < _RIVAL
 
 
 def judge_candidates(

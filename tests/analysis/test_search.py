@@ -102,7 +102,7 @@ def test_three_causes_are_found_together(runs, seed):
     # so that a true set of three may be called unexplained.
     assert verdict.word in ("explained", "unexplained")
     assert verdict.best.effects == three
-    assert verdict.best.candidate.best.place == pytest.approx([0.4, 0.8, 0.3, 0.7], abs=0.1)
+    assert verdict.best.candidate.best.place == pytest.approx([0.4, 0.8, 0.3, 0.7], abs=0.2)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -120,7 +120,7 @@ def test_nothing_is_looked_for_behind_a_cause_that_explains_all(runs):
     assert all(count <= 60 for key, count in runs.items() if len(key) > 1)
 
 
-@pytest.mark.parametrize(("missed", "tried", "closer"), [(1.1, 2, 2), (1.2, 8, 4)])
+@pytest.mark.parametrize(("missed", "tried", "closer"), [(1.0, 2, 2), (1.1, 8, 4)])
 def test_more_pairs_are_tried_behind_a_cause_that_predicts_badly(
     monkeypatch, missed, tried, closer
 ):

@@ -105,11 +105,14 @@ def test_that_nothing_is_hidden_is_a_rival_while_it_has_a_twentieth(lead, adequa
     assert [one.effects for one in verdict.rivals] == rivals
 
 
-@pytest.mark.parametrize(("behind", "rivals"), [(29.0, [WRONG]), (31.0, [])])
-def test_another_set_is_a_rival_while_it_has_a_seventh(behind, rivals):
+@pytest.mark.parametrize(
+    ("behind", "adequate", "rivals"),
+    [(29.0, True, [WRONG]), (31.0, True, []), (29.0, False, []), (1.0, False, [])],
+)
+def test_another_set_is_a_rival_while_it_has_a_seventh_and_explains(behind, adequate, rivals):
     found = judge(seen(TRUE, 1), ((), TRUE, WRONG), 1)
     (wrong,) = (one for one in found.judged if one.effects == WRONG)
-    near = replace(wrong, score=found.best.score - behind)
+    near = replace(wrong, score=found.best.score - behind, adequate=adequate)
     verdict = replace(found, judged=(found.best, near, found.baseline))
     assert [one.effects for one in verdict.rivals] == rivals
 
@@ -161,9 +164,9 @@ def test_a_datasheet_value_that_may_be_half_or_twice_is_no_explanation(
         (0.05, 1.2, 60.0, TRUE),
         (0.03, 1.2, 60.0, TRUE + WRONG),
         (0.03, 1.2, 19.0, TRUE),
-        (0.03, 1.1, 74.0, TRUE),
-        (0.03, 1.1, 76.0, TRUE + WRONG),
-        (0.05, 1.1, 76.0, TRUE),
+        (0.03, 1.0, 74.0, TRUE),
+        (0.03, 1.0, 76.0, TRUE + WRONG),
+        (0.05, 1.0, 76.0, TRUE),
     ],
 )
 def test_a_pair_that_nothing_calls_for_or_that_leads_by_chance_is_not_believed(

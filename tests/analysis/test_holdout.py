@@ -1,0 +1,67 @@
+"""What is predicted of levels not fitted, where the answer is known."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import synthetic
+from synthetic import ROWS, candidate, observation, read
+
+from analysis.holdout import hold_out
+from analysis.likelihood import HEAT
+from analysis.surface import Surface
+
+HALF = ROWS // 2
+
+
+@pytest.mark.parametrize(
+    ("middle", "std"),
+    [((0.5,), (0.05,)), ((0.3,), (0.1,)), ((0.4, 0.6), (0.08, 0.04)), ((0.5, 0.5), (0.02, 0.1))],
+)
+def test_places_of_a_walk_are_believed_as_a_bell_says(middle, std):
+    """Mean and standard deviation of a Gaussian, from the weights alone."""
+    surface = candidate(observation(np.zeros((3, ROWS))), ("load-inertia",)[: len(middle) - 1])
+    surface = surface.surface
+
+    def bell(place, rows=None):
+        z2 = np.sum(((place - np.array(middle)) / np.array(std)) ** 2)
+        return SimpleNamespace(place=place, log_likelihood=-0.5 * HEAT * z2)
+
+    told = SimpleNamespace(places=surface.places, fit=bell)
+    fits = Surface.walk(told, np.full(len(middle), 0.45), tries=1500)
+    share = Surface.shares(told, fits)
+    places = np.array([fit.place for fit in fits])
+    mean = share @ places
+    assert share.sum() == pytest.approx(1.0)
+    np.testing.assert_allclose(mean, middle, atol=0.15 * max(std))
+    np.testing.assert_allclose(np.sqrt(share @ (places - mean) ** 2), std, rtol=0.15)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_what_the_other_levels_leave_open_is_no_miss(seed, monkeypatch):
+    """The low level says everything of the ratio, the high one nothing, and is true to it."""
+    slope = synthetic.RATIO_SLOPE.copy()
+    slope[:, :HALF] *= 8.0
+    slope[:, HALF:] = 0.0
+    monkeypatch.setattr(synthetic, "RATIO_SLOPE", slope)
+    observed = observation(read((), np.array([0.3]), np.random.default_rng(seed)))
+    found = candidate(observed, seed=seed)
+    held_out = hold_out(found, observed)
+    z = held_out.residual / held_out.std
+    assert np.sqrt(np.mean(z[:2, :HALF] ** 2)) < 1.3, "the low level, predicted from the high one"
+    assert np.sqrt(np.mean(z[:2, HALF:] ** 2)) < 1.3
+    # It is told how little is known: the best place alone would have the scatter of a run.
+    alone = found.surface.fit(found.best.place).std
+    assert np.median(held_out.std[:2, :HALF] / alone[:2, :HALF]) > 5.0
+    assert np.median(held_out.std[:2, HALF:] / alone[:2, HALF:]) < 1.5
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_no_place_predicts_is_a_miss(seed):
+    values = read((), np.array([0.5]), np.random.default_rng(seed))
+    values[0, :HALF] += 0.3
+    observed = observation(values)
+    found = candidate(observed, seed=seed)
+    honest = observation(read((), np.array([0.5]), np.random.default_rng(seed)))
+    assert hold_out(found, observed).rms_sigma > 2.0
+    assert hold_out(candidate(honest, seed=seed), honest).rms_sigma < 1.3
