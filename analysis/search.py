@@ -21,6 +21,7 @@ from analysis.executor import Executor
 from analysis.holdout import AT_NOISE, hold_out
 from analysis.hunt import Hunt, Starts
 from analysis.observation import Observation
+from analysis.plausibility import is_pressed
 from analysis.progress import Progress, part_of
 from analysis.screening import Place, screen_further, screen_pairs, screen_singles
 from sim.unit import Unit
@@ -268,6 +269,9 @@ def _compare(fine: Hunt, rng: np.random.Generator) -> bool:
         # a true cause of several parameters has been beaten by itself and another.
         parts = set(_parts(leader, fine.found))
         near += sorted(parts & set(fine.leading(len(fine.found), _NEAR)))
+        if done and not is_pressed(fine.found[leader]):
+            # Who wants a size that no bench has will be no rival, however near.
+            near = [key for key in near if not is_pressed(fine.found[key])]
         if done and not near:
             break
         near += [key for key in fine.leading(len(fine.found), behind) if not key]

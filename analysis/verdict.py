@@ -18,6 +18,7 @@ from analysis.candidate import Candidate
 from analysis.holdout import AT_NOISE, HeldOut, hold_out
 from analysis.likelihood import HEAT
 from analysis.observation import Observation
+from analysis.plausibility import EDGE, is_pressed
 
 __all__ = ["Judged", "Verdict", "judge_candidates"]
 
@@ -34,15 +35,6 @@ _PER_CAUSE = 10.0
 
 _AT_BOUND = 10.0
 """Cost of a parameter at the end of its plausible range: a sign that the cause is another."""
-
-_EDGE, _INWARDS = 0.02, 0.05
-"""How near its end that is, and how far inside a parameter is put to see whether it is pressed
-against it: whether that costs more than the heat, as it does not where the size says little."""
-
-_TOWARDS, _AS_GOOD = 0.15, 2.0 * HEAT
-"""How near to an end of its range a datasheet value is that may as well be there, half or twice of
-what it should be, and the log-likelihood by which the end must be worse (two standard
-deviations). A shaft that hardens is taken for one that is twice as stiff, or more."""
 
 _WITHIN_TOLERANCE = 40.0
 """Cost of a datasheet value so little off that its tolerance covers it: that is no cause."""
@@ -197,28 +189,13 @@ def _is_adequate(
 ) -> bool:
     causes, missed = len(candidate.hypothesis.effects), held_out.rms_sigma
     several = causes > 1
-    if misfit > _UNLIKE or _is_pressed(candidate) or missed > (_UNPREDICTED if several else _NEVER):
+    if misfit > _UNLIKE or is_pressed(candidate) or missed > (_UNPREDICTED if several else _NEVER):
         return False
     if missed <= (_WELL_PREDICTED if several else _UNPREDICTED):
         return True
     if causes > _FEW:
         return False
     return misses_alike(candidate, held_out, 0.0 if several else _SELDOM, rng)
-
-
-def _is_pressed(candidate: Candidate) -> bool:
-    """Whether a parameter wants to be beyond its plausible range: then the cause is another."""
-    best, fit = candidate.best, candidate.surface.fit
-    for at, amid in enumerate(candidate.hypothesis.amid, start=1):
-        inside, beyond = best.place.copy(), best.place.copy()
-        inside[at] += _INWARDS if inside[at] < 0.5 else -_INWARDS
-        beyond[at] = round(best.place[at])
-        off = abs(best.place[at] - beyond[at])
-        if off < _EDGE and fit(inside).log_likelihood < best.log_likelihood - HEAT:
-            return True
-        if amid and off < _TOWARDS and fit(beyond).log_likelihood > best.log_likelihood - _AS_GOOD:
-            return True
-    return False
 
 
 def _may_be_chance(simpler: Judged, best: Judged, rng: np.random.Generator) -> bool:
@@ -268,7 +245,7 @@ def _shares(scores: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _score(candidate: Candidate, held_out: HeldOut) -> float:
     sizes = candidate.best.place[1:]
-    bound = np.count_nonzero((sizes < _EDGE) | (sizes > 1.0 - _EDGE))
+    bound = np.count_nonzero((sizes < EDGE) | (sizes > 1.0 - EDGE))
     causes = len(candidate.hypothesis.effects)
     cost = _PER_CAUSE * causes + _PER_PARAMETER * len(sizes) + _AT_BOUND * bound
     if any(candidate.hypothesis.within_tolerance(candidate.best.place)):

@@ -302,9 +302,23 @@ def test_a_pair_is_compared_with_its_parts_in_every_round(monkeypatch, gap, roun
 
     fine = SimpleNamespace(found=standing, leading=leading, hear=lambda: None)
     monkeypatch.setattr(search, "_is_nothing_missing", lambda *_: False)
+    monkeypatch.setattr(search, "is_pressed", lambda _: False)
     monkeypatch.setattr(search, "_settle", lambda _, chosen: settled.append(chosen))
     assert search._compare(fine, None)
     assert settled == ([[pair, part]] if gap < 120.0 else [[pair]]) * rounds
+
+
+@pytest.mark.parametrize(("pressed", "rounds"), [("", 4), ("w", 1), ("l", 4), ("lw", 4)])
+def test_who_wants_a_size_that_no_bench_has_gets_one_round(monkeypatch, pressed, rounds):
+    """Unless the leader does so, too."""
+    leader, near, settled = ("load-inertia",), ("payload-flexibility",), []
+    found = {leader: "l", near: "w"}
+    fine = SimpleNamespace(found=found, leading=lambda *_: list(found), hear=lambda: None)
+    monkeypatch.setattr(search, "_is_nothing_missing", lambda *_: False)
+    monkeypatch.setattr(search, "is_pressed", lambda candidate: candidate in pressed)
+    monkeypatch.setattr(search, "_settle", lambda _, chosen: settled.append(chosen))
+    assert search._compare(fine, None)
+    assert settled == [[leader, near]] * rounds
 
 
 def test_who_has_runs_enough_gets_no_more_to_be_compared_by():

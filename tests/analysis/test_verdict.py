@@ -12,6 +12,7 @@ from analysis import adequacy
 from analysis.adequacy import judge_adequacy
 from analysis.holdout import hold_out
 from analysis.misfit import describe_departures, find_departures
+from analysis.plausibility import is_pressed
 from analysis.verdict import judge_candidates
 
 TRUE, WRONG = ("load-inertia",), ("shaft-stiffness",)
@@ -133,7 +134,7 @@ def test_a_size_that_wants_to_be_beyond_its_range_is_no_explanation(size, steep,
         best=fit(np.array([0.4, size])),
         surface=surface,
     )
-    assert rules._is_pressed(one) is pressed
+    assert is_pressed(one) is pressed
     held_out = SimpleNamespace(rms_sigma=1.0)
     assert rules._is_adequate(one, held_out, 0.0, np.random.default_rng(0)) is not pressed
 
@@ -154,8 +155,8 @@ def test_a_datasheet_value_that_may_be_half_or_twice_is_no_explanation(
         best = fit(np.array([0.4, 1.0 - size if mirrored else size]))
         return SimpleNamespace(hypothesis=hypothesis, best=best, surface=SimpleNamespace(fit=fit))
 
-    assert rules._is_pressed(judged(True)) is pressed
-    assert not rules._is_pressed(judged(False))
+    assert is_pressed(judged(True)) is pressed
+    assert not is_pressed(judged(False))
 
 
 @pytest.mark.parametrize(

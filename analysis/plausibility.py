@@ -1,0 +1,39 @@
+"""Whether a size wants to be where no bench has it: then the cause is another.
+
+Owns what "at the end of a plausible range" means. It simulates nothing and
+passes no verdict.
+"""
+
+from __future__ import annotations
+
+from analysis.candidate import Candidate
+from analysis.likelihood import HEAT
+
+__all__ = ["EDGE", "is_pressed"]
+
+EDGE = 0.02
+"""How near its end, as a share of its range, a size is at the end."""
+
+_INWARDS = 0.05
+"""How far inside it is put to see whether it is pressed against that end: whether that costs more
+than the heat, as it does not where the size says little."""
+
+_TOWARDS, _AS_GOOD = 0.15, 2.0 * HEAT
+"""How near to an end of its range a datasheet value is that may as well be there, half or twice of
+what it should be, and the log-likelihood by which the end must be worse (two standard
+deviations). A shaft that hardens is taken for one that is twice as stiff, or more."""
+
+
+def is_pressed(candidate: Candidate) -> bool:
+    """Whether a size wants to be beyond its plausible range, or may as well be at its end."""
+    best, fit = candidate.best, candidate.surface.fit
+    for at, amid in enumerate(candidate.hypothesis.amid, start=1):
+        inside, beyond = best.place.copy(), best.place.copy()
+        inside[at] += _INWARDS if inside[at] < 0.5 else -_INWARDS
+        beyond[at] = round(best.place[at])
+        off = abs(best.place[at] - beyond[at])
+        if off < EDGE and fit(inside).log_likelihood < best.log_likelihood - HEAT:
+            return True
+        if amid and off < _TOWARDS and fit(beyond).log_likelihood > best.log_likelihood - _AS_GOOD:
+            return True
+    return False
