@@ -60,6 +60,10 @@ once more: at most so many, the parts of a leading pair and the baseline, in so 
 Where none is close all but the first are spared.
 """
 
+_IN_EARNEST = 2
+"""Rounds after which it is believed that a set wants a size which no bench has; fewer runs may
+only seem to say so."""
+
 _ENOUGH = 320
 """Runs of a hypothesis from which on it gets no more to be compared by."""
 
@@ -269,9 +273,10 @@ def _compare(fine: Hunt, rng: np.random.Generator) -> bool:
         # a true cause of several parameters has been beaten by itself and another.
         parts = set(_parts(leader, fine.found))
         near += sorted(parts & set(fine.leading(len(fine.found), _NEAR)))
-        if done and not is_pressed(fine.found[leader]):
-            # Who wants a size that no bench has will be no rival, however near.
-            near = [key for key in near if not is_pressed(fine.found[key])]
+        if done >= _IN_EARNEST:
+            # Who wants a size that no bench has is no explanation, however well it fits.
+            plausible = [key for key in [leader, *near] if not is_pressed(fine.found[key])]
+            leader, *near = plausible or [leader, *near]
         if done and not near:
             break
         near += [key for key in fine.leading(len(fine.found), behind) if not key]

@@ -308,11 +308,15 @@ def test_a_pair_is_compared_with_its_parts_in_every_round(monkeypatch, gap, roun
     assert settled == ([[pair, part]] if gap < 120.0 else [[pair]]) * rounds
 
 
-@pytest.mark.parametrize(("pressed", "rounds"), [("", 4), ("w", 1), ("l", 4), ("lw", 4)])
-def test_who_wants_a_size_that_no_bench_has_gets_one_round(monkeypatch, pressed, rounds):
-    """Unless the leader does so, too."""
+@pytest.mark.parametrize(
+    ("pressed", "rounds"), [("", 4), ("near", 2), ("leader", 2), ("leader near", 4)]
+)
+def test_who_wants_a_size_that_no_bench_has_is_left_aside_after_two_rounds(
+    monkeypatch, pressed, rounds
+):
+    """Unless all do."""
     leader, near, settled = ("load-inertia",), ("payload-flexibility",), []
-    found = {leader: "l", near: "w"}
+    found = {leader: "leader", near: "near"}
     fine = SimpleNamespace(found=found, leading=lambda *_: list(found), hear=lambda: None)
     monkeypatch.setattr(search, "_is_nothing_missing", lambda *_: False)
     monkeypatch.setattr(search, "is_pressed", lambda candidate: candidate in pressed)
