@@ -65,6 +65,7 @@ def test_a_large_effect_drawn_at_random_is_named(cache):
         assert found.next_measurement is not None
 
 
+@pytest.mark.study
 def test_nothing_is_blamed_where_nothing_is_hidden(cache):
     seed = int(np.random.SeedSequence().entropy % 2**31)
     print(f"seed {seed}")
@@ -134,10 +135,6 @@ def test_one_level_without_phase_still_gets_a_verdict_and_asks_for_more(cache):
     json.dumps(document, allow_nan=False)
 
 
-NEAR_TIES = {"01": {"ambiguous"}}
-"""A heavily damped payload below the band acts much as the viscous damper that it is taken for."""
-
-
 QUICK = ("09",)
 """Sets of every test run; the others are judged by `make blind`."""
 
@@ -169,15 +166,14 @@ def judge_practice(number, response, cache, folder):
     unit = load_unit(truth["unit"].lower())
     found = diagnose_response(response, unit, cache=cache)
     document = json.loads(json.dumps(found.to_json(), allow_nan=False))
-    words = {"consistent"} if not truth["effects"] else {"explained"}
-    assert document["verdict"] in words | NEAR_TIES.get(number, set())
+    assert document["verdict"] == ("explained" if truth["effects"] else "consistent")
     named = {cause["effect"]: cause["parameters"] for cause in document["causes"]}
     assert set(named) == set(truth["effects"])
     for effect, values in truth["effects"].items():
         for name, value in values.items():
-            assert named[effect][name]["value"] == pytest.approx(value, rel=0.2)
+            assert named[effect][name]["value"] == pytest.approx(value, rel=0.15)
     ratio = document["contribution_ratio"]["extended"]
-    assert abs(ratio["value"] - truth["contribution_ratio"]) < max(0.06, 2.5 * ratio["std"])
+    assert abs(ratio["value"] - truth["contribution_ratio"]) < 0.06
     assert document["extended"]["held_out_rms_sigma"] < 1.3
     assert "\n".join(found.summary())
     for path in draw_diagnosis(found, folder):
