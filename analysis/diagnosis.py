@@ -166,8 +166,8 @@ class Diagnosis:
         lines.append("  sets judged, by probability:")
         for one in self.verdict.judged:
             name = " + ".join(one.effects) or "nothing hidden"
-            unlike = "  (does not look like its own runs)" if one.unlike else ""
-            lines.append(f"    {one.probability:6.3f}  {name}{unlike}")
+            against = f"  ({one.objection})" if one.refused else ""
+            lines.append(f"    {one.probability:6.3f}  {name}{against}")
         if self.next_measurement is not None:
             proposal = self.next_measurement
             lines.append(

@@ -96,12 +96,12 @@ def probability_figure(diagnosis: Diagnosis) -> Figure:
             row,
             max(one.probability, _NARROWEST_SHARE),
             color=_EXTENDED if one is diagnosis.verdict.best else "#999999",
-            hatch="///" if one.unlike else None,
+            hatch="///" if one.refused else None,
         )
         axes.text(1.02, row, f"{one.probability:.3f}", va="center", fontsize=8)
     axes.set_yticks(range(len(judged)), names, fontsize=8)
     axes.invert_yaxis()
     axes.set_xlim(0.0, 1.15)
-    axes.set_xlabel("probability among the sets judged (hatched: unlike its own runs)")
+    axes.set_xlabel("probability among the sets judged (hatched: no explanation)")
     axes.set_title(f"{diagnosis.unit}: {diagnosis.verdict.word}", fontsize=11)
     return figure

@@ -88,14 +88,16 @@ that fitted where one of them was another's stand-in missed them by 1.13 and 1.2
 
 _JUDGED = 6
 
+_NOT_ASKED = "too far behind to be asked"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Judged:
-    """A candidate with its score, its probability among those judged and how adequate it is.
+    """A candidate with its score, its probability among those judged and what speaks against it.
 
     `misfit`: standard deviations by which it is fitted worse than runs of its
-    own, NaN where that was not asked of a set far behind. `adequate`: whether
-    the observation looks like one of them, as far as that was asked.
+    own, NaN where that was not asked of a set far behind. `objection`: why it
+    is no explanation, empty where it may be one.
     """
 
     candidate: Candidate
@@ -103,7 +105,7 @@ class Judged:
     score: float
     misfit: float
     probability: float
-    adequate: bool
+    objection: str
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -111,9 +113,14 @@ class Judged:
         return self.candidate.hypothesis.effects
 
     @property
-    def unlike(self) -> bool:
-        """Whether it was asked, and the observation does not look like one of its own runs."""
-        return not self.adequate and not np.isnan(self.misfit)
+    def adequate(self) -> bool:
+        """Whether it may be the explanation, as far as that was asked."""
+        return not self.objection
+
+    @property
+    def refused(self) -> bool:
+        """Whether it was asked, and something speaks against it."""
+        return self.objection not in ("", _NOT_ASKED)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -161,8 +168,8 @@ def judge_candidates(
         near = _PART if set(c.hypothesis.effects) < leader else _SURE
         asked = score > scores.max() - near or not c.hypothesis.effects
         misfit = judge_adequacy(c, rng).sigma if asked else np.nan
-        adequate = asked and _is_adequate(c, h, misfit, rng)
-        judged.append(Judged(c, h, float(score), misfit, float(share), adequate))
+        objection = _find_objection(c, h, misfit, rng) if asked else _NOT_ASKED
+        judged.append(Judged(c, h, float(score), misfit, float(share), objection))
     judged.sort(key=lambda one: -one.score)
     (baseline,) = (one for one in judged if not one.effects)
     best = _simplest(judged, rng)
@@ -184,18 +191,23 @@ def judge_candidates(
     return verdict
 
 
-def _is_adequate(
+def _find_objection(
     candidate: Candidate, held_out: HeldOut, misfit: float, rng: np.random.Generator
-) -> bool:
+) -> str:
     causes, missed = len(candidate.hypothesis.effects), held_out.rms_sigma
     several = causes > 1
-    if misfit > _UNLIKE or is_pressed(candidate) or missed > (_UNPREDICTED if several else _NEVER):
-        return False
-    if missed <= (_WELL_PREDICTED if several else _UNPREDICTED):
-        return True
-    if causes > _FEW:
-        return False
-    return misses_alike(candidate, held_out, 0.0 if several else _SELDOM, rng)
+    if misfit > _UNLIKE:
+        return "does not look like its own runs"
+    if is_pressed(candidate):
+        return "wants a size that no bench has"
+    predicted = missed <= (_WELL_PREDICTED if several else _UNPREDICTED)
+    if not predicted and (
+        missed > (_UNPREDICTED if several else _NEVER)
+        or causes > _FEW
+        or not misses_alike(candidate, held_out, 0.0 if several else _SELDOM, rng)
+    ):
+        return "does not predict the other levels"
+    return ""
 
 
 def _may_be_chance(simpler: Judged, best: Judged, rng: np.random.Generator) -> bool:

@@ -47,7 +47,7 @@ def test_sets_far_behind_are_not_held_against_runs_of_their_own_but_the_baseline
         assert (one in asked) == (one is verdict.baseline or one not in far)
         if one not in asked:
             assert not one.adequate
-            assert not one.unlike, "nobody asked whether it looks like its own runs"
+            assert not one.refused, "nobody asked whether it looks like its own runs"
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -101,7 +101,8 @@ def test_two_causes_that_look_the_same_are_both_named(monkeypatch):
 )
 def test_that_nothing_is_hidden_is_a_rival_while_it_has_a_twentieth(lead, adequate, rivals):
     found = judge(seen(TRUE, 1), ((), TRUE), 1)
-    plain = replace(found.baseline, score=found.best.score - lead, adequate=adequate)
+    against = "" if adequate else "does not look like its own runs"
+    plain = replace(found.baseline, score=found.best.score - lead, objection=against)
     verdict = replace(found, judged=(found.best, plain), baseline=plain)
     assert [one.effects for one in verdict.rivals] == rivals
 
@@ -113,7 +114,8 @@ def test_that_nothing_is_hidden_is_a_rival_while_it_has_a_twentieth(lead, adequa
 def test_another_set_is_a_rival_while_it_has_a_seventh_and_explains(behind, adequate, rivals):
     found = judge(seen(TRUE, 1), ((), TRUE, WRONG), 1)
     (wrong,) = (one for one in found.judged if one.effects == WRONG)
-    near = replace(wrong, score=found.best.score - behind, adequate=adequate)
+    against = "" if adequate else "wants a size that no bench has"
+    near = replace(wrong, score=found.best.score - behind, objection=against)
     verdict = replace(found, judged=(found.best, near, found.baseline))
     assert [one.effects for one in verdict.rivals] == rivals
 
@@ -136,7 +138,8 @@ def test_a_size_that_wants_to_be_beyond_its_range_is_no_explanation(size, steep,
     )
     assert is_pressed(one) is pressed
     held_out = SimpleNamespace(rms_sigma=1.0)
-    assert rules._is_adequate(one, held_out, 0.0, np.random.default_rng(0)) is not pressed
+    against = rules._find_objection(one, held_out, 0.0, np.random.default_rng(0))
+    assert against == ("wants a size that no bench has" if pressed else "")
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -175,9 +178,9 @@ def test_a_pair_that_nothing_calls_for_or_that_leads_by_chance_is_not_believed(
 ):
     found = judge(seen(TRUE, 1), ((), TRUE, (*TRUE, *WRONG)), 1)
     pair, part = (next(o for o in found.judged if o.effects == e) for e in (TRUE + WRONG, TRUE))
-    pair = replace(pair, score=part.score + lead, adequate=True)
+    pair = replace(pair, score=part.score + lead, objection="")
     predicted = SimpleNamespace(rms_sigma=missed)
-    part = replace(part, misfit=0.0, adequate=True, held_out=predicted)
+    part = replace(part, misfit=0.0, objection="", held_out=predicted)
 
     def chance(simpler, alleged, rng):
         assert (simpler, alleged) == (part.candidate, pair.candidate)
@@ -188,7 +191,7 @@ def test_a_pair_that_nothing_calls_for_or_that_leads_by_chance_is_not_believed(
     best = rules._simplest([pair, part, found.baseline], rng)
     assert best.effects == named
     # A part that looks like none of its own runs has nothing to say on that.
-    assert rules._simplest([pair, replace(part, misfit=4.1, adequate=False)], rng) is pair
+    assert rules._simplest([pair, replace(part, misfit=4.1, objection="no")], rng) is pair
     first, second = rules._put_behind([pair, part], best)
     assert first.effects == named
     assert first.probability > 0.75
@@ -224,8 +227,10 @@ def test_what_misses_other_levels_must_have_own_runs_that_do(
     candidate = SimpleNamespace(hypothesis=hypothesis, best=best, surface=SimpleNamespace(fit=None))
     rng = np.random.default_rng(0)
     held_out = SimpleNamespace(rms_sigma=missed)
-    assert rules._is_adequate(candidate, held_out, 0.0, rng) is adequate
-    assert rules._is_adequate(candidate, held_out, 4.1, rng) is False
+    against = "" if adequate else "does not predict the other levels"
+    assert rules._find_objection(candidate, held_out, 0.0, rng) == against
+    unlike = rules._find_objection(candidate, held_out, 4.1, rng)
+    assert unlike == "does not look like its own runs"
 
 
 @pytest.mark.parametrize(
