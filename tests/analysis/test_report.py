@@ -148,6 +148,12 @@ def test_every_verdict_has_its_words(report, monkeypatch, hidden, judged, verdic
     _, page = report(diagnosis=found)
     assert said in page.text
     assert page.text.count("Departures left") == (verdict == "explained")
+    told = found.summary()
+    for one in found.verdict.judged:
+        name = " + ".join(one.effects) or "nothing hidden"
+        (line,) = (text for text in told if text.startswith(f"    {one.probability:6.3f}  {name}"))
+        assert line.endswith(f"  ({one.objection})") == one.refused
+        assert not one.refused or verdict != "consistent" or one.effects
 
 
 def test_a_tie_is_told_with_the_sweep_that_would_break_it(report):
