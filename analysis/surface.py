@@ -236,8 +236,8 @@ class Surface:
     def shares(self, fits: Sequence[Fit]) -> NDArray[np.float64]:
         """How much each place (count,) of a walk is believed, by the rows it was fitted to.
 
-        Weights of importance: steps were drawn from ever smaller boxes about the best place, so
-        that near it there are more places than it is more likely.
+        Weights of importance: as steps shrink, a walk looks more often near the best place than
+        that place is likely, so that each fit counts less by as much.
         """
         best = max(fits, key=lambda fit: fit.log_likelihood)
         span = np.maximum(np.ptp(self.places, axis=0), 1e-9)
