@@ -94,15 +94,16 @@ def test_two_causes_are_found_together(runs, seed):
     assert (verdict.word, verdict.best.effects) == ("explained", pair)
 
 
-@pytest.mark.parametrize("seed", [1])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_three_causes_are_found_together(runs, seed):
+    """Seeds 1 to 6 all find them, three of six with the word "explained"; 1 is farthest off."""
     three = ("amplifier-lag", "load-inertia", "mesh1-damping")
     _, verdict = diagnosed(three, [0.8, 0.3, 0.7], seed)
     # They miss the other level by one standard deviation or so: of three causes no more is taken,
     # so that a true set of three may be called unexplained.
     assert verdict.word in ("explained", "unexplained")
     assert verdict.best.effects == three
-    assert verdict.best.candidate.best.place == pytest.approx([0.4, 0.8, 0.3, 0.7], abs=0.2)
+    assert verdict.best.candidate.best.place == pytest.approx([0.4, 0.8, 0.3, 0.7], abs=0.15)
 
 
 @pytest.mark.parametrize("seed", [1, 2])
