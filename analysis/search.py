@@ -34,13 +34,18 @@ _THIRD, _THIRD_GROUPS = 4, 4
 """How many hypotheses are looked at in each round, and in how many groups of runs each."""
 
 _PAIRS, _PARTNERS, _GLANCE_FREQUENCIES, _GLANCE_GROUPS = 20, 10, 10, 2
-_PAIRS_CLOSER, _PAIRS_AFTER, _PAIR_GROUPS = 12, 8, (2, 3)
+_PAIRS_CLOSER, _PAIRS_AFTER, _PAIR_GROUPS = 10, 5, (2, 3)
 """Pairs that the atlas favours, and more of those with the leader in them; at how many frequencies
 they are simulated at first, and in how many groups; how many are looked at closer, twice.
 
 What two causes do together is seldom the sum of what each does: of eleven true pairs the coarse
-look put seven among its first four, the others down to the 27th place.
+look put seven among its first four, the others down to the 27th place. Few runs rank them by
+chance: what is lost here, `_swap_one` finds again.
 """
+
+_SWAPS, _SWAPS_CLOSER, _SWAP_ROUNDS = 8, 4, 2
+"""Pairs with each cause of the leading one that are looked at then, how many of them closer, and
+how often, where one of them takes the lead."""
 
 _BESIDE, _BESIDE_CLOSER, _BESIDE_GROUPS = (5, 8), (2, 4), (2, 4)
 """The same for pairs with a leader that is not doubted, and where it predicts worse than true
@@ -150,17 +155,16 @@ def search_causes(
         part_of(progress, 0.6, 1.0, "looking closer"),
         rough.observation.noise_v,
     )
-    third = _third(rough)
-    fine.take_over([rough.found[key] for key in third], _THIRD_GROUPS)
+    # Where all rows cast doubt on the leader who is next to it is not worth as many runs.
+    fine.take_over([rough.found[_third(rough)[0]]], _THIRD_GROUPS)
     fine.hear()
     while True:
         if not doubted and _is_doubtful(fine.best, rng):
-            # More rows, or more runs, show that a single cause will not do after all.
             doubted = True
             _search_pairs(rough, atlas)
-            pairs = [key for key in _third(rough) if key not in fine.found]
-            fine.take_over([rough.found[key] for key in pairs], _THIRD_GROUPS)
-            fine.hear()
+        others = [key for key in _third(rough) if key not in fine.found]
+        fine.take_over([rough.found[key] for key in others], _THIRD_GROUPS)
+        fine.hear()
         if _is_doubtful(fine.best, rng):
             # Parameters trade off in ways that evenly placed runs miss: a second chance.
             leading = [key for key in fine.leading(len(fine.found), _HOPELESS) if key]
@@ -248,7 +252,9 @@ def _weigh_parts(fine: Hunt) -> None:
     }
     if places:
         fine.start(places, _LAST_GROUPS)
-        fine.settle(list(places), _LAST_GROUPS)
+        fine.settle(
+            [key for key in fine.leading(len(fine.found), _NEAR) if key in places], _LAST_GROUPS
+        )
         fine.hear()
 
 
@@ -294,8 +300,8 @@ def _singles(coarse: Observation, atlas: Atlas) -> Starts:
 def _search_pairs(rough: Hunt, atlas: Atlas) -> None:
     """Look at the pairs that the atlas favours, ever fewer of them ever closer."""
     places = screen_pairs(rough.observation, atlas)
-    ranked, leader = _ranked(places), rough.best_single[0]
-    partners = [key for key in ranked if leader in key]
+    ranked = _ranked(places)
+    partners = [key for key in ranked if rough.best_single[0] in key]
     if not ranked:
         return
     glance = rough.thinned(coarse_stride(rough.observation, _GLANCE_FREQUENCIES))
@@ -304,10 +310,38 @@ def _search_pairs(rough: Hunt, atlas: Atlas) -> None:
     closer = [glance.found[key] for key in glance.leading(_PAIRS_CLOSER)]
     rough.take_over(closer, _PAIR_GROUPS[0])
     rough.look_closer(_among(rough, chosen)[:_PAIRS_AFTER], _PAIR_GROUPS[1])
-    # A part may do as well where the pair has it, and only have been looked at elsewhere.
-    best = rough.found[_among(rough, chosen)[0]]
-    rough.start(_places_of_parts(best), _PAIR_GROUPS[1])
+    leader = _among(rough, chosen)[0]
+    _look_at_parts(rough, leader)
+    for _ in range(_SWAP_ROUNDS):
+        chosen |= dict.fromkeys(_swap_one(rough, atlas, leader))
+        before, leader = leader, _among(rough, chosen)[0]
+        if leader == before:
+            break
+        _look_at_parts(rough, leader)
+
+
+def _look_at_parts(rough: Hunt, leader: Effects) -> None:
+    """A part may do as well where the pair has it, and only have been looked at elsewhere."""
+    rough.start(_places_of_parts(rough.found[leader]), _PAIR_GROUPS[1])
     rough.hear()
+
+
+def _swap_one(rough: Hunt, atlas: Atlas, leader: Effects) -> list[Effects]:
+    """Look at pairs that share a cause with the leading one, as nearly every true pair does.
+
+    What one cause does where the leader has it tells better than the atlas what a second adds.
+    """
+    places: dict[Effects, Place] = {}
+    for part in _parts(leader, rough.found):
+        further = screen_further(rough.observation, atlas, rough.found[part])
+        unseen = [key for key in _ranked(further) if key not in rough.found]
+        places |= {key: further[key] for key in unseen[:_SWAPS]}
+    glance = rough.thinned(coarse_stride(rough.observation, _GLANCE_FREQUENCIES))
+    glance.start({key: one.place for key, one in places.items()}, _GLANCE_GROUPS)
+    closer = glance.leading(_SWAPS_CLOSER)
+    rough.take_over([glance.found[key] for key in closer], sum(_PAIR_GROUPS))
+    rough.hear()
+    return closer
 
 
 def _ranked(places: Mapping[Effects, Place]) -> list[Effects]:

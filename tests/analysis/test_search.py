@@ -94,6 +94,22 @@ def test_two_causes_are_found_together(runs, seed):
     assert (verdict.word, verdict.best.effects) == ("explained", pair)
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_pair_that_the_coarse_look_passes_over_is_found_beside_one_of_its_causes(
+    runs, monkeypatch, seed
+):
+    pair = ("amplifier-lag", "load-inertia")
+
+    def blind_to_it(*given):
+        places = search_pairs_of_atlas(*given)
+        return {key: place for key, place in places.items() if key != pair}
+
+    search_pairs_of_atlas = search.screen_pairs
+    monkeypatch.setattr(search, "screen_pairs", blind_to_it)
+    _, verdict = diagnosed(pair, [0.8, 0.3], seed)
+    assert (verdict.word, verdict.best.effects) == ("explained", pair)
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 def test_three_causes_are_found_together(runs, seed):
     """Seeds 1 to 6 all find them, three of six with the word "explained"; 1 is farthest off."""
