@@ -36,12 +36,8 @@ _THIRD, _THIRD_GROUPS = 4, 4
 _PAIRS, _PARTNERS, _GLANCE_FREQUENCIES, _GLANCE_GROUPS = 20, 10, 10, 2
 _PAIRS_CLOSER, _PAIRS_AFTER, _PAIR_GROUPS = 10, 5, (2, 3)
 """Pairs that the atlas favours, and more of those with the leader in them; at how many frequencies
-they are simulated at first, and in how many groups; how many are looked at closer, twice.
-
-What two causes do together is seldom the sum of what each does: of eleven true pairs the coarse
-look put seven among its first four, the others down to the 27th place. Few runs rank them by
-chance: what is lost here, `_swap_one` finds again.
-"""
+they are simulated at first, and in how many groups; how many are looked at closer, twice. What
+two causes do together is seldom the sum of what each does, and few runs rank them by chance."""
 
 _SWAPS, _SWAPS_CLOSER, _SWAP_ROUNDS = 8, 4, 2
 """Pairs with each cause of the leading one that are looked at then, how many of them closer, and
@@ -94,8 +90,8 @@ any where that part predicts badly, for pairs are looked at in coarser steps."""
 
 _PREDICTED, _NOT_PREDICTED, _MORE_ROUNDS, _ROUNDS_ALONE = 1.3, 2.5, 3, 7
 """What a leader misses of levels not fitted, in standard deviations, from which it gets more runs
-and up to which that may help; and how many times it gets them, or one that leaves all others
-far behind: a pair with four parameters took six rounds to be seen as the truth that it was."""
+and up to which that may help; how many times, and how many where it leaves all others far behind:
+a pair with four parameters took six rounds to be seen as the truth that it was."""
 
 _COMMON = 0.2
 """Share of the baseline's own runs that the leader explains better by as much, from which on there
@@ -309,12 +305,15 @@ def _search_pairs(rough: Hunt, atlas: Atlas) -> None:
     glance.start({key: places[key].place for key in chosen}, _GLANCE_GROUPS)
     closer = [glance.found[key] for key in glance.leading(_PAIRS_CLOSER)]
     rough.take_over(closer, _PAIR_GROUPS[0])
-    rough.look_closer(_among(rough, chosen)[:_PAIRS_AFTER], _PAIR_GROUPS[1])
-    leader = _among(rough, chosen)[0]
+    looked_at = set(_among(rough, chosen)[:_PAIRS_AFTER])
+    rough.look_closer(sorted(looked_at), _PAIR_GROUPS[1])
+    leader, asked = _among(rough, looked_at)[0], set[Effects]()
     _look_at_parts(rough, leader)
     for _ in range(_SWAP_ROUNDS):
-        chosen |= dict.fromkeys(_swap_one(rough, atlas, leader))
-        before, leader = leader, _among(rough, chosen)[0]
+        kept = [part for part in _parts(leader, rough.found) if part not in asked]
+        looked_at |= _swap_one(rough, atlas, kept, looked_at)
+        asked |= set(kept)
+        before, leader = leader, _among(rough, looked_at)[0]
         if leader == before:
             break
         _look_at_parts(rough, leader)
@@ -326,22 +325,24 @@ def _look_at_parts(rough: Hunt, leader: Effects) -> None:
     rough.hear()
 
 
-def _swap_one(rough: Hunt, atlas: Atlas, leader: Effects) -> list[Effects]:
-    """Look at pairs that share a cause with the leading one, as nearly every true pair does.
+def _swap_one(
+    rough: Hunt, atlas: Atlas, kept: Sequence[Effects], looked_at: Collection[Effects]
+) -> set[Effects]:
+    """Look at others beside what is kept of a leading pair: true pairs nearly all share a cause.
 
-    What one cause does where the leader has it tells better than the atlas what a second adds.
+    What it does where the leader has it tells better than the atlas what a second adds.
     """
     places: dict[Effects, Place] = {}
-    for part in _parts(leader, rough.found):
+    for part in kept:
         further = screen_further(rough.observation, atlas, rough.found[part])
-        unseen = [key for key in _ranked(further) if key not in rough.found]
-        places |= {key: further[key] for key in unseen[:_SWAPS]}
+        others = [key for key in _ranked(further) if key not in looked_at]
+        places |= {key: further[key] for key in others[:_SWAPS]}
     glance = rough.thinned(coarse_stride(rough.observation, _GLANCE_FREQUENCIES))
     glance.start({key: one.place for key, one in places.items()}, _GLANCE_GROUPS)
     closer = glance.leading(_SWAPS_CLOSER)
     rough.take_over([glance.found[key] for key in closer], sum(_PAIR_GROUPS))
     rough.hear()
-    return closer
+    return set(closer)
 
 
 def _ranked(places: Mapping[Effects, Place]) -> list[Effects]:
