@@ -94,7 +94,7 @@ def test_two_causes_are_found_together(runs, seed):
     assert (verdict.word, verdict.best.effects) == ("explained", pair)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_a_pair_that_the_coarse_look_passes_over_is_found_beside_one_of_its_causes(
     runs, monkeypatch, seed
 ):
