@@ -72,8 +72,8 @@ _CHANCES = 4
 """Hypotheses that are looked at once more where none fits yet."""
 
 _TOO_FAR, _HOPELESS = 200.0, 300.0
-"""Log-likelihood behind the leader from which the second and the third round leave one out, and
-from which there is no second chance."""
+"""Log-likelihood behind the leader from which the second and the third round leave one out, and the
+last ones its parts, and from which there is no second chance."""
 
 _DOUBT = 2.0
 """Misfit of the best single cause, in standard deviations, from which pairs are tried; and the
@@ -248,9 +248,8 @@ def _weigh_parts(fine: Hunt) -> None:
     }
     if places:
         fine.start(places, _LAST_GROUPS)
-        fine.settle(
-            [key for key in fine.leading(len(fine.found), _NEAR) if key in places], _LAST_GROUPS
-        )
+        hopeful = fine.leading(len(fine.found), _HOPELESS)
+        fine.settle([key for key in hopeful if key in places], _LAST_GROUPS)
         fine.hear()
 
 
@@ -274,7 +273,7 @@ def _compare(fine: Hunt, rng: np.random.Generator) -> bool:
         # The parts of a pair count in every round, even where others lie before them: with few runs
         # a true cause of several parameters has been beaten by itself and another.
         parts = set(_parts(leader, fine.found))
-        near += sorted(parts & set(fine.leading(len(fine.found), _NEAR)))
+        near += sorted(parts & set(fine.leading(len(fine.found), _TOO_FAR)))
         if done >= _IN_EARNEST:
             # Who wants a size that no bench has is no explanation, however well it fits.
             plausible = [key for key in [leader, *near] if not is_pressed(fine.found[key])]
@@ -310,6 +309,8 @@ def _search_pairs(rough: Hunt, atlas: Atlas) -> None:
     leader, asked = _among(rough, looked_at)[0], set[Effects]()
     _look_at_parts(rough, leader)
     for _ in range(_SWAP_ROUNDS):
+        if not _earns(leader, rough.found):
+            break  # One of its causes does as well alone.
         kept = [part for part in _parts(leader, rough.found) if part not in asked]
         looked_at |= _swap_one(rough, atlas, kept, looked_at)
         asked |= set(kept)

@@ -309,7 +309,7 @@ def test_a_leader_that_predicts_badly_gets_more_runs(monkeypatch, missed, second
     assert settled == [[leader]] * rounds
 
 
-@pytest.mark.parametrize(("gap", "rounds"), [(50.0, 4), (119.0, 4), (121.0, 1)])
+@pytest.mark.parametrize(("gap", "rounds"), [(50.0, 4), (199.0, 4), (201.0, 1)])
 def test_a_pair_is_compared_with_its_parts_in_every_round(monkeypatch, gap, rounds):
     pair, part, settled = ("amplifier-lag", "load-inertia"), ("load-inertia",), []
     standing = {pair: 300.0, part: 300.0 - gap, (): 0.0}
@@ -322,7 +322,7 @@ def test_a_pair_is_compared_with_its_parts_in_every_round(monkeypatch, gap, roun
     monkeypatch.setattr(search, "is_pressed", lambda _: False)
     monkeypatch.setattr(search, "_settle", lambda _, chosen: settled.append(chosen))
     assert search._compare(fine, None)
-    assert settled == ([[pair, part]] if gap < 120.0 else [[pair]]) * rounds
+    assert settled == ([[pair, part]] if gap < 200.0 else [[pair]]) * rounds
 
 
 @pytest.mark.parametrize(
