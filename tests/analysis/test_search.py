@@ -13,6 +13,7 @@ from analysis.executor import LocalExecutor
 from analysis.observation import USUAL_NOISE_V
 from analysis.population import Population
 from analysis.verdict import judge_candidates
+from sim.catalogue import CATALOGUE
 
 ADSS = synthetic.ADSS
 
@@ -107,6 +108,12 @@ def test_a_pair_that_the_coarse_look_passes_over_is_found_beside_one_of_its_caus
     search_pairs_of_atlas = search.screen_pairs
     monkeypatch.setattr(search, "screen_pairs", blind_to_it)
     _, verdict = diagnosed(pair, [0.8, 0.3], seed)
+    assert (verdict.word, verdict.best.effects) == ("explained", pair)
+
+
+def test_a_pair_is_found_where_there_are_no_others_to_hold_it_against(runs):
+    pair = ("amplifier-lag", "load-inertia")
+    _, verdict = diagnosed(pair, [0.8, 0.3], 1, without=set(CATALOGUE) - set(pair))
     assert (verdict.word, verdict.best.effects) == ("explained", pair)
 
 
