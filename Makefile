@@ -43,7 +43,8 @@ bench: $(READY)
 	@for script in $(wildcard tests/benchmarks/*.py); do $(BIN)/python $$script || exit 1; done
 
 blind: $(READY)
-	@$(BIN)/python -m pytest -m study tests/analysis/test_diagnosis.py tests/analysis/test_estimate.py
+	@$(BIN)/python -m pytest -m study tests/analysis/test_diagnosis.py tests/analysis/test_estimate.py \
+	  tests/analysis/test_search.py
 	@$(BIN)/python tests/campaigns/blind_study.py
 	@$(BIN)/python tests/campaigns/ties.py
 	@$(BIN)/python tests/campaigns/smallest.py
