@@ -109,6 +109,8 @@ def test_a_pair_that_the_coarse_look_passes_over_is_found_beside_one_of_its_caus
 
     search_pairs_of_atlas = search.screen_pairs
     monkeypatch.setattr(search, "screen_pairs", blind_to_it)
+    # Nor by way of sets of three, whose parts are looked at, too.
+    monkeypatch.setattr(search, "_TRIPLES", 0)
     _, verdict = diagnosed(pair, [0.8, 0.3], seed)
     assert (verdict.word, verdict.best.effects) == ("explained", pair)
 
