@@ -151,16 +151,17 @@ def search_causes(
         part_of(progress, 0.6, 1.0, "looking closer"),
         rough.observation.noise_v,
     )
-    # Where all rows cast doubt on the leader who is next to it is not worth as many runs.
-    fine.take_over([rough.found[_third(rough)[0]]], _THIRD_GROUPS)
+    third = _third(rough)
+    fine.take_over([rough.found[key] for key in third], _THIRD_GROUPS)
     fine.hear()
     while True:
         if not doubted and _is_doubtful(fine.best, rng):
+            # More rows, or more runs, show that a single cause will not do after all.
             doubted = True
             _search_pairs(rough, atlas)
-        others = [key for key in _third(rough) if key not in fine.found]
-        fine.take_over([rough.found[key] for key in others], _THIRD_GROUPS)
-        fine.hear()
+            pairs = [key for key in _third(rough) if key not in fine.found]
+            fine.take_over([rough.found[key] for key in pairs], _THIRD_GROUPS)
+            fine.hear()
         if _is_doubtful(fine.best, rng):
             # Parameters trade off in ways that evenly placed runs miss: a second chance.
             leading = [key for key in fine.leading(len(fine.found), _HOPELESS) if key]
