@@ -7,7 +7,7 @@ does not decide what to look at.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -68,6 +68,10 @@ class Hunt:
         likelihood = {key: c.best.log_likelihood for key, c in self.found.items()}
         ranked = sorted(likelihood, key=lambda key: -likelihood[key])
         return [k for k in ranked[:most] if likelihood[k] >= likelihood[ranked[0]] - behind]
+
+    def among(self, keys: Collection[Effects]) -> list[Effects]:
+        """Those of some hypotheses that were simulated, the most likely first."""
+        return [key for key in self.leading(len(self.found)) if key in keys]
 
     def thinned(self, stride: int) -> Hunt:
         """A hunt on every so manieth of the frequencies, with nothing simulated yet."""

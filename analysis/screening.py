@@ -10,7 +10,7 @@ of a pair showed. It simulates nothing itself.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -25,7 +25,7 @@ from analysis.observation import Observation
 from analysis.population import Population
 from analysis.surface import Surface, differences
 
-__all__ = ["Place", "screen_further", "screen_pairs", "screen_singles"]
+__all__ = ["Place", "ranked", "screen_further", "screen_pairs", "screen_singles"]
 
 _WIDTHS = {1: (0.06,), 2: (0.1, 0.13), 3: (0.12, 0.15, 0.2), 4: (0.15, 0.25, 0.08, 1.0)}
 """Distances over which a coarse surface reaches, by number of coordinates."""
@@ -48,6 +48,11 @@ class Place:
 
     place: NDArray[np.float64]
     log_likelihood: float
+
+
+def ranked(places: Mapping[Effects, Place]) -> list[Effects]:
+    """Hypotheses, the most likely by the coarse look first."""
+    return sorted(places, key=lambda key: -places[key].log_likelihood)
 
 
 def screen_singles(coarse: Observation, atlas: Atlas) -> dict[Effects, Place]:

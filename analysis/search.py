@@ -8,8 +8,7 @@ It compares hypotheses to decide where to look next, and passes no verdict.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from itertools import chain, combinations
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,9 +20,11 @@ from analysis.executor import Executor
 from analysis.holdout import AT_NOISE, hold_out
 from analysis.hunt import Hunt, Starts
 from analysis.observation import Observation
+from analysis.pairs import search_pairs
+from analysis.parts import earns, parts_of, places_of_parts
 from analysis.plausibility import is_pressed
 from analysis.progress import Progress, part_of
-from analysis.screening import Place, screen_further, screen_pairs, screen_singles
+from analysis.screening import ranked, screen_further, screen_pairs, screen_singles
 from sim.unit import Unit
 
 __all__ = ["search_causes"]
@@ -33,26 +34,12 @@ _SECOND, _SECOND_GROUPS = 5, 4
 _THIRD, _THIRD_GROUPS = 4, 4
 """How many hypotheses are looked at in each round, and in how many groups of runs each."""
 
-_PAIRS, _PARTNERS, _GLANCE_FREQUENCIES, _GLANCE_GROUPS = 20, 10, 10, 2
-_PAIRS_CLOSER, _PAIRS_AFTER, _PAIR_GROUPS = 10, 5, (2, 3)
-"""Pairs that the atlas favours, and more of those with the leader in them; at how many frequencies
-they are simulated at first, and in how many groups; how many are looked at closer, twice. What
-two causes do together is seldom the sum of what each does, and few runs rank them by chance."""
-
-_SWAPS, _SWAPS_CLOSER, _SWAP_ROUNDS = 8, 4, 2
-"""Pairs with each cause of the leading one that are looked at then, how many of them closer, and
-how often, where one of them takes the lead."""
-
 _BESIDE, _BESIDE_CLOSER, _BESIDE_GROUPS = (5, 8), (2, 4), (2, 4)
-"""The same for pairs with a leader that is not doubted, and where it predicts worse than true
-causes do."""
+"""How many pairs with a leader that is not doubted are tried, and how many looked at closer, where
+it predicts other levels well and where worse than true causes do; in how many groups each time."""
 
 _TRIPLES, _TRIPLES_CLOSER, _TRIPLE_GROUPS, _TRIPLES_AFTER = 8, 4, (2, 4), 2
 """The same for sets with a third cause beside a leading pair that is doubted."""
-
-_EARNED = 6.0
-"""Log-likelihood on the rows of the rough look, a third of all, by which a pair must beat its parts
-to be looked at further; a further cause costs three times as much in the end."""
 
 _NEAR, _CLOSE = 120.0, 30.0
 _LAST_ROUNDS, _LAST_GROUPS = ((4, _NEAR), (3, 60.0), (3, _CLOSE), (3, _CLOSE)), 4
@@ -142,7 +129,7 @@ def search_causes(
         rough.settle([rough.best.hypothesis.effects], _LAST_GROUPS)
     doubted = _is_doubtful(rough.best, rng)
     if doubted:
-        _search_pairs(rough, atlas)
+        search_pairs(rough, atlas)
     fine = Hunt(
         unit,
         observation,
@@ -158,7 +145,7 @@ def search_causes(
         if not doubted and _is_doubtful(fine.best, rng):
             # More rows, or more runs, show that a single cause will not do after all.
             doubted = True
-            _search_pairs(rough, atlas)
+            search_pairs(rough, atlas)
             pairs = [key for key in _third(rough) if key not in fine.found]
             fine.take_over([rough.found[key] for key in pairs], _THIRD_GROUPS)
             fine.hear()
@@ -189,12 +176,9 @@ def _look_beside(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator
     places = screen_pairs(rough.observation, atlas, leader)
     poor = hold_out(fine.best, fine.observation).rms_sigma > AT_NOISE
     enough = -np.inf if poor else alone.log_likelihood - _LITTLE
-    ranked = [k for k in _ranked(places)[: _BESIDE[poor]] if places[k].log_likelihood > enough]
-    if not ranked:
-        return
-    rough.start({key: places[key].place for key in ranked}, _BESIDE_GROUPS[0])
-    rough.look_closer(_among(rough, ranked)[: _BESIDE_CLOSER[poor]], _BESIDE_GROUPS[1])
-    kept = [key for key in _among(rough, ranked) if _earns(key, rough.found)][: _BESIDE_CLOSER[0]]
+    chosen = [k for k in ranked(places)[: _BESIDE[poor]] if places[k].log_likelihood > enough]
+    starts = {key: places[key].place for key in chosen}
+    kept = _narrow(rough, starts, _BESIDE_CLOSER[poor], _BESIDE_GROUPS)[: _BESIDE_CLOSER[0]]
     if kept:
         fine.take_over([rough.found[key] for key in kept], _THIRD_GROUPS)
         if set(kept) & set(fine.leading(len(fine.found), _CLOSE)):
@@ -204,19 +188,24 @@ def _look_beside(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator
 def _search_triples(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator) -> None:
     """See whether a third cause makes up for what a leading pair leaves."""
     places = screen_further(rough.observation, atlas, fine.best)
-    ranked = _ranked(places)[:_TRIPLES]
-    if not ranked:
-        return
-    rough.start({key: places[key].place for key in ranked}, _TRIPLE_GROUPS[0])
-    rough.look_closer(_among(rough, ranked)[:_TRIPLES_CLOSER], _TRIPLE_GROUPS[1])
-    kept = [key for key in _among(rough, ranked) if _earns(key, rough.found)][:_TRIPLES_AFTER]
+    starts = {key: places[key].place for key in ranked(places)[:_TRIPLES]}
+    kept = _narrow(rough, starts, _TRIPLES_CLOSER, _TRIPLE_GROUPS)[:_TRIPLES_AFTER]
     if kept:
         fine.take_over([rough.found[key] for key in kept], _THIRD_GROUPS)
         _compare(fine, rng)
     if len(fine.best.hypothesis.effects) > 2:
         # Two of the three may do as well where they are now, and not have been looked at.
-        fine.start(_places_of_parts(fine.best), _LAST_GROUPS)
+        fine.start(places_of_parts(fine.best), _LAST_GROUPS)
         _compare(fine, rng)
+
+
+def _narrow(rough: Hunt, starts: Starts, closer: int, groups: tuple[int, int]) -> list[Effects]:
+    """Those of some sets that explain more than their parts, the best looked at closer."""
+    if not starts:
+        return []
+    rough.start(starts, groups[0])
+    rough.look_closer(rough.among(starts)[:closer], groups[1])
+    return [key for key in rough.among(starts) if earns(key, rough.found)]
 
 
 def _see_it_predict(fine: Hunt) -> None:
@@ -244,7 +233,7 @@ def _weigh_parts(fine: Hunt) -> None:
         return
     places = {
         part: place
-        for part, place in _places_of_parts(leader).items()
+        for part, place in places_of_parts(leader).items()
         if part in fine.found and len(fine.found[part].population) < len(leader.population)
     }
     if places:
@@ -273,7 +262,7 @@ def _compare(fine: Hunt, rng: np.random.Generator) -> bool:
         leader, *near = fine.leading(most, behind)
         # The parts of a pair count in every round, even where others lie before them: with few runs
         # a true cause of several parameters has been beaten by itself and another.
-        parts = set(_parts(leader, fine.found))
+        parts = set(parts_of(leader, fine.found))
         near += sorted(parts & set(fine.leading(len(fine.found), _TOO_FAR)))
         if done >= _IN_EARNEST:
             # Who wants a size that no bench has is no explanation, however well it fits.
@@ -290,70 +279,7 @@ def _compare(fine: Hunt, rng: np.random.Generator) -> bool:
 def _singles(coarse: Observation, atlas: Atlas) -> Starts:
     """Best places of the single causes that the atlas favours, and of the baseline."""
     places = screen_singles(coarse, atlas)
-    return {key: places[key].place for key in _with_baseline(_ranked(places)[:_FIRST])}
-
-
-def _search_pairs(rough: Hunt, atlas: Atlas) -> None:
-    """Look at the pairs that the atlas favours, ever fewer of them ever closer."""
-    places = screen_pairs(rough.observation, atlas)
-    ranked = _ranked(places)
-    partners = [key for key in ranked if rough.best_single[0] in key]
-    if not ranked:
-        return
-    glance = rough.thinned(coarse_stride(rough.observation, _GLANCE_FREQUENCIES))
-    chosen = dict.fromkeys([*ranked[:_PAIRS], *partners[:_PARTNERS]])
-    glance.start({key: places[key].place for key in chosen}, _GLANCE_GROUPS)
-    closer = [glance.found[key] for key in glance.leading(_PAIRS_CLOSER)]
-    rough.take_over(closer, _PAIR_GROUPS[0])
-    looked_at = set(_among(rough, chosen)[:_PAIRS_AFTER])
-    rough.look_closer(sorted(looked_at), _PAIR_GROUPS[1])
-    leader, asked = _among(rough, looked_at)[0], set[Effects]()
-    _look_at_parts(rough, leader)
-    for _ in range(_SWAP_ROUNDS):
-        if not _earns(leader, rough.found):
-            break  # One of its causes does as well alone.
-        kept = [part for part in _parts(leader, rough.found) if part not in asked]
-        looked_at |= _swap_one(rough, atlas, kept, looked_at)
-        asked |= set(kept)
-        before, leader = leader, _among(rough, looked_at)[0]
-        if leader == before:
-            break
-        _look_at_parts(rough, leader)
-
-
-def _look_at_parts(rough: Hunt, leader: Effects) -> None:
-    """A part may do as well where the pair has it, and only have been looked at elsewhere."""
-    rough.start(_places_of_parts(rough.found[leader]), _PAIR_GROUPS[1])
-    rough.hear()
-
-
-def _swap_one(
-    rough: Hunt, atlas: Atlas, kept: Sequence[Effects], looked_at: Collection[Effects]
-) -> set[Effects]:
-    """Look at others beside what is kept of a leading pair: true pairs nearly all share a cause.
-
-    What it does where the leader has it tells better than the atlas what a second adds.
-    """
-    places: dict[Effects, Place] = {}
-    for part in kept:
-        further = screen_further(rough.observation, atlas, rough.found[part])
-        others = [key for key in _ranked(further) if key not in looked_at]
-        places |= {key: further[key] for key in others[:_SWAPS]}
-    glance = rough.thinned(coarse_stride(rough.observation, _GLANCE_FREQUENCIES))
-    glance.start({key: one.place for key, one in places.items()}, _GLANCE_GROUPS)
-    closer = glance.leading(_SWAPS_CLOSER)
-    rough.take_over([glance.found[key] for key in closer], sum(_PAIR_GROUPS))
-    rough.hear()
-    return set(closer)
-
-
-def _ranked(places: Mapping[Effects, Place]) -> list[Effects]:
-    return sorted(places, key=lambda key: -places[key].log_likelihood)
-
-
-def _among(hunt: Hunt, keys: Collection[Effects]) -> list[Effects]:
-    """Those of some hypotheses that were simulated, the most likely first."""
-    return [key for key in hunt.leading(len(hunt.found)) if key in keys]
+    return {key: places[key].place for key in _with_baseline(ranked(places)[:_FIRST])}
 
 
 def _is_doubtful(candidate: Candidate, rng: np.random.Generator, missed: float = _DOUBT) -> bool:
@@ -371,30 +297,11 @@ def _is_nothing_missing(fine: Hunt, rng: np.random.Generator) -> bool:
 
 def _third(rough: Hunt) -> list[Effects]:
     """Who is looked at on all rows: the leaders, the parts of the first, and the baseline."""
-    leading = [k for k in rough.leading(len(rough.found), _TOO_FAR) if _earns(k, rough.found)]
+    leading = [k for k in rough.leading(len(rough.found), _TOO_FAR) if earns(k, rough.found)]
     leading = leading[:_THIRD]
-    others = [*_parts(leading[0], rough.found), rough.best_single]
+    others = [*parts_of(leading[0], rough.found), rough.best_single]
     hopeful = set(rough.leading(len(rough.found), _HOPELESS))
     return _with_baseline([*leading, *(key for key in others if key in hopeful)])
-
-
-def _places_of_parts(leader: Candidate) -> Starts:
-    """Where sets of one cause less are by the best fit of several causes."""
-    whole, place = leader.hypothesis, leader.best.place
-    fewer = combinations(whole.effects, len(whole.effects) - 1)
-    return {effects: whole.part(effects, place) for effects in fewer}
-
-
-def _earns(key: Effects, found: Mapping[Effects, Candidate]) -> bool:
-    """Whether a pair explains more than either of its parts."""
-    parts = [found[part].best.log_likelihood for part in _parts(key, found)]
-    return not parts or found[key].best.log_likelihood > max(parts) + _EARNED
-
-
-def _parts(key: Effects, found: Collection[Effects]) -> list[Effects]:
-    """Sets of fewer of the same causes, as far as they were looked at."""
-    fewer = (combinations(key, count) for count in range(1, len(key)))
-    return [part for part in chain.from_iterable(fewer) if part in found]
 
 
 def _with_baseline(keys: Sequence[Effects]) -> list[Effects]:

@@ -1,131 +1,42 @@
-"""The search in a world whose answers are known: everything but the simulations is real."""
+"""The search, where everything but the simulations is real."""
 
-from collections import Counter
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import synthetic
+import synthetic_search
 
-from analysis import atlas, hunt, population, search
+from analysis import search
 from analysis.causes import Hypothesis
 from analysis.executor import LocalExecutor
 from analysis.observation import USUAL_NOISE_V
-from analysis.population import Population
-from analysis.verdict import judge_candidates
 from sim.catalogue import CATALOGUE
 
 ADSS = synthetic.ADSS
-MORE_SEEDS = [1, pytest.param(2, marks=pytest.mark.study), pytest.param(3, marks=pytest.mark.study)]
-"""Where half a minute a seed is too long for every test run; all hold."""
-
-
-def read(effects, place, rng, deviations=None, scatter=1.0):
-    """One run (3, rows) of a set of effects, each with its own slope; only first sizes act."""
-    sizes, at = {}, 1
-    for effect in effects:
-        sizes[effect] = place[at]
-        at += Hypothesis(ADSS, (effect,)).d - 1
-    plain = synthetic.read((), place[:1], rng, deviations, scatter)
-    return plain + sum(synthetic.effect_slope((e,)) * size for e, size in sizes.items())
-
-
-class Asked(Counter):
-    """How many runs of each hypothesis were asked for, atlas apart; and where, atlas included."""
-
-    def __init__(self):
-        super().__init__()
-        self.executors = set()
 
 
 @pytest.fixture
 def runs(monkeypatch):
     """What was asked for."""
-    count = Asked()
-
-    def simulate(unit, groups, observation, rng, executor=None, progress=None):
-        found = {}
-        count.executors.add(executor)
-        for group, signs in zip(groups, population._signs(groups, rng), strict=True):
-            key, off = group.hypothesis.effects, signs * synthetic.SIGMAS
-            rows = np.isin(
-                np.tile(synthetic.FREQUENCIES, len(synthetic.LEVELS)), observation.frequency_hz
-            )
-            channels = np.array([read(key, place, rng, off)[:, rows] for place in group.places])
-            mean = np.exp(channels[:, 0] + 1j * channels[:, 1])
-            made = Population(
-                group.places,
-                np.tile(off, (len(mean), 1)),
-                mean,
-                np.exp(2.0 * channels[:, 2]),
-            )
-            found[key] = found[key].joined(made) if key in found else made
-            count[key] += len(mean)
-        return found
-
-    def quietly(*given):
-        made = simulate(*given)
-        count.clear()
-        return made
-
-    monkeypatch.setattr(hunt, "simulate_groups", simulate)
-    monkeypatch.setattr(atlas, "simulate_groups", quietly)
-    return count
-
-
-def diagnosed(effects, sizes, seed, **given):
-    rng = np.random.default_rng(seed)
-    observed = synthetic.observation(read(effects, np.array([0.4, *sizes]), rng))
-    found = search.search_causes(ADSS, observed, seed=seed, **given)
-    return found, judge_candidates(found, found[0].surface.observation, rng)
+    return synthetic_search.simulate_in(monkeypatch)
 
 
 @pytest.mark.parametrize(
     ("effect", "seed"), [("load-inertia", 1), ("amplifier-lag", 2), ("mesh1-damping", 3)]
 )
 def test_a_single_cause_is_found_among_all_of_the_catalogue(runs, effect, seed):
-    found, verdict = diagnosed((effect,), [0.8], seed)
+    found, verdict = synthetic_search.diagnosed((effect,), [0.8], seed)
     assert (verdict.word, verdict.best.effects) == ("explained", (effect,))
     assert verdict.best.candidate.best.place == pytest.approx([0.4, 0.8], abs=0.1)
     assert () in {one.hypothesis.effects for one in found}
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_two_causes_are_found_together(runs, seed):
-    pair = ("amplifier-lag", "load-inertia")
-    _, verdict = diagnosed(pair, [0.8, 0.3], seed)
-    assert (verdict.word, verdict.best.effects) == ("explained", pair)
-
-
-@pytest.mark.parametrize("seed", MORE_SEEDS)
-def test_a_pair_that_the_coarse_look_passes_over_is_found_beside_one_of_its_causes(
-    runs, monkeypatch, seed
-):
-    pair = ("amplifier-lag", "load-inertia")
-
-    def blind_to_it(*given):
-        places = search_pairs_of_atlas(*given)
-        return {key: place for key, place in places.items() if key != pair}
-
-    search_pairs_of_atlas = search.screen_pairs
-    monkeypatch.setattr(search, "screen_pairs", blind_to_it)
-    # Nor by way of sets of three, whose parts are looked at, too.
-    monkeypatch.setattr(search, "_TRIPLES", 0)
-    _, verdict = diagnosed(pair, [0.8, 0.3], seed)
-    assert (verdict.word, verdict.best.effects) == ("explained", pair)
-
-
-def test_a_pair_is_found_where_there_are_no_others_to_hold_it_against(runs):
-    pair = ("amplifier-lag", "load-inertia")
-    _, verdict = diagnosed(pair, [0.8, 0.3], 1, without=set(CATALOGUE) - set(pair))
-    assert (verdict.word, verdict.best.effects) == ("explained", pair)
-
-
-@pytest.mark.parametrize("seed", MORE_SEEDS)
+@pytest.mark.parametrize("seed", synthetic_search.MORE_SEEDS)
 def test_three_causes_are_found_together(runs, seed):
     """Seeds 1 to 6 all find them, three of six with the word "explained"; 1 is farthest off."""
     three = ("amplifier-lag", "load-inertia", "mesh1-damping")
-    _, verdict = diagnosed(three, [0.8, 0.3, 0.7], seed)
+    _, verdict = synthetic_search.diagnosed(three, [0.8, 0.3, 0.7], seed)
     # They miss the other level by one standard deviation or so: of three causes no more is taken,
     # so that a true set of three may be called unexplained.
     assert verdict.word in ("explained", "unexplained")
@@ -137,12 +48,12 @@ def test_three_causes_are_found_together(runs, seed):
 def test_a_second_cause_is_found_behind_one_that_nobody_doubts(runs, monkeypatch, seed):
     monkeypatch.setattr(search, "_is_doubtful", lambda candidate, *_: candidate.hypothesis.d == 1)
     pair = ("amplifier-lag", "load-inertia")
-    _, verdict = diagnosed(pair, [0.8, 0.3], seed)
+    _, verdict = synthetic_search.diagnosed(pair, [0.8, 0.3], seed)
     assert verdict.best.effects == pair
 
 
 def test_nothing_is_looked_for_behind_a_cause_that_explains_all(runs):
-    found, verdict = diagnosed(("load-inertia",), [0.8], 1)
+    found, verdict = synthetic_search.diagnosed(("load-inertia",), [0.8], 1)
     assert verdict.best.effects == ("load-inertia",)
     # Twenty runs of a few pairs, forty more of two of them; what does no better goes no further.
     assert all(count <= 60 for key, count in runs.items() if len(key) > 1)
@@ -164,7 +75,7 @@ def test_more_pairs_are_tried_behind_a_cause_that_predicts_badly(
     rough = SimpleNamespace(
         observation=None,
         found=found,
-        leading=lambda most: list(found),
+        among=list,
         start=lambda places, groups: looked.append(list(places)),
         look_closer=lambda keys, groups: looked.append(keys),
     )
@@ -176,38 +87,10 @@ def test_more_pairs_are_tried_behind_a_cause_that_predicts_badly(
     assert looked == [list(pairs)[:tried], list(pairs)[:closer]]
 
 
-def hunted(sizes, seed):
-    """A hunt for one cause of a known size, with nothing simulated yet."""
-    rng = np.random.default_rng(seed)
-    observed = synthetic.observation(read(("load-inertia",), np.array([0.4, *sizes]), rng))
-    return hunt.Hunt(ADSS, observed, rng, None, None)
-
-
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_a_second_look_elsewhere_does_not_lose_what_the_first_found(runs, seed):
-    key = ("load-inertia",)
-    looking = hunted([0.8], seed)
-    looking.start({key: np.array([0.4, 0.8])}, 4)
-    looking.start({key: np.array([0.9, 0.1])}, 4)
-    assert looking.found[key].best.place == pytest.approx([0.4, 0.8], abs=0.1)
-    assert len(looking.found[key].population) == 80
-
-
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_a_look_at_the_right_place_mends_one_at_a_wrong_place(runs, seed):
-    key = ("load-inertia",)
-    looking = hunted([0.8], seed)
-    looking.start({key: np.array([0.9, 0.1])}, 4)
-    wrong = looking.found[key].best.log_likelihood
-    looking.start({key: np.array([0.4, 0.8])}, 4)
-    assert looking.found[key].best.log_likelihood > wrong + 100.0
-    assert looking.found[key].best.place == pytest.approx([0.4, 0.8], abs=0.1)
-
-
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_part_that_was_looked_at_elsewhere_is_weighed_where_the_pair_has_it(runs, seed):
     pair, part = ("amplifier-lag", "load-inertia"), ("load-inertia",)
-    looking = hunted([0.8], seed)
+    looking = synthetic_search.hunted([0.8], seed)
     looking.start({part: np.array([0.9, 0.1])}, 4)
     looking.start({pair: np.array([0.4, 0.0, 0.8])}, 6)
     looking.settle([pair], 4)
@@ -222,7 +105,7 @@ def test_a_part_that_was_looked_at_elsewhere_is_weighed_where_the_pair_has_it(ru
 
 def test_nothing_more_is_simulated_where_no_pair_leads_or_its_parts_have_runs_enough(runs):
     pair, part = ("amplifier-lag", "load-inertia"), ("load-inertia",)
-    looking = hunted([0.8], 1)
+    looking = synthetic_search.hunted([0.8], 1)
     looking.start({part: np.array([0.4, 0.8])}, 8)
     runs.clear()
     search._weigh_parts(looking)
@@ -231,27 +114,6 @@ def test_nothing_more_is_simulated_where_no_pair_leads_or_its_parts_have_runs_en
     runs.clear()
     search._weigh_parts(looking)
     assert not runs
-
-
-def test_the_parts_of_a_pair_stand_where_the_pair_has_them():
-    pair = Hypothesis(ADSS, ("amplifier-lag", "payload-flexibility"))
-    place = np.array([0.4, 0.1, 0.2, 0.3, 0.5])
-    best = SimpleNamespace(hypothesis=pair, best=SimpleNamespace(place=place))
-    found = search._places_of_parts(best)
-    assert found[("amplifier-lag",)].tolist() == [0.4, 0.1]
-    assert found[("payload-flexibility",)].tolist() == [0.4, 0.2, 0.3, 0.5]
-
-
-def test_two_of_three_stand_where_the_three_have_them():
-    three = Hypothesis(ADSS, ("amplifier-lag", "load-inertia", "payload-flexibility"))
-    place = np.array([0.4, 0.1, 0.2, 0.3, 0.5, 0.6])
-    best = SimpleNamespace(hypothesis=three, best=SimpleNamespace(place=place))
-    found = search._places_of_parts(best)
-    assert {key: at.tolist() for key, at in found.items()} == {
-        ("amplifier-lag", "load-inertia"): [0.4, 0.1, 0.2],
-        ("amplifier-lag", "payload-flexibility"): [0.4, 0.1, 0.3, 0.5, 0.6],
-        ("load-inertia", "payload-flexibility"): [0.4, 0.2, 0.3, 0.5, 0.6],
-    }
 
 
 def test_two_of_three_causes_are_weighed_where_the_three_lead(monkeypatch):
@@ -273,7 +135,7 @@ def test_two_of_three_causes_are_weighed_where_the_three_lead(monkeypatch):
     rough = SimpleNamespace(
         observation=None,
         found=found,
-        leading=lambda most: list(found),
+        among=list,
         start=rough_start,
         look_closer=lambda keys, groups: None,
     )
@@ -368,7 +230,7 @@ def test_who_has_runs_enough_gets_no_more_to_be_compared_by():
 def test_every_run_is_made_where_the_caller_says(runs):
     executor, pair = LocalExecutor(1), ("amplifier-lag", "load-inertia")
     others = set(CATALOGUE) - {*pair, "mesh1-damping"}
-    diagnosed(pair, [0.8, 0.3], 1, executor=executor, without=others)
+    synthetic_search.diagnosed(pair, [0.8, 0.3], 1, executor=executor, without=others)
     assert runs.executors == {executor}
 
 
@@ -376,7 +238,7 @@ def test_where_nothing_is_missing_the_search_ends_early(runs):
     spent = []
     for seed in range(2):
         runs.clear()
-        _, verdict = diagnosed((), [], seed)
+        _, verdict = synthetic_search.diagnosed((), [], seed)
         assert verdict.word == "consistent"
         spent.append(sum(runs.values()))
     # 180 runs of nine causes and the baseline, 200 of five, 200 of four, and no more; by chance a
@@ -386,14 +248,18 @@ def test_where_nothing_is_missing_the_search_ends_early(runs):
 
 def test_what_is_left_out_of_the_catalogue_is_not_looked_at(runs, monkeypatch):
     monkeypatch.setattr(search, "_TRIPLES", 0)
-    found, verdict = diagnosed(("load-inertia",), [0.8], 5, without=("load-inertia",))
+    found, verdict = synthetic_search.diagnosed(
+        ("load-inertia",), [0.8], 5, without=("load-inertia",)
+    )
     assert not any("load-inertia" in key for key in runs)
     assert verdict.word == "unexplained"
 
 
 def test_every_candidate_is_held_against_the_same_noise(runs):
     rng = np.random.default_rng(6)
-    observed = synthetic.observation(read(("load-inertia",), np.array([0.4, 0.8]), rng))
+    observed = synthetic.observation(
+        synthetic_search.read(("load-inertia",), np.array([0.4, 0.8]), rng)
+    )
     loud = observed.with_noise(4.0 * USUAL_NOISE_V)
     found = search.search_causes(ADSS, loud, seed=6)
     heard = {one.surface.observation.noise_v for one in found}

@@ -1,0 +1,94 @@
+"""The search for pairs: from all that an atlas favours to the few that are worth all rows.
+
+Owns which pairs are simulated where no single cause will do, and how the one
+that leads them is held against others with one of its causes.
+It leaves what it found in the hunt, and does not tell whether a pair is called for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+from analysis.atlas import Atlas, coarse_stride
+from analysis.candidate import Candidate, Effects
+from analysis.hunt import Hunt
+from analysis.parts import earns, parts_of, places_of_parts
+from analysis.screening import Place, ranked, screen_further, screen_pairs
+
+__all__ = ["search_pairs"]
+
+_PAIRS, _PARTNERS, _GLANCE_FREQUENCIES, _GLANCE_GROUPS = 20, 10, 10, 2
+_CLOSER, _AFTER, _GROUPS = 10, 5, (2, 3)
+"""Pairs that the atlas favours, and more of those with the leader in them; at how many frequencies
+they are simulated at first, and in how many groups; how many are looked at closer, twice. What
+two causes do together is seldom the sum of what each does, and few runs rank them by chance."""
+
+_SWAPS, _SWAPS_CLOSER, _SWAP_ROUNDS = 8, 4, 2
+"""Pairs with each cause of the leading one that are looked at then, how many of them closer, and
+how often, where one of them takes the lead."""
+
+
+def search_pairs(rough: Hunt, atlas: Atlas) -> None:
+    """Look at the pairs that the atlas favours, ever fewer of them ever closer.
+
+    Raises
+    ------
+    AnalysisError
+        If a motion grew without bound.
+    """
+    places = screen_pairs(rough.observation, atlas)
+    favoured = ranked(places)
+    if not favoured:
+        return
+    partners = [key for key in favoured if rough.best_single[0] in key]
+    chosen = dict.fromkeys([*favoured[:_PAIRS], *partners[:_PARTNERS]])
+    rough.take_over(_glance(rough, {key: places[key] for key in chosen}, _CLOSER), _GROUPS[0])
+    looked_at = set(rough.among(chosen)[:_AFTER])
+    rough.look_closer(sorted(looked_at), _GROUPS[1])
+    _hold_against_neighbours(rough, atlas, looked_at)
+
+
+def _hold_against_neighbours(rough: Hunt, atlas: Atlas, looked_at: set[Effects]) -> None:
+    """Look at others with a cause of the leading pair: true pairs nearly all share one with it."""
+    leader, before = rough.among(looked_at)[0], Effects()
+    for _ in range(_SWAP_ROUNDS):
+        _look_at_parts(rough, leader)
+        if not earns(leader, rough.found):
+            return  # One of its causes does as well alone.
+        fresh = set(parts_of(leader, rough.found)) - set(parts_of(before, rough.found))
+        looked_at = looked_at | _swap(rough, atlas, sorted(fresh), looked_at)
+        before, leader = leader, rough.among(looked_at)[0]
+        if leader == before:
+            return
+    _look_at_parts(rough, leader)
+
+
+def _look_at_parts(rough: Hunt, leader: Effects) -> None:
+    """Simulate the causes of a pair alone where it has them: either may do as well there."""
+    rough.start(places_of_parts(rough.found[leader]), _GROUPS[1])
+    rough.hear()
+
+
+def _swap(
+    rough: Hunt, atlas: Atlas, kept: Sequence[Effects], looked_at: Collection[Effects]
+) -> set[Effects]:
+    """Look at others beside what is kept of a leading pair; those that are worth it closer.
+
+    What it does where the leader has it tells better than the atlas what a second adds.
+    """
+    places: dict[Effects, Place] = {}
+    for part in kept:
+        further = screen_further(rough.observation, atlas, rough.found[part])
+        others = [key for key in ranked(further) if key not in looked_at]
+        places |= {key: further[key] for key in others[:_SWAPS]}
+    closer = _glance(rough, places, _SWAPS_CLOSER)
+    rough.take_over(closer, sum(_GROUPS))
+    rough.hear()
+    return {one.hypothesis.effects for one in closer}
+
+
+def _glance(rough: Hunt, places: dict[Effects, Place], most: int) -> list[Candidate]:
+    """The most likely of some pairs by a few runs at few frequencies."""
+    few = rough.thinned(coarse_stride(rough.observation, _GLANCE_FREQUENCIES))
+    few.start({key: one.place for key, one in places.items()}, _GLANCE_GROUPS)
+    return [few.found[key] for key in few.leading(most)]

@@ -1,0 +1,135 @@
+"""The search for pairs, in a world whose answers are known."""
+
+from types import SimpleNamespace
+
+import pytest
+import synthetic_search
+
+from analysis import pairs, search
+from analysis.screening import Place
+from sim.catalogue import CATALOGUE
+
+
+@pytest.fixture
+def runs(monkeypatch):
+    """What was asked for."""
+    return synthetic_search.simulate_in(monkeypatch)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_two_causes_are_found_together(runs, seed):
+    pair = ("amplifier-lag", "load-inertia")
+    _, verdict = synthetic_search.diagnosed(pair, [0.8, 0.3], seed)
+    assert (verdict.word, verdict.best.effects) == ("explained", pair)
+
+
+@pytest.mark.parametrize("seed", synthetic_search.MORE_SEEDS)
+def test_a_pair_that_the_coarse_look_passes_over_is_found_beside_one_of_its_causes(
+    runs, monkeypatch, seed
+):
+    pair = ("amplifier-lag", "load-inertia")
+
+    def blind_to_it(*given):
+        places = screen_pairs(*given)
+        return {key: place for key, place in places.items() if key != pair}
+
+    screen_pairs = pairs.screen_pairs
+    monkeypatch.setattr(pairs, "screen_pairs", blind_to_it)
+    # Nor by way of sets of three, whose parts are looked at, too.
+    monkeypatch.setattr(search, "_TRIPLES", 0)
+    _, verdict = synthetic_search.diagnosed(pair, [0.8, 0.3], seed)
+    assert (verdict.word, verdict.best.effects) == ("explained", pair)
+
+
+def test_a_pair_is_found_where_there_are_no_others_to_hold_it_against(runs):
+    pair = ("amplifier-lag", "load-inertia")
+    _, verdict = synthetic_search.diagnosed(pair, [0.8, 0.3], 1, without=set(CATALOGUE) - set(pair))
+    assert (verdict.word, verdict.best.effects) == ("explained", pair)
+
+
+class Standings:
+    """A hunt that has looked at hypotheses already, of these log-likelihoods."""
+
+    def __init__(self, likelihood):
+        self.found = {
+            key: SimpleNamespace(best=SimpleNamespace(log_likelihood=value))
+            for key, value in likelihood.items()
+        }
+
+    def among(self, keys):
+        ranked = sorted(self.found, key=lambda key: -self.found[key].best.log_likelihood)
+        return [key for key in ranked if key in keys]
+
+
+@pytest.mark.parametrize(
+    ("part", "brought_in", "swapped", "weighed"),
+    [
+        # One of the leader's causes does as well alone.
+        (95.0, [], [], [("a", "b")]),
+        # What is tried beside them does no better.
+        (60.0, [[("a", "c"), ("b", "d")]], [[("a",), ("b",)]], [("a", "b")]),
+        # One does; what is tried beside its new cause does no better.
+        (
+            60.0,
+            [[("a", "e")], [("d", "e")]],
+            [[("a",), ("b",)], [("e",)]],
+            [("a", "b"), ("a", "e")],
+        ),
+        # That does, too, and is the last.
+        (
+            60.0,
+            [[("a", "e")], [("e", "f")]],
+            [[("a",), ("b",)], [("e",)]],
+            [("a", "b"), ("a", "e"), ("e", "f")],
+        ),
+    ],
+)
+def test_others_are_tried_beside_the_causes_of_a_leading_pair(
+    monkeypatch, part, brought_in, swapped, weighed
+):
+    likelihood = {("a", "b"): 100.0, ("a", "c"): 90.0, ("a", "e"): 200.0, ("e", "f"): 300.0}
+    likelihood |= {("b", "d"): 80.0, ("d", "e"): 150.0, (): 0.0}
+    likelihood |= {(cause,): part for cause in "abcdef"}
+    beside, alone, known = [], [], [{("a", "b"), ("a", "c")}]
+
+    def swap(rough, atlas, kept, looked_at):
+        beside.append(list(kept))
+        assert looked_at == known[-1]
+        new = set(brought_in[len(beside) - 1])
+        known.append(known[-1] | new)
+        return new
+
+    monkeypatch.setattr(pairs, "_swap", swap)
+    monkeypatch.setattr(pairs, "_look_at_parts", lambda rough, leader: alone.append(leader))
+    pairs._hold_against_neighbours(Standings(likelihood), {}, known[0])
+    assert (beside, alone) == (swapped, weighed)
+
+
+def test_what_the_atlas_adds_to_each_part_is_tried_but_for_what_was_looked_at(monkeypatch):
+    found = {("a",): "alone", ("b",): "by itself"}
+    further = {
+        "alone": {("a", f"x{i:02}"): Place(None, -float(i)) for i in range(12)},
+        "by itself": {("b", f"x{i:02}"): Place(None, 100.0 - i) for i in range(3)},
+    }
+    taken = []
+    rough = SimpleNamespace(
+        observation=None,
+        found=found,
+        take_over=lambda candidates, groups: taken.append((candidates, groups)),
+        hear=lambda: None,
+    )
+    tried = []
+
+    def glance(rough, places, most):
+        tried.extend(places)
+        best = [SimpleNamespace(hypothesis=SimpleNamespace(effects=key)) for key in places]
+        return best[-most:]
+
+    monkeypatch.setattr(pairs, "screen_further", lambda _, __, known: further[known])
+    monkeypatch.setattr(pairs, "_glance", glance)
+    looked_at = {("a", "x00"), ("a", "x03"), ("b", "x01")}
+    closer = pairs._swap(rough, {}, [("a",), ("b",)], looked_at)
+    eight = [("a", f"x{i:02}") for i in (1, 2, 4, 5, 6, 7, 8, 9)]
+    assert tried == [*eight, ("b", "x00"), ("b", "x02")]
+    assert closer == {("a", "x08"), ("a", "x09"), ("b", "x00"), ("b", "x02")}
+    assert [(len(candidates), groups) for candidates, groups in taken] == [(4, 5)]
