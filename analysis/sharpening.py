@@ -26,8 +26,9 @@ __all__ = ["sharpen_candidate"]
 _ROUNDS, _GROUPS = 5, 4
 _SHARP = 0.035
 """Standard deviation of every coordinate from which on nothing more is simulated."""
-_WORTHWHILE, _LEAST_ROUNDS = 0.9, 2
-"""Nor, after so many rounds, where one left the largest of them above this share of what it was."""
+_WORTHWHILE, _TWO = 0.9, 2
+"""Nor where two rounds left the largest of them above this share of what it was. What few runs say
+of their error is uncertain itself, so that a single round may seem worthless by chance."""
 
 
 def sharpen_candidate(
@@ -46,13 +47,12 @@ def sharpen_candidate(
         If a motion grew without bound.
     """
     key, found = candidate.hypothesis.effects, size_candidate(candidate, observation, rng)
-    before = np.inf
+    widest: list[float] = []
     for done in range(_ROUNDS):
-        widest = np.sqrt(np.diag(found.covariance)).max()
-        stalled = done >= _LEAST_ROUNDS and widest > _WORTHWHILE * before
-        if widest <= _SHARP or stalled:
+        widest.append(np.sqrt(np.diag(found.covariance)).max())
+        stalled = done >= _TWO and widest[-1] > _WORTHWHILE * widest[-1 - _TWO]
+        if widest[-1] <= _SHARP or stalled:
             break
-        before = widest
         groups = list(groups_around(candidate.hypothesis, found, _GROUPS, rng))
         made = simulate_groups(unit, groups, observation, rng, executor)[key]
         # The surface stays as it was judged; sizing asks it for its widths alone.

@@ -93,6 +93,24 @@ def test_it_ends_where_the_data_tell_no_more(monkeypatch, asked):
     assert answer.covariance[0, 0] == pytest.approx(0.2**2)
 
 
+@pytest.mark.parametrize(
+    ("stds", "rounds"),
+    [
+        ([0.085, 0.077, 0.076, 0.063, 0.062, 0.054], 5),
+        ([0.085, 0.080, 0.079, 0.060, 0.050, 0.040], 2),
+        ([0.085, 0.077, 0.068, 0.067, 0.066, 0.065], 4),
+    ],
+)
+def test_one_round_that_seems_worthless_does_not_end_it_and_two_do(
+    monkeypatch, asked, stds, rounds
+):
+    observed = observed_at(0)
+    monkeypatch.setattr(sharpening, "size_candidate", sized(stds))
+    rng = np.random.default_rng(0)
+    sharpening.sharpen_candidate(synthetic.ADSS, found(observed, 0), observed, rng)
+    assert len(asked) == rounds
+
+
 def test_it_goes_on_as_long_as_it_pays_but_not_for_ever(monkeypatch, asked):
     observed = observed_at(0)
     monkeypatch.setattr(sharpening, "size_candidate", sized(0.5 * 0.8 ** np.arange(50)))
