@@ -35,8 +35,8 @@ _ENOUGH = {1: 4.0, 2: 5.0, 3: 6.0, 4: 25.0}
 what is far away counts; the many parameters of a resonance need more. True pairs then rank best.
 """
 
-_COUNTS = {1: (31,), 2: (21, 25), 3: (13, 9, 5), 4: (11, 4, 15, 2)}
-"""Places looked at along each coordinate."""
+_COUNTS = {1: (31,), 2: (21, 25), 3: (13, 9, 5), 4: (11, 5, 15, 2)}
+"""Places looked at along each coordinate, the ends of its range among them unless they are two."""
 
 _PAIR_RATIOS, _PAIR_SIZES = 15, {2: (13,), 3: (9, 3), 4: (4, 15, 2)}
 """The same for pairs, whose ratio is common to both, and for each cause by its coordinates."""
@@ -183,7 +183,8 @@ def _surface(coarse: Observation, population: Population) -> Surface:
 
 
 def _grid(d: int) -> NDArray[np.float64]:
-    return _mesh([np.linspace(0.0, 1.0, count) for count in _COUNTS[d]])
+    lines = [np.linspace(0.0, 1.0, n) if n > 2 else _centres(n) for n in _COUNTS[d]]
+    return _mesh(lines)
 
 
 def _centres(count: int) -> NDArray[np.float64]:

@@ -120,14 +120,11 @@ def search_causes(
     atlas = {k: v for k, v in atlas.items() if not set(k) & set(without)}
     rng = np.random.default_rng(seed)
     rough = Hunt(unit, coarse, rng, executor, part_of(progress, 0.4, 0.6, "narrowing down"))
-    rough.start(_singles(coarse, atlas), _FIRST_GROUPS)
+    rough.start(_singles(coarse, atlas), _FIRST_GROUPS, coarse=True)
     rough.hear()
     rough.look_closer(_with_baseline(rough.leading(_SECOND, _TOO_FAR)), _SECOND_GROUPS)
     rough.hear()
-    if _is_doubtful(rough.best, rng):
-        # A cause with several parameters may only want a closer look.
-        rough.settle([rough.best.hypothesis.effects], _LAST_GROUPS)
-    doubted = _is_doubtful(rough.best, rng)
+    doubted = _stays_doubtful(rough, rng)
     if doubted:
         search_pairs(rough, atlas)
     fine = Hunt(
@@ -286,6 +283,18 @@ def _is_doubtful(candidate: Candidate, rng: np.random.Generator, missed: float =
     if judge_adequacy(candidate, rng).sigma > _DOUBT:
         return True
     return hold_out(candidate, candidate.surface.observation).rms_sigma > missed
+
+
+def _stays_doubtful(rough: Hunt, rng: np.random.Generator) -> bool:
+    """Whether the leader is in doubt after closer looks: one for each size that it has.
+
+    A cause with several may only want more runs, and those of pairs are many more.
+    """
+    for _ in range(max(rough.best.hypothesis.d - 1, 1)):
+        if not _is_doubtful(rough.best, rng):
+            return False
+        rough.settle([rough.best.hypothesis.effects], _LAST_GROUPS)
+    return _is_doubtful(rough.best, rng)
 
 
 def _is_nothing_missing(fine: Hunt, rng: np.random.Generator) -> bool:

@@ -153,6 +153,29 @@ def test_two_of_three_causes_are_weighed_where_the_three_lead(monkeypatch):
 
 
 @pytest.mark.parametrize(
+    ("effects", "doubts", "looks", "doubted"),
+    [
+        (("payload-flexibility",), [False], 0, False),
+        (("payload-flexibility",), [True, True, True, False], 3, False),
+        (("payload-flexibility",), [True] * 4, 3, True),
+        (("load-inertia",), [True, False], 1, False),
+        (("load-inertia",), [True, True], 1, True),
+        ((), [True, True], 1, True),
+    ],
+)
+def test_a_doubted_leader_is_looked_at_once_more_for_each_of_its_sizes(
+    monkeypatch, effects, doubts, looks, doubted
+):
+    settled, left = [], iter(doubts)
+    best = SimpleNamespace(hypothesis=Hypothesis(ADSS, effects))
+    rough = SimpleNamespace(best=best, settle=lambda chosen, groups: settled.append(chosen))
+    monkeypatch.setattr(search, "_is_doubtful", lambda *_: next(left))
+    assert search._stays_doubtful(rough, None) is doubted
+    assert settled == [[effects]] * looks
+    assert not list(left)
+
+
+@pytest.mark.parametrize(
     ("missed", "second", "rounds"),
     [
         ([1.0], 10.0, 0),
