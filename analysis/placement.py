@@ -25,11 +25,11 @@ _RATIOS = 10
 _CLOSE, _FAR = (0.14, 0.06), (0.3, 0.12)
 """Reach in ratio and in sizes about a place that the coarse look knows well, and about a pair's."""
 
-_LOOSE, _MORE = np.array([0.2, 0.15, 0.35]), 3
-"""Reach about the three sizes of a cause that has so many, and how many times the groups, where
-the coarse look alone says where. Of sixteen payloads drawn at random it missed the inertia by 0.2,
-the resonance by 0.1 and the damping by 0.25; a fit that does not get there makes pairs look for
-what a payload does alone."""
+_LOOSE = np.array([0.2, 0.15, 0.35])
+"""Reach about the three sizes of a cause that has so many, where a coarse look alone says where. Of
+sixteen payloads drawn at random it missed the inertia by 0.2 of its range, the resonance by 0.1 and
+the damping by 0.25."""
+
 _RATIO_REACH, _JITTER = 0.1, 0.01
 _WIDE, _LEAST_STD = 3.0, 0.015
 """Reach about a learned answer in its standard deviations, and the least of those."""
@@ -44,18 +44,17 @@ def groups_about(
     groups: int,
     rng: np.random.Generator,
     *,
-    coarse: bool = False,
+    loosely: bool = False,
 ) -> Iterator[Group]:
     """Groups about a place (d,), each of their sizes spread evenly.
 
-    They reach further for several causes, whose place is put together from what each does alone.
-    Where a place is a `coarse` look's word alone there are more of them for a cause of three sizes,
-    and further out.
+    They reach further for several causes, whose place is put together from what each does alone,
+    and `loosely` for a single cause of three sizes, which a coarse look cannot tell well.
     """
     ratio_reach, reach = _FAR if len(hypothesis.effects) > 1 else _CLOSE
     size_reach = np.full(hypothesis.d - 1, reach)
-    if coarse and len(size_reach) == len(_LOOSE):
-        size_reach, groups = _LOOSE, _MORE * groups
+    if loosely and len(hypothesis.effects) == 1 and len(size_reach) == len(_LOOSE):
+        size_reach = _LOOSE
     steps = np.array([rng.permutation(groups) for _ in range(hypothesis.d - 1)])
     for step in steps.T.reshape(groups, hypothesis.d - 1):
         offset = 2.0 * (step + rng.uniform(size=len(step))) / groups - 1.0

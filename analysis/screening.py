@@ -35,8 +35,8 @@ _ENOUGH = {1: 4.0, 2: 5.0, 3: 6.0, 4: 25.0}
 what is far away counts; the many parameters of a resonance need more. True pairs then rank best.
 """
 
-_COUNTS = {1: (31,), 2: (21, 25), 3: (13, 9, 5), 4: (11, 5, 15, 2)}
-"""Places looked at along each coordinate, the ends of its range among them unless they are two."""
+_COUNTS = {1: (31,), 2: (21, 25), 3: (13, 9, 5), 4: (11, 4, 15, 2)}
+"""Places looked at along each coordinate."""
 
 _PAIR_RATIOS, _PAIR_SIZES = 15, {2: (13,), 3: (9, 3), 4: (4, 15, 2)}
 """The same for pairs, whose ratio is common to both, and for each cause by its coordinates."""
@@ -55,11 +55,16 @@ def ranked(places: Mapping[Effects, Place]) -> list[Effects]:
     return sorted(places, key=lambda key: -places[key].log_likelihood)
 
 
-def screen_singles(coarse: Observation, atlas: Atlas) -> dict[Effects, Place]:
-    """The best place of every hypothesis of an atlas."""
+def screen_singles(
+    coarse: Observation, atlas: Atlas, *, amid: bool = False
+) -> dict[Effects, Place]:
+    """The best place of every hypothesis of an atlas.
+
+    `amid` looks at the middles of as many parts of every range, and not at its ends, too.
+    """
     found = {}
     for effects, population in atlas.items():
-        grid = _grid(population.places.shape[1])
+        grid = _grid(population.places.shape[1], amid)
         likelihood = _surface(coarse, population).scan(grid)
         top = int(np.argmax(likelihood))
         found[effects] = Place(grid[top], float(likelihood[top]))
@@ -182,8 +187,8 @@ def _surface(coarse: Observation, population: Population) -> Surface:
     )
 
 
-def _grid(d: int) -> NDArray[np.float64]:
-    lines = [np.linspace(0.0, 1.0, n) if n > 2 else _centres(n) for n in _COUNTS[d]]
+def _grid(d: int, amid: bool) -> NDArray[np.float64]:
+    lines = [_centres(n) if amid else np.linspace(0.0, 1.0, n) for n in _COUNTS[d]]
     return _mesh(lines)
 
 
