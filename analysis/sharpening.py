@@ -30,6 +30,11 @@ _WORTHWHILE, _TWO = 0.9, 2
 """Nor where two rounds left the largest of them above this share of what it was. What few runs say
 of their error is uncertain itself, so that a single round may seem worthless by chance."""
 
+_APART = 1.5
+"""Nor is either believed while the runs lie closer together than so many of those standard
+deviations: what is learned from runs is never more wrong than they are apart. Runs drawn evenly
+over three standard deviations on either side lie 1.7 apart."""
+
 
 def sharpen_candidate(
     unit: Unit,
@@ -49,9 +54,11 @@ def sharpen_candidate(
     key, found = candidate.hypothesis.effects, size_candidate(candidate, observation, rng)
     widest: list[float] = []
     for done in range(_ROUNDS):
-        widest.append(np.sqrt(np.diag(found.covariance)).max())
+        std = np.sqrt(np.diag(found.covariance))
+        widest.append(std.max())
         stalled = done >= _TWO and widest[-1] > _WORTHWHILE * widest[-1 - _TWO]
-        if widest[-1] <= _SHARP or stalled:
+        apart = bool(np.all(candidate.population.places.std(axis=0) > _APART * std))
+        if apart and (widest[-1] <= _SHARP or stalled):
             break
         groups = list(groups_around(candidate.hypothesis, found, _GROUPS, rng))
         made = simulate_groups(unit, groups, observation, rng, executor)[key]

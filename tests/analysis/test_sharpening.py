@@ -1,6 +1,7 @@
 """How long a named candidate is looked at, in a world whose answers are known."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -108,6 +109,29 @@ def test_one_round_that_seems_worthless_does_not_end_it_and_two_do(
     monkeypatch.setattr(sharpening, "size_candidate", sized(stds))
     rng = np.random.default_rng(0)
     sharpening.sharpen_candidate(synthetic.ADSS, found(observed, 0), observed, rng)
+    assert len(asked) == rounds
+
+
+@pytest.mark.parametrize(("reach", "rounds"), [(0.17, 0), (0.14, 1)])
+def test_a_sharp_answer_of_runs_that_lie_close_together_is_looked_at_again(
+    monkeypatch, asked, reach, rounds
+):
+    """Runs evenly over a size's reach lie that over the root of three apart."""
+    observed, steps = observed_at(0), np.linspace(-1.0, 1.0, 40)
+    candidate = found(observed, 0)
+    places = np.column_stack([np.linspace(0.0, 1.0, 40), 0.5 + reach * steps])
+    tens = [SimpleNamespace(places=ten) for ten in np.split(places, 4)]
+    made = population_of(tens, np.random.default_rng(0))
+    candidate = replace(candidate, population=made)
+    error = 0.1 / np.sqrt(3.0)
+
+    def size(candidate, observation, rng):
+        told = 0.03 if len(candidate.population) > 40 else error
+        return Calibrated(np.array([0.5, 0.5]), np.diag([0.001**2, told**2]))
+
+    monkeypatch.setattr(sharpening, "_SHARP", 0.07)
+    monkeypatch.setattr(sharpening, "size_candidate", size)
+    sharpening.sharpen_candidate(synthetic.ADSS, candidate, observed, np.random.default_rng(0))
     assert len(asked) == rounds
 
 
