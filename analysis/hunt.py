@@ -78,16 +78,15 @@ class Hunt:
         few, noise_v = self.observation.thinned(stride), self.observation.noise_v
         return Hunt(self._unit, few, self._rng, self._executor, self._report(), noise_v)
 
-    def start(self, places: Starts, groups: int, *, loosely: bool = False) -> None:
-        """Simulate hypotheses about places, or more of them than before about other places.
-
-        `loosely` puts them farther from places that are hardly known.
-        """
-        more: list[Group] = []
-        for key, place in places.items():
-            looked_at = Hypothesis(self._unit, key)
-            more += groups_about(looked_at, place, groups, self._rng, loosely=loosely)
-        self._simulate(more)
+    def start(self, places: Starts, groups: int) -> None:
+        """Simulate hypotheses about places, or more of them than before about other places."""
+        self._simulate(
+            [
+                group
+                for key, place in places.items()
+                for group in groups_about(Hypothesis(self._unit, key), place, groups, self._rng)
+            ]
+        )
         known = {key: self.found[key].best.place for key in places if key in self.found}
         self._form({**places, **known})
         for key in known:

@@ -24,12 +24,6 @@ _RATIOS = 10
 
 _CLOSE, _FAR = (0.14, 0.06), (0.3, 0.12)
 """Reach in ratio and in sizes about a place that the coarse look knows well, and about a pair's."""
-
-_LOOSE = np.array([0.2, 0.15, 0.35])
-"""Reach about the three sizes of a cause that has so many, where a coarse look alone says where. Of
-sixteen payloads drawn at random it missed the inertia by 0.2 of its range, the resonance by 0.1 and
-the damping by 0.25."""
-
 _RATIO_REACH, _JITTER = 0.1, 0.01
 _WIDE, _LEAST_STD = 3.0, 0.015
 """Reach about a learned answer in its standard deviations, and the least of those."""
@@ -39,22 +33,13 @@ _BEYOND, _CLOUD = 0.3, 250
 
 
 def groups_about(
-    hypothesis: Hypothesis,
-    best: NDArray[np.float64],
-    groups: int,
-    rng: np.random.Generator,
-    *,
-    loosely: bool = False,
+    hypothesis: Hypothesis, best: NDArray[np.float64], groups: int, rng: np.random.Generator
 ) -> Iterator[Group]:
     """Groups about a place (d,), each of their sizes spread evenly.
 
-    They reach further for several causes, whose place is put together from what each does alone,
-    and `loosely` for a single cause of three sizes, which a coarse look cannot tell well.
+    They reach further for several causes, whose place is put together from what each does alone.
     """
-    ratio_reach, reach = _FAR if len(hypothesis.effects) > 1 else _CLOSE
-    size_reach = np.full(hypothesis.d - 1, reach)
-    if loosely and len(hypothesis.effects) == 1 and len(size_reach) == len(_LOOSE):
-        size_reach = _LOOSE
+    ratio_reach, size_reach = _FAR if len(hypothesis.effects) > 1 else _CLOSE
     steps = np.array([rng.permutation(groups) for _ in range(hypothesis.d - 1)])
     for step in steps.T.reshape(groups, hypothesis.d - 1):
         offset = 2.0 * (step + rng.uniform(size=len(step))) / groups - 1.0

@@ -55,16 +55,11 @@ def ranked(places: Mapping[Effects, Place]) -> list[Effects]:
     return sorted(places, key=lambda key: -places[key].log_likelihood)
 
 
-def screen_singles(
-    coarse: Observation, atlas: Atlas, *, amid: bool = False
-) -> dict[Effects, Place]:
-    """The best place of every hypothesis of an atlas.
-
-    `amid` looks at the middles of as many parts of every range, and not at its ends, too.
-    """
+def screen_singles(coarse: Observation, atlas: Atlas) -> dict[Effects, Place]:
+    """The best place of every hypothesis of an atlas."""
     found = {}
     for effects, population in atlas.items():
-        grid = _grid(population.places.shape[1], amid)
+        grid = _grid(population.places.shape[1])
         likelihood = _surface(coarse, population).scan(grid)
         top = int(np.argmax(likelihood))
         found[effects] = Place(grid[top], float(likelihood[top]))
@@ -187,9 +182,8 @@ def _surface(coarse: Observation, population: Population) -> Surface:
     )
 
 
-def _grid(d: int, amid: bool) -> NDArray[np.float64]:
-    lines = [_centres(n) if amid else np.linspace(0.0, 1.0, n) for n in _COUNTS[d]]
-    return _mesh(lines)
+def _grid(d: int) -> NDArray[np.float64]:
+    return _mesh([np.linspace(0.0, 1.0, count) for count in _COUNTS[d]])
 
 
 def _centres(count: int) -> NDArray[np.float64]:

@@ -34,11 +34,6 @@ _SECOND, _SECOND_GROUPS = 5, 4
 _THIRD, _THIRD_GROUPS = 4, 4
 """How many hypotheses are looked at in each round, and in how many groups of runs each."""
 
-_MANY, _MANY_GROUPS = 4, 6
-"""Coordinates from which on a single cause gets so many groups more where the leader is doubted:
-two say little of three sizes, and pairs were then searched for what a flexible payload does alone.
-"""
-
 _BESIDE, _BESIDE_CLOSER, _BESIDE_GROUPS = (5, 8), (2, 4), (2, 4)
 """How many pairs with a leader that is not doubted are tried, and how many looked at closer, where
 it predicts other levels well and where worse than true causes do; in how many groups each time."""
@@ -130,8 +125,9 @@ def search_causes(
     rough.look_closer(_with_baseline(rough.leading(_SECOND, _TOO_FAR)), _SECOND_GROUPS)
     rough.hear()
     if _is_doubtful(rough.best, rng):
-        _look_at_many_sized(rough, atlas)
-    doubted = _stays_doubtful(rough, rng)
+        # A cause with several parameters may only want a closer look.
+        rough.settle([rough.best.hypothesis.effects], _LAST_GROUPS)
+    doubted = _is_doubtful(rough.best, rng)
     if doubted:
         search_pairs(rough, atlas)
     fine = Hunt(
@@ -290,26 +286,6 @@ def _is_doubtful(candidate: Candidate, rng: np.random.Generator, missed: float =
     if judge_adequacy(candidate, rng).sigma > _DOUBT:
         return True
     return hold_out(candidate, candidate.surface.observation).rms_sigma > missed
-
-
-def _look_at_many_sized(rough: Hunt, atlas: Atlas) -> None:
-    """Look more widely at causes of several sizes, which few runs lay beside where they are."""
-    many = {k: runs for k, runs in atlas.items() if runs.places.shape[1] >= _MANY}
-    places = screen_singles(rough.observation, many, amid=True)
-    rough.start({key: one.place for key, one in places.items()}, _MANY_GROUPS, loosely=True)
-    rough.hear()
-
-
-def _stays_doubtful(rough: Hunt, rng: np.random.Generator) -> bool:
-    """Whether the leader is in doubt after closer looks: one for each size that it has.
-
-    A cause with several may only want more runs, and those of pairs are many more.
-    """
-    for _ in range(max(rough.best.hypothesis.d - 1, 1)):
-        if not _is_doubtful(rough.best, rng):
-            return False
-        rough.settle([rough.best.hypothesis.effects], _LAST_GROUPS)
-    return _is_doubtful(rough.best, rng)
 
 
 def _is_nothing_missing(fine: Hunt, rng: np.random.Generator) -> bool:

@@ -31,32 +31,6 @@ def test_every_size_and_the_ratio_are_spread_evenly_over_the_reach(
         assert list(np.floor(offset / (ratio_reach / 5.0))) == list(range(10))
 
 
-@pytest.mark.parametrize("loosely", [False, True])
-def test_groups_about_a_place_of_three_sizes_that_is_hardly_known_lie_further_out(loosely):
-    hypothesis = Hypothesis(synthetic.ADSS, ("payload-flexibility",))
-    best, rng = np.full(4, 0.5), np.random.default_rng(3)
-    groups = list(groups_about(hypothesis, best, 6, rng, loosely=loosely))
-    farthest = np.abs([group.sizes - 0.5 for group in groups]).max(axis=0)
-    reach = np.array([0.2, 0.15, 0.35]) if loosely else np.full(3, 0.06)
-    # In the outermost of six even parts on either side.
-    assert np.all((farthest >= reach * 2.0 / 3.0) & (farthest <= reach))
-
-
-@pytest.mark.parametrize(
-    "effects",
-    [("load-inertia",), ("load-inertia", "mesh1-damping"), (),
-     ("load-inertia", "mesh1-damping", "tachometer-gain")],
-)  # fmt: skip
-def test_fewer_sizes_and_those_of_several_causes_stay_near(effects):
-    hypothesis = Hypothesis(synthetic.ADSS, effects)
-    best = np.full(hypothesis.d, 0.5)
-    near, far = (
-        list(groups_about(hypothesis, best, 4, np.random.default_rng(4), loosely=loosely))
-        for loosely in (False, True)
-    )
-    assert [g.sizes.tolist() for g in near] == [g.sizes.tolist() for g in far]
-
-
 def test_groups_stay_inside_the_plausible_range():
     hypothesis = Hypothesis(synthetic.ADSS, ("amplifier-lag", "load-inertia"))
     rng = np.random.default_rng(1)

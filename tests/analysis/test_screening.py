@@ -86,14 +86,6 @@ def test_a_pair_does_not_ask_its_parts_to_lead_alone(atlas, sizes, stands_in):
     assert found[best].log_likelihood > singles[alone].log_likelihood + 200.0
 
 
-@pytest.mark.parametrize(("amid", "ends"), [(False, True), (True, False)])
-def test_the_coarse_look_sees_the_ends_of_a_range_or_the_middles_of_its_parts(atlas, amid, ends):
-    """What wants more than there is of a cause is placed at the end, or half a part inside it."""
-    found = screen_singles(seen({"load-inertia": 1.2}, 0.3, 5), atlas, amid=amid)
-    size = found[("load-inertia",)].place[1]
-    assert size == pytest.approx(1.0 if ends else 1.0 - 0.5 / 25)
-
-
 def test_pairs_beside_a_cause_are_those_that_hold_it(atlas):
     observed = seen({"load-inertia": 0.8}, 0.3, 4)
     every, some = screen_pairs(observed, atlas), screen_pairs(observed, atlas, ("load-inertia",))

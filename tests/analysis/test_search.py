@@ -152,59 +152,6 @@ def test_two_of_three_causes_are_weighed_where_the_three_lead(monkeypatch):
     assert looked == [{pair, ("amplifier-lag", third), ("load-inertia", third)}]
 
 
-def test_causes_of_three_sizes_are_looked_at_widely_where_the_coarse_look_has_them(monkeypatch):
-    sizes = {("payload-flexibility",): 3, ("load-inertia",): 1, ("load-stribeck-friction",): 2}
-    atlas = {key: SimpleNamespace(places=np.zeros((5, 1 + n))) for key, n in sizes.items()}
-    place, asked = np.array([0.3, 0.4, 0.5, 0.6]), []
-
-    def screen(observation, some, *, amid):
-        assert amid
-        return {key: SimpleNamespace(place=place) for key in some}
-
-    rough = SimpleNamespace(
-        observation=None,
-        start=lambda places, groups, loosely: asked.append((places, groups, loosely)),
-        hear=lambda: asked.append("heard"),
-    )
-    monkeypatch.setattr(search, "screen_singles", screen)
-    search._look_at_many_sized(rough, atlas)
-    assert asked == [({("payload-flexibility",): place}, 6, True), "heard"]
-
-
-@pytest.mark.parametrize(("effects", "sizes", "wide"), [
-    (("load-inertia",), [0.8], 0), (("amplifier-lag", "load-inertia"), [0.8, 0.3], 1),
-])  # fmt: skip
-def test_they_are_where_the_leader_is_doubted_alone(runs, monkeypatch, effects, sizes, wide):
-    looks = []
-    monkeypatch.setattr(search, "_look_at_many_sized", lambda *_: looks.append(1))
-    others = set(CATALOGUE) - {*effects, "mesh1-damping"}
-    synthetic_search.diagnosed(effects, sizes, 1, without=others)
-    assert len(looks) == wide
-
-
-@pytest.mark.parametrize(
-    ("effects", "doubts", "looks", "doubted"),
-    [
-        (("payload-flexibility",), [False], 0, False),
-        (("payload-flexibility",), [True, True, True, False], 3, False),
-        (("payload-flexibility",), [True] * 4, 3, True),
-        (("load-inertia",), [True, False], 1, False),
-        (("load-inertia",), [True, True], 1, True),
-        ((), [True, True], 1, True),
-    ],
-)
-def test_a_doubted_leader_is_looked_at_once_more_for_each_of_its_sizes(
-    monkeypatch, effects, doubts, looks, doubted
-):
-    settled, left = [], iter(doubts)
-    best = SimpleNamespace(hypothesis=Hypothesis(ADSS, effects))
-    rough = SimpleNamespace(best=best, settle=lambda chosen, groups: settled.append(chosen))
-    monkeypatch.setattr(search, "_is_doubtful", lambda *_: next(left))
-    assert search._stays_doubtful(rough, None) is doubted
-    assert settled == [[effects]] * looks
-    assert not list(left)
-
-
 @pytest.mark.parametrize(
     ("missed", "second", "rounds"),
     [
