@@ -50,7 +50,8 @@ def search_pairs(rough: Hunt, atlas: Atlas) -> None:
 
 def _hold_against_neighbours(rough: Hunt, atlas: Atlas, looked_at: set[Effects]) -> None:
     """Look at others with a cause of the leading pair: true pairs nearly all share one with it."""
-    leader, before = rough.among(looked_at)[0], Effects()
+    before: Effects = ()
+    leader = rough.among(looked_at)[0]
     for _ in range(_SWAP_ROUNDS):
         _look_at_parts(rough, leader)
         if not earns(leader, rough.found):

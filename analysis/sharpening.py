@@ -26,7 +26,7 @@ __all__ = ["sharpen_candidate"]
 _ROUNDS, _GROUPS = 5, 4
 _SHARP = 0.035
 """Standard deviation of every coordinate from which on nothing more is simulated."""
-_WORTHWHILE, _TWO = 0.9, 2
+_WORTHWHILE, _BACK = 0.9, 2
 """Nor where two rounds left the largest of them above this share of what it was. What few runs say
 of their error is uncertain itself, so that a single round may seem worthless by chance."""
 
@@ -56,7 +56,7 @@ def sharpen_candidate(
     for done in range(_ROUNDS):
         std = np.sqrt(np.diag(found.covariance))
         widest.append(std.max())
-        stalled = done >= _TWO and widest[-1] > _WORTHWHILE * widest[-1 - _TWO]
+        stalled = done >= _BACK and widest[-1] > _WORTHWHILE * widest[-1 - _BACK]
         apart = bool(np.all(candidate.population.places.std(axis=0) > _APART * std))
         if apart and (widest[-1] <= _SHARP or stalled):
             break

@@ -70,16 +70,19 @@ def simulate_in(monkeypatch) -> Asked:
     return count
 
 
+def observed(effects, sizes, rng):
+    """An observation of a machine with these effects at a ratio of 0.4."""
+    return synthetic.observation(read(effects, np.array([0.4, *sizes]), rng))
+
+
 def diagnosed(effects, sizes, seed, **given):
     """Candidates of a search for hidden effects, and the verdict on them."""
     rng = np.random.default_rng(seed)
-    observed = synthetic.observation(read(effects, np.array([0.4, *sizes]), rng))
-    found = search.search_causes(ADSS, observed, seed=seed, **given)
+    found = search.search_causes(ADSS, observed(effects, sizes, rng), seed=seed, **given)
     return found, judge_candidates(found, found[0].surface.observation, rng)
 
 
 def hunted(sizes, seed):
     """A hunt for one cause of a known size, with nothing simulated yet."""
     rng = np.random.default_rng(seed)
-    observed = synthetic.observation(read(("load-inertia",), np.array([0.4, *sizes]), rng))
-    return hunt.Hunt(ADSS, observed, rng, None, None)
+    return hunt.Hunt(ADSS, observed(("load-inertia",), sizes, rng), rng, None, None)

@@ -5,12 +5,6 @@ import pytest
 import synthetic_search
 
 
-@pytest.fixture
-def runs(monkeypatch):
-    """What was asked for."""
-    return synthetic_search.simulate_in(monkeypatch)
-
-
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_second_look_elsewhere_does_not_lose_what_the_first_found(runs, seed):
     key = ("load-inertia",)

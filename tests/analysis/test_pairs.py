@@ -10,12 +10,6 @@ from analysis.screening import Place
 from sim.catalogue import CATALOGUE
 
 
-@pytest.fixture
-def runs(monkeypatch):
-    """What was asked for."""
-    return synthetic_search.simulate_in(monkeypatch)
-
-
 @pytest.mark.parametrize("seed", synthetic_search.MORE_SEEDS)
 def test_two_causes_are_found_together(runs, seed):
     pair = ("amplifier-lag", "load-inertia")

@@ -16,12 +16,6 @@ from sim.catalogue import CATALOGUE
 ADSS = synthetic.ADSS
 
 
-@pytest.fixture
-def runs(monkeypatch):
-    """What was asked for."""
-    return synthetic_search.simulate_in(monkeypatch)
-
-
 @pytest.mark.parametrize(
     ("effect", "seed"), [("load-inertia", 1), ("amplifier-lag", 2), ("mesh1-damping", 3)]
 )
@@ -256,10 +250,7 @@ def test_what_is_left_out_of_the_catalogue_is_not_looked_at(runs, monkeypatch):
 
 
 def test_every_candidate_is_held_against_the_same_noise(runs):
-    rng = np.random.default_rng(6)
-    observed = synthetic.observation(
-        synthetic_search.read(("load-inertia",), np.array([0.4, 0.8]), rng)
-    )
+    observed = synthetic_search.observed(("load-inertia",), [0.8], np.random.default_rng(6))
     loud = observed.with_noise(4.0 * USUAL_NOISE_V)
     found = search.search_causes(ADSS, loud, seed=6)
     heard = {one.surface.observation.noise_v for one in found}
