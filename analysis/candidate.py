@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 
 from analysis.branches import find_motions
 from analysis.causes import Hypothesis
+from analysis.chart import Chart
 from analysis.ensemble import TOLERANCES
 from analysis.observation import Observation
 from analysis.population import DEVIATING, Population
 from analysis.surface import Fit, Surface, differences
-from analysis.widths import learn_width, plain_width
+from analysis.widths import learn_width
 from sim.unit import Unit
 
 __all__ = ["Candidate", "Effects", "form_candidates"]
@@ -55,7 +56,8 @@ def form_candidates(
     found = {}
     for key, population in fine.items():
         surface = _without_deviations(raw[key], population, slopes)
-        width = learn_width(surface.places, surface.difference, surface.width, starts[key])
+        charts = surface.on_chart(surface.places), surface.on_chart(starts[key][None])
+        width = learn_width(charts[0], surface.difference, surface.width, charts[1])
         surface = replace(surface, width=width)
         best = surface.climb(starts[key])
         found[key] = Candidate(Hypothesis(unit, key), population, surface, best)
@@ -64,17 +66,19 @@ def form_candidates(
 
 def _surface(observation: Observation, population: Population, hypothesis: Hypothesis) -> Surface:
     none = np.empty((0, 3, len(observation)))
+    chart = Chart(hypothesis, observation.frequency_hz)
     return Surface(
         observation,
         population.places,
         differences(observation, population),
-        plain_width(hypothesis),
+        chart.width,
         none,
         np.empty(0),
         find_motions(observation, population),
         # As few as there are slopes leave a plane that turns with every group: of pairs with four
         # sizes runs left out were predicted worse by hundreds in log density.
-        enough=(hypothesis.d + 1) ** 2,
+        enough=(len(chart.width) + 1) ** 2,
+        chart=chart,
     )
 
 

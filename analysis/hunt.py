@@ -46,7 +46,7 @@ class Hunt:
         noise_v: float | None = None,
     ) -> None:
         heard = observation if noise_v is None else observation.with_noise(noise_v)
-        self._unit, self.observation, self._rng = unit, heard, rng
+        self.unit, self.observation, self._rng = unit, heard, rng
         self._noises = possible_noises(observation)
         self._executor, self._progress, self._left = executor, progress, 1.0
         self._runs: dict[Effects, Population] = {}
@@ -76,7 +76,7 @@ class Hunt:
     def thinned(self, stride: int) -> Hunt:
         """A hunt on every so manieth of the frequencies, with nothing simulated yet."""
         few, noise_v = self.observation.thinned(stride), self.observation.noise_v
-        return Hunt(self._unit, few, self._rng, self._executor, self._report(), noise_v)
+        return Hunt(self.unit, few, self._rng, self._executor, self._report(), noise_v)
 
     def start(self, places: Starts, groups: int) -> None:
         """Simulate hypotheses about places, or more of them than before about other places."""
@@ -84,7 +84,7 @@ class Hunt:
             [
                 group
                 for key, place in places.items()
-                for group in groups_about(Hypothesis(self._unit, key), place, groups, self._rng)
+                for group in groups_about(Hypothesis(self.unit, key), place, groups, self._rng)
             ]
         )
         known = {key: self.found[key].best.place for key in places if key in self.found}
@@ -119,7 +119,7 @@ class Hunt:
 
         def likelihood(seen: Observation) -> float:
             starts, runs = {key: best.best.place}, {key: self._runs[key]}
-            return form_candidates(self._unit, seen, runs, starts)[key].best.log_likelihood
+            return form_candidates(self.unit, seen, runs, starts)[key].best.log_likelihood
 
         heard = likeliest_noise(self._noises, likelihood)
         if heard.noise_v != self.observation.noise_v:
@@ -132,7 +132,7 @@ class Hunt:
 
     def _simulate(self, groups: Sequence[Group]) -> None:
         made = simulate_groups(
-            self._unit, groups, self.observation, self._rng, self._executor, self._report()
+            self.unit, groups, self.observation, self._rng, self._executor, self._report()
         )
         for key, population in made.items():
             known = self._runs.get(key)
@@ -140,7 +140,7 @@ class Hunt:
 
     def _form(self, starts: Starts) -> None:
         runs = {key: self._runs[key] for key in starts}
-        self.found |= form_candidates(self._unit, self.observation, runs, starts)
+        self.found |= form_candidates(self.unit, self.observation, runs, starts)
 
     def _report(self) -> Callable[[float], None] | None:
         """Half of what is left of the bar, as nobody knows how many rounds are to come."""

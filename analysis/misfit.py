@@ -87,7 +87,7 @@ def find_departures(candidate: Candidate, observation: Observation) -> tuple[Dep
 def _scatter_of_runs(candidate: Candidate) -> NDArray[np.float64]:
     """(near, 3, rows): runs near the best place less what is expected at their own places."""
     surface, best = candidate.surface, candidate.best
-    distance = np.sum(((surface.places - best.place) / surface.width) ** 2, axis=1)
+    distance = surface.distance(best.place)
     near = np.argsort(distance, kind="stable")[:_NEAR]
     return np.stack([surface.difference[i] - surface.expected(surface.places[i])[0] for i in near])
 

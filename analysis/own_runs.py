@@ -55,7 +55,7 @@ def own_runs(candidate: Candidate, rng: np.random.Generator) -> Iterator[OwnRun]
     surface, best = candidate.surface, candidate.best
     most_lost = max(surface.lost(best.place), _LOST * len(surface.observation))
     noise = surface.observation.noise
-    distance = np.sum(((surface.places - best.place) / surface.width) ** 2, axis=1)
+    distance = surface.distance(best.place)
     # Half of the runs deviate as a run does in the first datasheet value; the other half fits it.
     # The limits of what is doubted were settled so.
     halves = candidate.population.deviations[:, 0]

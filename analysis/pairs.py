@@ -36,7 +36,7 @@ def search_pairs(rough: Hunt, atlas: Atlas) -> None:
     AnalysisError
         If a motion grew without bound.
     """
-    places = screen_pairs(rough.observation, atlas)
+    places = screen_pairs(rough.unit, rough.observation, atlas)
     favoured = ranked(places)
     if not favoured:
         return

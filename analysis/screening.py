@@ -10,7 +10,7 @@ of a pair showed. It simulates nothing itself.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -21,22 +21,30 @@ from analysis.atlas import Atlas
 from analysis.branches import Motions
 from analysis.candidate import Candidate, Effects
 from analysis.causes import Hypothesis
+from analysis.chart import Chart
 from analysis.observation import Observation
 from analysis.population import Population
 from analysis.surface import Surface, differences
+from sim.unit import Unit
 
 __all__ = ["Place", "ranked", "screen_further", "screen_pairs", "screen_singles"]
 
-_WIDTHS = {1: (0.06,), 2: (0.1, 0.13), 3: (0.12, 0.15, 0.2), 4: (0.15, 0.25, 0.08, 1.0)}
+_WIDTHS = {1: (0.06,), 2: (0.1, 0.13), 3: (0.12, 0.15, 0.2)}
 """Distances over which a coarse surface reaches, by number of coordinates."""
 
-_ENOUGH = {1: 4.0, 2: 5.0, 3: 6.0, 4: 25.0}
+_ENOUGH = {1: 4.0, 2: 5.0, 3: 6.0}
 """How many runs a regression takes, by number of coordinates: so few of so coarse an atlas, lest
-what is far away counts; the many parameters of a resonance need more. True pairs then rank best.
-"""
+what is far away counts. True pairs then rank best."""
 
-_COUNTS = {1: (31,), 2: (21, 25), 3: (13, 9, 5), 4: (11, 4, 15, 2)}
+_FELT_WIDTHS, _FELT_ENOUGH = (0.15, 0.3, 0.3), 12.0
+"""The same where the load is seen by what it reflects."""
+
+_COUNTS = {1: (31,), 2: (21, 25), 3: (13, 9, 5)}
 """Places looked at along each coordinate."""
+
+_FELT_COUNTS, _REFINED = (10, 4, 16, 2), (0.5, 0.25)
+"""The same for what swings on the load, and the shares of those steps in which the best place is
+then looked for more closely: the surface is smooth enough for it, and a resonance narrow."""
 
 _PAIR_RATIOS, _PAIR_SIZES = 15, {2: (13,), 3: (9, 3), 4: (4, 15, 2)}
 """The same for pairs, whose ratio is common to both, and for each cause by its coordinates."""
@@ -55,20 +63,21 @@ def ranked(places: Mapping[Effects, Place]) -> list[Effects]:
     return sorted(places, key=lambda key: -places[key].log_likelihood)
 
 
-def screen_singles(coarse: Observation, atlas: Atlas) -> dict[Effects, Place]:
-    """The best place of every hypothesis of an atlas."""
-    found = {}
-    for effects, population in atlas.items():
-        grid = _grid(population.places.shape[1])
-        likelihood = _surface(coarse, population).scan(grid)
-        top = int(np.argmax(likelihood))
-        found[effects] = Place(grid[top], float(likelihood[top]))
+def screen_singles(
+    unit: Unit, coarse: Observation, atlas: Atlas, wanted: Collection[Effects] | None = None
+) -> dict[Effects, Place]:
+    """The best place of every hypothesis of an atlas, or of those that are wanted."""
+    surfaces, found = _surfaces(unit, coarse, atlas), {}
+    for effects in atlas if wanted is None else wanted:
+        found[effects] = _best_place(surfaces[effects])
     return found
 
 
-def screen_pairs(coarse: Observation, atlas: Atlas, beside: Effects = ()) -> dict[Effects, Place]:
+def screen_pairs(
+    unit: Unit, coarse: Observation, atlas: Atlas, beside: Effects = ()
+) -> dict[Effects, Place]:
     """The best place of every pair of causes of an atlas, or of those with one of `beside`."""
-    plain, added = _every_added(coarse, atlas)
+    plain, added = _every_added(unit, coarse, atlas)
     return {
         (*first, *second): _best_pair(plain, added[first], added[second])
         for first, second in combinations(sorted(added), 2)
@@ -84,7 +93,8 @@ def screen_further(coarse: Observation, atlas: Atlas, known: Candidate) -> dict[
     """
     rows = _rows_of(coarse, known.surface.observation)
     shown = [np.array(known.surface.expected(p))[..., rows] for p in known.population.places]
-    _, added = _every_added(coarse, atlas)
+    unit = known.hypothesis.unit
+    _, added = _every_added(unit, coarse, atlas)
     ratios = _centres(_PAIR_RATIOS)
     nearest = [int(np.argmin(abs(ratios - p[0]))) for p in known.population.places]
     found = {}
@@ -102,7 +112,7 @@ def screen_further(coarse: Observation, atlas: Atlas, known: Candidate) -> dict[
         one, size = np.unravel_index(np.argmax(likelihood), likelihood.shape)
         both, place = known.hypothesis.joined(
             known.population.places[one],
-            Hypothesis(known.hypothesis.unit, effects),
+            Hypothesis(unit, effects),
             further.sizes[size],
         )
         found[both.effects] = Place(place, float(likelihood[one, size]))
@@ -132,10 +142,10 @@ class _Added:
 
 
 def _every_added(
-    coarse: Observation, atlas: Atlas
+    unit: Unit, coarse: Observation, atlas: Atlas
 ) -> tuple[NDArray[np.float64], dict[Effects, _Added]]:
     """What the baseline shows at every ratio (ratios, 3, rows), and what each cause adds."""
-    surfaces = {effects: _surface(coarse, population) for effects, population in atlas.items()}
+    surfaces = _surfaces(unit, coarse, atlas)
     ratios = _centres(_PAIR_RATIOS)
     plain = np.array([surfaces[()].expected(np.array([ratio]))[0] for ratio in ratios])
     return plain, {e: _added(surface, plain) for e, surface in surfaces.items() if e}
@@ -163,27 +173,94 @@ def _best_pair(plain: NDArray[np.float64], first: _Added, second: _Added) -> Pla
     return Place(where, top)
 
 
-def _surface(coarse: Observation, population: Population) -> Surface:
-    d = population.places.shape[1]
-    width = np.array(_WIDTHS[d])
-    none = np.empty((0, 3, len(coarse)))
-    difference = differences(coarse, population)
-    nothing = Motions.unknown(*difference.shape[::2])
-    return Surface(
+def _surfaces(unit: Unit, coarse: Observation, atlas: Atlas) -> dict[Effects, Surface]:
+    """A surface for every hypothesis of an atlas.
+
+    A load that is felt alike does alike, whatever hangs on it: what swings on the load is seen by
+    all runs with something linear there.
+    """
+    charts = {effects: Chart(Hypothesis(unit, effects), coarse.frequency_hz) for effects in atlas}
+    at_load = [k for k, chart in charts.items() if chart.at_load]
+    return {
+        k: _felt_surface(coarse, atlas, charts, k, at_load)
+        if charts[k].bent.any()
+        else _surface(coarse, atlas[k])
+        for k in atlas
+    }
+
+
+def _felt_surface(
+    coarse: Observation,
+    atlas: Atlas,
+    charts: Mapping[Effects, Chart],
+    effects: Effects,
+    at_load: Sequence[Effects],
+) -> Surface:
+    """A surface over the ratio and what the load reflects, by the runs of many hypotheses."""
+    runs = np.concatenate([differences(coarse, atlas[k]) for k in at_load])
+    felt = np.concatenate([charts[k].felt(atlas[k].places) for k in at_load], axis=1)
+    return _plain_surface(
         coarse,
-        population.places,
-        difference,
-        width,
-        none,
-        np.empty(0),
-        nothing,
-        _ENOUGH[d],
-        tailed=False,
+        atlas[effects].places,
+        runs,
+        _FELT_WIDTHS,
+        _FELT_ENOUGH,
+        chart=charts[effects],
+        coordinates=felt,
     )
 
 
-def _grid(d: int) -> NDArray[np.float64]:
-    return _mesh([np.linspace(0.0, 1.0, count) for count in _COUNTS[d]])
+def _surface(coarse: Observation, population: Population) -> Surface:
+    d = population.places.shape[1]
+    runs = differences(coarse, population)
+    return _plain_surface(coarse, population.places, runs, _WIDTHS[d], _ENOUGH[d])
+
+
+def _plain_surface(
+    coarse: Observation,
+    places: NDArray[np.float64],
+    difference: NDArray[np.float64],
+    width: Sequence[float],
+    enough: float,
+    chart: Chart | None = None,
+    coordinates: NDArray[np.float64] | None = None,
+) -> Surface:
+    """A surface that knows nothing of deviations and states of motion."""
+    return Surface(
+        coarse,
+        places,
+        difference,
+        np.array(width),
+        np.empty((0, 3, len(coarse))),
+        np.empty(0),
+        Motions.unknown(len(difference), len(coarse)),
+        enough,
+        tailed=False,
+        chart=chart,
+        coordinates=coordinates,
+    )
+
+
+def _best_place(surface: Surface) -> Place:
+    d = surface.places.shape[1]
+    if d not in _COUNTS:
+        return _refined(surface, _mesh([_centres(count) for count in _FELT_COUNTS]))
+    return _best_of(surface, _mesh([np.linspace(0.0, 1.0, count) for count in _COUNTS[d]]))
+
+
+def _refined(surface: Surface, grid: NDArray[np.float64]) -> Place:
+    """The best place about the best of a grid, in ever finer steps."""
+    best = _best_of(surface, grid)
+    for share in _REFINED:
+        lines = [share / count * np.array([-1.0, 0.0, 1.0]) for count in _FELT_COUNTS]
+        best = _best_of(surface, np.clip(best.place + _mesh(lines), 0.0, 1.0))
+    return best
+
+
+def _best_of(surface: Surface, grid: NDArray[np.float64]) -> Place:
+    likelihood = surface.scan(grid)
+    top = int(np.argmax(likelihood))
+    return Place(grid[top], float(likelihood[top]))
 
 
 def _centres(count: int) -> NDArray[np.float64]:

@@ -120,7 +120,7 @@ def search_causes(
     atlas = {k: v for k, v in atlas.items() if not set(k) & set(without)}
     rng = np.random.default_rng(seed)
     rough = Hunt(unit, coarse, rng, executor, part_of(progress, 0.4, 0.6, "narrowing down"))
-    rough.start(_singles(coarse, atlas), _FIRST_GROUPS)
+    rough.start(_singles(unit, coarse, atlas), _FIRST_GROUPS)
     rough.hear()
     rough.look_closer(_with_baseline(rough.leading(_SECOND, _TOO_FAR)), _SECOND_GROUPS)
     rough.hear()
@@ -172,8 +172,8 @@ def _look_beside(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator
     leader = fine.best.hypothesis.effects
     if len(leader) != 1:
         return
-    alone = screen_singles(rough.observation, {leader: atlas[leader]})[leader]
-    places = screen_pairs(rough.observation, atlas, leader)
+    alone = screen_singles(rough.unit, rough.observation, atlas, [leader])[leader]
+    places = screen_pairs(rough.unit, rough.observation, atlas, leader)
     poor = hold_out(fine.best, fine.observation).rms_sigma > AT_NOISE
     enough = -np.inf if poor else alone.log_likelihood - _LITTLE
     chosen = [k for k in ranked(places)[: _BESIDE[poor]] if places[k].log_likelihood > enough]
@@ -276,9 +276,9 @@ def _compare(fine: Hunt, rng: np.random.Generator) -> bool:
     return missing
 
 
-def _singles(coarse: Observation, atlas: Atlas) -> Starts:
+def _singles(unit: Unit, coarse: Observation, atlas: Atlas) -> Starts:
     """Best places of the single causes that the atlas favours, and of the baseline."""
-    places = screen_singles(coarse, atlas)
+    places = screen_singles(unit, coarse, atlas)
     return {key: places[key].place for key in _with_baseline(ranked(places)[:_FIRST])}
 
 

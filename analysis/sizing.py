@@ -23,12 +23,14 @@ def size_candidate(
 ) -> Calibrated:
     """Mean (d,) and covariance (d, d) of the coordinates, from runs left out in turn."""
     runs, surface = candidate.population, candidate.surface
+    bent = len(surface.width) != candidate.hypothesis.d
     emulator = Emulator(
         runs.places,
         runs.deviations,
         runs.channels(observation),
         observation.blocks,
-        surface.width,
+        # The widths of a chart are not those of the places.
+        runs.places.std(axis=0) + 1e-6 if bent else surface.width,
         surface.sigmas,
     )
     found = calibrate(observation, emulator, rng)

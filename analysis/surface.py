@@ -18,18 +18,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.branches import Motions
+from analysis.chart import Chart
 from analysis.emulator import GAIN_TOLERANCE
 from analysis.likelihood import HEAT
 from analysis.observation import Observation
 from analysis.population import Population
+from analysis.regression import TAIL, TAIL_SCALE, regress
 
 __all__ = ["Fit", "Surface", "differences"]
 
 _WIDENINGS: NDArray[np.float64] = 1.3 ** np.arange(-3, 9, dtype=np.float64)
 """Reaches of the kernel, in widths: the first is taken that holds enough runs."""
-
-_RIDGE = 0.1
-"""Ridge of the slopes, in units of the kernel's reach: few runs must not make a wild slope."""
 
 _BLUR = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0
 """Weights over neighbouring frequencies by which a scatter is smoothed: few runs tell little."""
@@ -49,12 +48,8 @@ _UNKNOWN = np.array([0.5, 0.5, 1.5])
 """Scatter of a motion that no run shows, by channel: a machine that never does what was observed
 is unlikely, but not as unlikely as its other motion would have it."""
 
-_TAIL = 4.0
-"""Degrees of freedom of Student's t, whose variance is _TAIL / (_TAIL - 2) of its scale squared."""
-
-_TAIL_ITERATIONS = 5
-
-_SCALE = float(np.sqrt((_TAIL - 2.0) / _TAIL))
+_MOST = 3.0
+"""How many of the nearest runs take part in a regression at one row, as multiples of `enough`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +90,7 @@ class Surface:
     difference
         (n, 3, rows), see `differences`; deviations taken out where slopes are known.
     width
-        (d,): distance over which a response changes smoothly.
+        (k,): distance over which a response changes smoothly, in the coordinates of `chart`.
     slopes
         (k, 3, rows): change of the channels per unit of each deviation, or no rows.
     sigmas
@@ -106,6 +101,10 @@ class Surface:
         How many runs a regression takes, by their weights.
     tailed
         Whether scatter is fitted as Student's t (slower) or as a mean square.
+    chart
+        Coordinates in which runs are compared; their places if not given.
+    coordinates
+        (1 or rows, n, k) of the runs, where not all are the hypothesis's own.
     """
 
     observation: Observation
@@ -117,6 +116,8 @@ class Surface:
     motions: Motions
     enough: float
     tailed: bool = True
+    chart: Chart | None = None
+    coordinates: NDArray[np.float64] | None = None
 
     def scan(self, grid: NDArray[np.float64]) -> NDArray[np.float64]:
         """Log-likelihood (count,) at places (count, d), deviations left in the scatter."""
@@ -124,65 +125,68 @@ class Surface:
 
     def expected(self, place: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
         """Mean difference (3, rows) of runs at a place, and the scatter of a single run there."""
-        offset = (self.places - place) / self.width
-        weights = self._weights(offset)
+        return self._expected(self._offset(place))
+
+    def _expected(self, offset: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
+        mean, variance = self._by_row(offset) if len(offset) > 1 else self._at_once(offset)
+        variance = variance @ self._blur
+        return mean + self._unread, np.sqrt(variance + self._least)
+
+    def _at_once(self, offset: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
+        """Mean and variance (3, rows) where runs are as near at one row as at any other."""
+        weights = _weigh(np.sum(offset[0] ** 2, axis=1))
         shape = self.difference.shape[1:]
         mean, variance = np.empty(shape), np.empty(shape)
         mixed = self.motions.mixed
         if not mixed.all():
             pick = self._reach(weights.sum(axis=1))
-            found = self._regress(offset, weights[pick][:, None], _WIDENINGS[[pick]], ~mixed)
-            mean[:, ~mixed], variance[:, ~mixed] = found
+            near = weights[pick] > 0.0
+            # Weighted alike, all rows are one problem.
+            values = self._values[~mixed][:, :, near].reshape(1, -1, np.count_nonzero(near))
+            reach = _WIDENINGS[[pick]]
+            one, other = regress(
+                offset[:, near], weights[pick, near][None], reach, values, tailed=self.tailed
+            )
+            mean[:, ~mixed], variance[:, ~mixed] = one.reshape(-1, 3).T, other.reshape(-1, 3).T
         if mixed.any():
             alike = self.alike[:, mixed]
             picks = self._reach(weights @ alike)
-            weight = weights[picks].T * alike
-            found = self._regress(offset, weight, _WIDENINGS[picks], mixed)
-            unknown = np.clip(1.0 - weight.sum(axis=0), 0.0, 1.0)
-            mean[:, mixed] = found[0]
-            variance[:, mixed] = found[1] + unknown * _UNKNOWN[:, None] ** 2
-        variance = variance @ self._blur
-        return mean + self._unread, np.sqrt(variance + self._least)
+            weight = weights[picks] * alike.T
+            near = weight.max(axis=0) > 0.0
+            one, other = regress(
+                offset[:, near],
+                weight[:, near],
+                _WIDENINGS[picks],
+                self._values[mixed][:, :, near],
+                tailed=self.tailed,
+            )
+            mean[:, mixed] = one.T
+            variance[:, mixed] = other.T + _variance_unknown(weight)
+        return mean, variance
 
-    def _regress(
-        self,
-        offset: NDArray[np.float64],
-        weight: NDArray[np.float64],
-        reach: NDArray[np.float64],
-        rows: NDArray[np.bool_],
-    ) -> tuple[NDArray, NDArray]:
-        """Value and variance (3, some rows) at offset 0, with weights (n, 1 or some rows)."""
-        near = weight.max(axis=1) > 0.0
-        w, offset = weight[near].T[:, None], offset[near]
-        values = self._values[rows][:, :, near]
-        if len(w) == 1:
-            # Weighted alike, all rows are one problem.
-            values = values.reshape(1, -1, len(offset))
-        basis = np.column_stack([np.ones(len(offset)), offset]).T
-        weighed = basis * w
-        ridge = np.zeros((len(reach), len(basis)))
-        ridge[:, 0] = 1e-9
-        # The ridge is for slopes in units of the kernel's reach.
-        ridge[:, 1:] = _RIDGE * reach[:, None] ** 2
-        inverse = np.linalg.inv(weighed @ basis.T + ridge[:, :, None] * np.eye(len(basis)))
-        coefficients = values @ weighed.transpose(0, 2, 1) @ inverse
-        squares = (values - coefficients @ basis) ** 2
-        total, most = w.sum(axis=2), w * squares
-        variance = most.sum(axis=2) / total
-        for _ in range(_TAIL_ITERATIONS if self.tailed else 0):
-            # The scale of Student's t, which a few runs far out do not blow up.
-            bound = _TAIL * (_SCALE**2 * variance + 1e-12)
-            share = most / (squares + bound[:, :, None])
-            variance = (_TAIL + 1.0) * variance * share.sum(axis=2) / total
-        used = (inverse * (weighed @ weighed.transpose(0, 2, 1))).sum(axis=(1, 2))[:, None]
-        variance *= total / np.maximum(total - used, 0.3 * total)
-        leverage = ((inverse[:, :1] @ weighed) ** 2).sum(axis=2)
-        variance *= 1.0 + leverage
-        return coefficients[:, :, 0].reshape(-1, 3).T, variance.reshape(-1, 3).T
+    def _by_row(self, offset: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
+        """Mean and variance (3, rows) where every row has its own neighbours."""
+        squares, alike = np.einsum("rnk,rnk->rn", offset, offset), self.alike.T
+        most = min(int(_MOST * self.enough), squares.shape[1])
+        # Those in another state of motion come last.
+        near = np.argpartition(squares / alike, most - 1, axis=1)[:, :most]
+        alike = np.take_along_axis(alike, near, axis=1)
+        weights = _weigh(np.take_along_axis(squares, near, axis=1)) * alike
+        picks = self._reach(weights.sum(axis=2))
+        weight = weights[picks, np.arange(len(picks))]
+        mean, variance = regress(
+            np.take_along_axis(offset, near[..., None], axis=1),
+            weight,
+            _WIDENINGS[picks],
+            np.take_along_axis(self._values, near[:, None], axis=2),
+            tailed=self.tailed,
+        )
+        return mean.T, variance.T + self.motions.mixed * _variance_unknown(weight)
 
     def fit(self, place: NDArray[np.float64], rows: NDArray[np.bool_] | None = None) -> Fit:
         """Agreement at a place, deviations fitted to some rows (all where None)."""
-        mean, std = self.expected(place)
+        offset = self._offset(place)
+        mean, std = self._expected(offset)
         gain = np.zeros((1, *mean.shape))
         gain[0, 0] = 1.0
         slopes = np.concatenate([self.slopes, gain])
@@ -190,17 +194,17 @@ class Surface:
         seen = np.isfinite(mean)
         if rows is not None:
             seen &= rows
-        y, s, slope = -mean[seen], _SCALE * std[seen], slopes[:, seen]
+        y, s, slope = -mean[seen], TAIL_SCALE * std[seen], slopes[:, seen]
         best = np.zeros(len(sigmas))
         for _ in range(_ITERATIONS):
             z2 = ((y - best @ slope) / s) ** 2
-            trust = (_TAIL + 1.0) / (_TAIL + z2) / s**2
+            trust = (TAIL + 1.0) / (TAIL + z2) / s**2
             normal = (slope * trust) @ slope.T + np.diag(1.0 / sigmas**2)
             best = np.linalg.solve(normal, (slope * trust) @ y)
         residual = -mean - np.tensordot(best, slopes, axes=1)
         density = self.log_density(-residual, std)
         # Of runs near the place so many do as was observed.
-        density[2] += self.motions.log_shares(self._near(place))
+        density[2] += self.motions.log_shares(self._near(_distance(offset)))
         _, log_det = np.linalg.slogdet(normal @ np.diag(sigmas**2))
         prior = -0.5 * float(np.sum((best / sigmas) ** 2)) - 0.5 * float(log_det)
         total = float(density[seen].sum()) + prior
@@ -252,29 +256,42 @@ class Surface:
     @staticmethod
     def log_density(mean: NDArray[np.float64], std: NDArray[np.float64]) -> NDArray[np.float64]:
         """Student's t with a mean and a standard deviation (3, rows); 0 where nothing is known."""
-        scale = _SCALE * std
-        tail = -0.5 * (_TAIL + 1.0) * np.log1p((mean / scale) ** 2 / _TAIL)
+        scale = TAIL_SCALE * std
+        tail = -0.5 * (TAIL + 1.0) * np.log1p((mean / scale) ** 2 / TAIL)
         return np.where(np.isfinite(mean), tail - np.log(scale), 0.0)
 
     def lost(self, place: NDArray[np.float64]) -> int:
         """How many rows no run near a place shows as they were observed."""
-        return int(np.count_nonzero(self._near(place) @ self.motions.alike < 1.0))
+        near = self._near(self.distance(place))
+        return int(np.count_nonzero(near @ self.motions.alike < 1.0))
 
-    def _near(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
+    def distance(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far (n,) the runs are from a place, in widths squared, over all rows."""
+        return _distance(self._offset(place))
+
+    def on_chart(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Coordinates (1 or rows, m, k) of places (m, d) in which runs are compared."""
+        return places[None] if self.chart is None else self.chart(places)
+
+    def _offset(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far (1 or rows, n, k) the runs are from a place, in widths."""
+        return np.asarray((self._charted - self.on_chart(place[None])) / self.width)
+
+    def _near(self, distance: NDArray[np.float64]) -> NDArray[np.float64]:
         """Weights (n,) of runs near a place, whatever they do there."""
-        weights = self._weights((self.places - place) / self.width)
-        return weights[self._reach(weights.sum(axis=1))]
-
-    def _weights(self, offset: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Weights (reaches, n) of runs for every reach that may be needed."""
-        squares = np.sum(offset**2, axis=1) / _WIDENINGS[:, None] ** 2
-        return np.asarray(np.clip(1.0 - squares / 4.0, 0.0, None) ** 2)
+        weights = _weigh(distance)
+        return np.asarray(weights[self._reach(weights.sum(axis=1))])
 
     def _reach(self, totals: NDArray[np.float64]) -> NDArray[np.intp]:
         """The first reach whose weights (reaches, ...) suffice, or the last."""
         enough = totals >= self.enough
         enough[-1] = True
         return np.argmax(enough, axis=0)
+
+    @cached_property
+    def _charted(self) -> NDArray[np.float64]:
+        """(1 or rows, n, k): the runs in the coordinates in which they are compared."""
+        return self.on_chart(self.places) if self.coordinates is None else self.coordinates
 
     @cached_property
     def alike(self) -> NDArray[np.float64]:
@@ -307,3 +324,20 @@ class Surface:
     def _values(self) -> NDArray[np.float64]:
         """(rows, 3, n): the differences, 0 where nothing was observed."""
         return np.ascontiguousarray(np.nan_to_num(self.difference).transpose(2, 1, 0))
+
+
+def _distance(offset: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Squares (n,) of how far runs are in the mean of all rows, from offsets (rows, n, k)."""
+    return np.asarray(np.einsum("rnk,rnk->n", offset, offset) / len(offset))
+
+
+def _weigh(squares: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Weights (reaches, ...) of runs at squared distances, for every reach that may be needed."""
+    reaches = _WIDENINGS.reshape(-1, *[1] * squares.ndim)
+    return np.asarray(np.clip(1.0 - squares / reaches**2 / 4.0, 0.0, None) ** 2)
+
+
+def _variance_unknown(weight: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What to add to the variance (3, rows) where the weights (rows, n) are next to nothing."""
+    unknown = np.clip(1.0 - weight.sum(axis=1), 0.0, 1.0)
+    return np.asarray(unknown * _UNKNOWN[:, None] ** 2)

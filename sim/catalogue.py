@@ -56,7 +56,9 @@ class Effect:
 
     `site` says whether the fault sits in the mechanics ("plant") or in the
     measuring chain ("chain"). Exactly one of `on_unit` and `on_drivetrain`
-    is given.
+    is given. `added_inertia`, of what is linear and acts on the load alone: by
+    how much the load is felt to have more inertia at an angular frequency
+    (rad/s), kg.m^2, complex where it brakes or swings.
     """
 
     id: str
@@ -66,6 +68,7 @@ class Effect:
     bench_cause: str
     on_unit: Callable[[Unit, Mapping[str, float]], Unit] | None = None
     on_drivetrain: Callable[[Drivetrain, Unit, Mapping[str, float]], Drivetrain] | None = None
+    added_inertia: Callable[[Unit, Mapping[str, Any], Any], Any] | None = None
 
 
 def _table_1(symbol: str) -> Callable[[Unit, Mapping[str, float]], Unit]:
@@ -131,6 +134,12 @@ def _add_payload(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrai
     )
 
 
+def _payload_felt(unit: Unit, v: Mapping[str, Any], omega: Any) -> Any:
+    resonance = 2.0 * math.pi * v["f_p"]
+    force = resonance**2 + 2j * v["zeta_p"] * resonance * omega
+    return v["J_p"] * force / (force - omega**2)
+
+
 def _amplifier(**fields: str) -> Callable[[Drivetrain, Unit, Mapping[str, float]], Drivetrain]:
     def change(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrain:
         values = {name: v[parameter] for name, parameter in fields.items()}
@@ -186,6 +195,7 @@ _ALL = (
         "The load is braked in proportion to its speed.",
         "grease or a seal dragging on the load, or eddy currents",
         on_drivetrain=_add_load_damper,
+        added_inertia=lambda unit, v, omega: v["B_L"] / (1j * omega),
     ),
     Effect(
         "shaft-damping",
@@ -255,6 +265,7 @@ _ALL = (
         "The inertia of the load differs from its datasheet.",
         "another payload, or a counterweight moved or missing",
         on_unit=_table_1("J_L"),
+        added_inertia=lambda unit, v, omega: v["J_L"] - unit.load.J_L + 0j * omega,
     ),
     Effect(
         "shaft-stiffness",
@@ -287,6 +298,7 @@ _ALL = (
         "A spring ties the load to ground.",
         "a stiff cable bundle or hose across the joint",
         on_drivetrain=lambda d, unit, v: d.adding(cable=Spring({"th_L": 1.0}, v["K_c"])),
+        added_inertia=lambda unit, v, omega: -v["K_c"] / omega**2,
     ),
     Effect(
         "load-torque-bias",
@@ -307,6 +319,7 @@ _ALL = (
         "Something on the load swings on a spring of its own.",
         "a loose bracket, lens or cable clamp on the load",
         on_drivetrain=_add_payload,
+        added_inertia=_payload_felt,
     ),
     Effect(
         "amplifier-gain",

@@ -67,6 +67,7 @@ def test_more_pairs_are_tried_behind_a_cause_that_predicts_badly(
     found = {key: SimpleNamespace(best=standing(90.0)) for key in pairs}
     found[leader] = SimpleNamespace(best=standing(90.0), hypothesis=Hypothesis(ADSS, leader))
     rough = SimpleNamespace(
+        unit=ADSS,
         observation=None,
         found=found,
         among=list,

@@ -5,10 +5,8 @@ import pytest
 from synthetic import ROWS, observation
 
 from analysis.branches import Motions
-from analysis.causes import Hypothesis
 from analysis.surface import Surface
-from analysis.widths import learn_width, plain_width
-from sim.unit import load_unit
+from analysis.widths import learn_width
 
 WIDTH = np.array([0.1, 0.1, 0.1])
 
@@ -24,34 +22,50 @@ def world(slopes, rng, runs=200, scatter=0.02):
 @pytest.mark.parametrize("seed", range(3))
 def test_a_coordinate_is_as_much_wider_as_it_matters_less(seed):
     places, difference = world([2.0, 1.0, 0.8], np.random.default_rng(seed))
-    width = learn_width(places, difference, WIDTH, np.full(3, 0.5))
+    width = learn_width(places[None], difference, WIDTH, np.full((1, 1, 3), 0.5))
     np.testing.assert_allclose(width, WIDTH * [1.0, 2.0, 2.5], rtol=0.12)
 
 
 def test_a_coordinate_that_does_nothing_is_wide_but_not_endless():
     places, difference = world([1.0, 0.0, 1.0], np.random.default_rng(0))
     difference[:, 1] = np.nan  # No phase was observed.
-    width = learn_width(places, difference, WIDTH, np.full(3, 0.5))
+    width = learn_width(places[None], difference, WIDTH, np.full((1, 1, 3), 0.5))
     np.testing.assert_allclose(width, WIDTH * [1.0, 4.0, 1.0], rtol=0.05)
 
 
 def test_widths_do_not_depend_on_the_units_of_what_is_read():
     places, difference = world([1.0, 0.3, 0.6], np.random.default_rng(1))
-    one = learn_width(places, difference, WIDTH, np.full(3, 0.5))
-    other = learn_width(places, 30.0 * difference, WIDTH, np.full(3, 0.5))
+    one = learn_width(places[None], difference, WIDTH, np.full((1, 1, 3), 0.5))
+    other = learn_width(places[None], 30.0 * difference, WIDTH, np.full((1, 1, 3), 0.5))
     np.testing.assert_allclose(one, other, rtol=1e-3)
 
 
 def test_few_runs_give_widths_all_the_same():
     places, difference = world([1.0, 0.0, 1.0], np.random.default_rng(2), runs=2)
-    width = learn_width(places, difference, WIDTH, np.full(3, 0.5))
+    width = learn_width(places[None], difference, WIDTH, np.full((1, 1, 3), 0.5))
     assert np.all((width >= WIDTH) & (width <= 4.0 * WIDTH))
 
 
-def test_a_resonance_is_narrow_beforehand_and_what_damps_it_is_not():
-    width = plain_width(Hypothesis(load_unit("adss"), ("payload-flexibility",)))
-    ratio, inertia, frequency, damping = width
-    assert frequency < inertia < ratio < damping
+@pytest.mark.parametrize("seed", range(3))
+def test_coordinates_of_every_row_give_the_widths_of_shared_ones_where_they_are_the_same(seed):
+    places, difference = world([2.0, 1.0, 0.8], np.random.default_rng(seed))
+    shared = learn_width(places[None], difference, WIDTH, np.full((1, 1, 3), 0.5))
+    every = np.repeat(places[None], ROWS, axis=0)
+    apart = learn_width(every, difference, WIDTH, np.full((ROWS, 1, 3), 0.5))
+    np.testing.assert_allclose(apart, shared, rtol=1e-9)
+
+
+def test_a_coordinate_that_turns_from_row_to_row_is_seen_as_what_it_does_at_each():
+    """Of two coordinates that change places half-way along the rows each does the same."""
+    rng = np.random.default_rng(4)
+    places = rng.uniform(0.0, 1.0, (200, 2))
+    first = np.arange(ROWS)[:, None, None] < ROWS // 2
+    coordinates = np.where(first, places, places[:, ::-1])
+    difference = np.empty((200, 3, ROWS))
+    difference[:] = (coordinates @ [2.0, 0.8]).T[:, None]
+    difference += 0.02 * rng.standard_normal(difference.shape)
+    width = learn_width(coordinates, difference, WIDTH[:2], np.full((ROWS, 1, 2), 0.5))
+    np.testing.assert_allclose(width, WIDTH[:2] * [1.0, 2.5], rtol=0.12)
 
 
 def gain_of_more_runs(rng):

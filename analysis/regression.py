@@ -1,0 +1,69 @@
+"""Local regression: the value at a point, and its error, from weighted runs around it.
+
+Owns the arithmetic of many small regressions at once. It knows neither what
+the runs are nor how near they have to be.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["TAIL", "TAIL_SCALE", "regress"]
+
+_RIDGE = 0.1
+"""Ridge of the slopes, in units of the kernel's reach: few runs must not make a wild slope."""
+
+TAIL = 4.0
+"""Degrees of freedom of Student's t, whose variance is TAIL / (TAIL - 2) of its scale squared."""
+
+TAIL_SCALE = float(np.sqrt((TAIL - 2.0) / TAIL))
+
+_TAIL_ITERATIONS = 5
+
+
+def regress(
+    offset: NDArray[np.float64],
+    weight: NDArray[np.float64],
+    reach: NDArray[np.float64],
+    values: NDArray[np.float64],
+    *,
+    tailed: bool,
+) -> tuple[NDArray, NDArray]:
+    """Value and variance (p, c) at offset 0 of p regressions with c columns each.
+
+    Parameters
+    ----------
+    offset
+        (1 or p, n, k): where the runs are, in widths.
+    weight, reach
+        (p, n), (p,): how much each counts, and how far the kernel reaches, in widths.
+    values
+        (p, c, n).
+    tailed
+        Whether the scatter is that of Student's t, which a few runs far out do not
+        blow up (slower), or a mean square.
+    """
+    w = weight[:, None]
+    count, n, k = offset.shape
+    basis = np.concatenate([np.ones((count, 1, n)), offset.transpose(0, 2, 1)], axis=1)
+    weighed = basis * w
+    ridge = np.zeros((len(reach), k + 1))
+    ridge[:, 0] = 1e-9
+    # The ridge is for slopes in units of the kernel's reach.
+    ridge[:, 1:] = _RIDGE * reach[:, None] ** 2
+    normal = weighed @ basis.transpose(0, 2, 1) + ridge[:, :, None] * np.eye(k + 1)
+    inverse = np.linalg.inv(normal)
+    coefficients = values @ weighed.transpose(0, 2, 1) @ inverse
+    squares = (values - coefficients @ basis) ** 2
+    total, most = w.sum(axis=2), w * squares
+    variance = most.sum(axis=2) / total
+    for _ in range(_TAIL_ITERATIONS if tailed else 0):
+        bound = TAIL * (TAIL_SCALE**2 * variance + 1e-12)
+        share = most / (squares + bound[:, :, None])
+        variance = (TAIL + 1.0) * variance * share.sum(axis=2) / total
+    used = (inverse * (weighed @ weighed.transpose(0, 2, 1))).sum(axis=(1, 2))[:, None]
+    variance *= total / np.maximum(total - used, 0.3 * total)
+    leverage = ((inverse[:, :1] @ weighed) ** 2).sum(axis=2)
+    variance *= 1.0 + leverage
+    return coefficients[:, :, 0], variance
