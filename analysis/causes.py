@@ -123,6 +123,14 @@ class Hypothesis:
             for known, value in zip(nominal, self.values(place), strict=True)
         ]
 
+    def brought_within_tolerance(self, place: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
+        """Places (d,) like one, each with one datasheet value off by just its tolerance."""
+        for at, (_, parameter) in enumerate(self.parameters):
+            if (known := parameter.nominal(self.unit)) is not None:
+                values = self.values(place)
+                values[at] = known * (1.0 + np.sign(values[at] - known) * _TOLERANCE)
+                yield self.place(place[0], list(values))
+
     @property
     def sites(self) -> tuple[str, ...]:
         """Where its effects sit: "plant", "chain"."""

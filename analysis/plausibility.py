@@ -1,7 +1,7 @@
-"""Whether a size wants to be where no bench has it: then the cause is another.
+"""Whether a size is where no bench has it, or where every bench does: then the cause is another.
 
-Owns what "at the end of a plausible range" means. It simulates nothing and
-passes no verdict.
+Owns what "at the end of a plausible range" and "within its tolerance" mean. It
+simulates nothing and passes no verdict.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from analysis.candidate import Candidate
 from analysis.likelihood import HEAT
 
-__all__ = ["EDGE", "is_pressed"]
+__all__ = ["EDGE", "is_pressed", "may_be_within_tolerance"]
 
 EDGE = 0.02
 """How near its end, as a share of its range, a size is at the end."""
@@ -37,3 +37,20 @@ def is_pressed(candidate: Candidate) -> bool:
         if amid and off < _TOWARDS and fit(beyond).log_likelihood > best.log_likelihood - _AS_GOOD:
             return True
     return False
+
+
+def may_be_within_tolerance(candidate: Candidate) -> bool:
+    """Whether a datasheet value is no further off than its tolerance, or may as well not be.
+
+    The second is asked of several causes alone: one of them may be there for what the other
+    leaves, and a value that is hardly off, or not for sure, then explains nothing.
+    """
+    hypothesis, best, fit = candidate.hypothesis, candidate.best, candidate.surface.fit
+    if any(hypothesis.within_tolerance(best.place)):
+        return True
+    if len(hypothesis.effects) < 2:
+        return False
+    return any(
+        fit(place).log_likelihood > best.log_likelihood - _AS_GOOD
+        for place in hypothesis.brought_within_tolerance(best.place)
+    )

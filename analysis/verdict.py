@@ -18,7 +18,7 @@ from analysis.candidate import Candidate
 from analysis.holdout import AT_NOISE, HeldOut, hold_out
 from analysis.likelihood import HEAT
 from analysis.observation import Observation
-from analysis.plausibility import EDGE, is_pressed
+from analysis.plausibility import EDGE, is_pressed, may_be_within_tolerance
 
 __all__ = ["Judged", "Verdict", "judge_candidates"]
 
@@ -260,7 +260,7 @@ def _score(candidate: Candidate, held_out: HeldOut) -> float:
     bound = np.count_nonzero((sizes < EDGE) | (sizes > 1.0 - EDGE))
     causes = len(candidate.hypothesis.effects)
     cost = _PER_CAUSE * causes + _PER_PARAMETER * len(sizes) + _AT_BOUND * bound
-    if any(candidate.hypothesis.within_tolerance(candidate.best.place)):
+    if may_be_within_tolerance(candidate):
         cost += _WITHIN_TOLERANCE
     agreed = (1.0 - _HELD_OUT) * candidate.best.log_likelihood + _HELD_OUT * held_out.score
     return agreed - cost

@@ -142,26 +142,6 @@ def test_a_size_that_wants_to_be_beyond_its_range_is_no_explanation(size, steep,
     assert against == ("wants a size that no bench has" if pressed else "")
 
 
-@pytest.mark.parametrize("mirrored", [False, True])
-@pytest.mark.parametrize(
-    ("size", "lost", "pressed"),
-    [(0.93, 29.0, True), (0.93, 31.0, False), (0.84, 0.0, False), (0.99, 29.0, True)],
-)
-def test_a_datasheet_value_that_may_be_half_or_twice_is_no_explanation(
-    size, lost, pressed, mirrored
-):
-    def fit(place):
-        return SimpleNamespace(place=place, log_likelihood=-lost if place[1] in (0.0, 1.0) else 0.0)
-
-    def judged(amid):
-        hypothesis = SimpleNamespace(effects=TRUE, amid=[amid])
-        best = fit(np.array([0.4, 1.0 - size if mirrored else size]))
-        return SimpleNamespace(hypothesis=hypothesis, best=best, surface=SimpleNamespace(fit=fit))
-
-    assert is_pressed(judged(True)) is pressed
-    assert not is_pressed(judged(False))
-
-
 @pytest.mark.parametrize(
     ("share", "missed", "lead", "named"),
     [
