@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from analysis.causes import Hypothesis
 from sim.catalogue import CATALOGUE
 
-__all__ = ["Chart", "reflections"]
+__all__ = ["Chart", "added_inertias", "reflected", "reflections"]
 
 _RATIO, _SIZE, _REFLECTED = 0.08, 0.06, 0.16
 """Widths near the answer: of the ratio, of a size, of a reflection."""
@@ -81,6 +81,18 @@ def reflections(
     brakes or resonates. Without gain of energy that lies inside the unit circle: -1 is
     nothing, 1 holds the load fast.
     """
+    return reflected(added_inertias(hypothesis, places, frequency_hz))
+
+
+def reflected(inertia: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """What is reflected by so many times the load's own inertia besides it."""
+    return np.asarray((1j * inertia - 1.0) / (1j * inertia + 1.0))
+
+
+def added_inertias(
+    hypothesis: Hypothesis, places: NDArray[np.float64], frequency_hz: NDArray[np.float64]
+) -> NDArray[np.complex128]:
+    """By how many times its own inertia the load is felt to have more (m, rows)."""
     omega, unit = 2.0 * np.pi * frequency_hz, hypothesis.unit
     values = np.exp(hypothesis.logs[:, 0] + np.ptp(hypothesis.logs, axis=1) * places[:, 1:])
     added = np.zeros((len(places), len(omega)), dtype=complex)
@@ -93,5 +105,4 @@ def reflections(
                 if owner == effect
             }
             added += of(unit, sizes, omega)
-    turned = 1j * added / unit.parameters["J_L"]
-    return np.asarray((turned - 1.0) / (turned + 1.0))
+    return np.asarray(added / unit.load.J_L, dtype=complex)

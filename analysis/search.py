@@ -224,7 +224,7 @@ def _see_it_predict(fine: Hunt) -> None:
 
 
 def _weigh_parts(fine: Hunt) -> None:
-    """See what the causes of a leading pair do alone where it has them, with as many runs.
+    """See what the causes of a leading pair do alone where it has them, with runs enough.
 
     A resonance that had been looked at elsewhere lay 300 behind itself and a brake it has not.
     """
@@ -234,7 +234,7 @@ def _weigh_parts(fine: Hunt) -> None:
     places = {
         part: place
         for part, place in places_of_parts(leader).items()
-        if part in fine.found and len(fine.found[part].population) < len(leader.population)
+        if part in fine.found and len(fine.found[part].population) <= len(leader.population)
     }
     if places:
         fine.start(places, _LAST_GROUPS)

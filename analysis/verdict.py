@@ -17,6 +17,7 @@ from analysis.adequacy import judge_adequacy, judge_chance, misses_alike
 from analysis.candidate import Candidate
 from analysis.holdout import AT_NOISE, HeldOut, hold_out
 from analysis.likelihood import HEAT
+from analysis.likeness import is_felt_alike
 from analysis.observation import Observation
 from analysis.plausibility import EDGE, is_pressed, may_be_within_tolerance
 
@@ -137,7 +138,7 @@ class Verdict:
         """Sets near the best one that say something else, and might be the explanation.
 
         Among them that nothing is hidden, which has a wider margin. A set that would be no
-        explanation if it led is none as a rival.
+        explanation if it led is none as a rival, nor is one that says the same with more sizes.
         """
         return tuple(one for one in self.judged if self._is_rival(one))
 
@@ -146,7 +147,9 @@ class Verdict:
         if not one.effects:
             return bool(best) and one.adequate and behind < _SURE
         other = not set(one.effects) <= best and not set(one.effects) >= best
-        return other and one.adequate and behind < _RIVAL
+        if not other or not one.adequate or behind >= _RIVAL:
+            return False
+        return not is_felt_alike(one.candidate, self.best.candidate)
 
 
 def judge_candidates(
@@ -223,10 +226,13 @@ def _simplest(judged: Sequence[Judged], rng: np.random.Generator) -> Judged:
     So does one that leads by no more than it leads in runs of the part alone.
 
     Where the best set does not look like its own runs and another that ties with it does, it is
-    the other that is believed.
+    the other that is believed; and so is one that says the same with fewer sizes.
     """
     tied = [one for one in judged if one.score > judged[0].score - _TIE and one.adequate]
     best = tied[0] if tied else judged[0]
+    for one in tied:
+        if is_felt_alike(best.candidate, one.candidate):
+            best = one
     for one in judged:
         part = one.effects and set(one.effects) < set(best.effects)
         if not part or not one.adequate:

@@ -111,6 +111,30 @@ def test_nothing_more_is_simulated_where_no_pair_leads_or_its_parts_have_runs_en
     assert not runs
 
 
+@pytest.mark.parametrize(("runs_of_part", "weighed"), [(79, True), (80, True), (81, False)])
+def test_a_part_with_as_many_runs_elsewhere_is_weighed_where_the_pair_has_it(runs_of_part, weighed):
+    pair, part = ("amplifier-gain", "payload-flexibility"), ("payload-flexibility",)
+    started = []
+    leader = SimpleNamespace(
+        hypothesis=Hypothesis(ADSS, pair),
+        best=SimpleNamespace(place=np.array([0.1, 0.5, 0.2, 0.3, 0.4])),
+        population=range(80),
+    )
+    fine = SimpleNamespace(
+        best=leader,
+        found={pair: leader, part: SimpleNamespace(population=range(runs_of_part))},
+        start=lambda places, groups: started.append(places),
+        leading=lambda *_: [pair, part],
+        settle=lambda chosen, groups: started.append(chosen),
+        hear=lambda: None,
+    )
+    search._weigh_parts(fine)
+    assert len(started) == (2 if weighed else 0)
+    if weighed:
+        assert started[0][part].tolist() == [0.1, 0.2, 0.3, 0.4]
+        assert started[1] == [part]
+
+
 def test_two_of_three_causes_are_weighed_where_the_three_lead(monkeypatch):
     """They may not have been looked at, and explain as much."""
     pair, third = ("amplifier-lag", "load-inertia"), "mesh1-damping"

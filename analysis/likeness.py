@@ -1,0 +1,55 @@
+"""Whether a set of causes says of the load what a simpler one says.
+
+Owns that comparison: a damped payload that swings far below all that was
+measured is a brake, and a stiff one far above it a heavier load, however well
+each is told from nothing. It simulates nothing and names no cause.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from analysis.candidate import Candidate, Effects
+from analysis.chart import added_inertias, reflected
+from sim.catalogue import CATALOGUE
+
+__all__ = ["is_felt_alike"]
+
+_ALIKE = 1.0 / 3.0
+"""Share of what a set adds at the load that may be left where a simpler one stands in its place:
+a tenth, squared, of what it explains better than the plain model."""
+
+_TOLERANCE = 0.015
+"""Of the load's own inertia, three standard deviations: it cannot be told from what is added."""
+
+
+def is_felt_alike(one: Candidate, simpler: Candidate) -> bool:
+    """Whether what a set adds at the load could be that of one with fewer sizes.
+
+    Both must agree in all that is not at the load. Looked at over the frequencies that were
+    measured, at the best place of the set and any sizes of the other.
+    """
+    if _elsewhere(one) != _elsewhere(simpler) or simpler.hypothesis.d >= one.hypothesis.d:
+        return False
+    frequency_hz = np.unique(one.surface.observation.frequency_hz)
+    felt = added_inertias(one.hypothesis, one.best.place[None], frequency_hz)[0]
+
+    def left(free: NDArray[np.float64]) -> NDArray[np.float64]:
+        place, own = free[:-1], free[-1]
+        other = own + added_inertias(simpler.hypothesis, place[None], frequency_hz)[0]
+        apart = reflected(felt) - reflected(other)
+        return np.concatenate([apart.real, apart.imag])
+
+    d = simpler.hypothesis.d
+    low, high = np.append(np.zeros(d), -_TOLERANCE), np.append(np.ones(d), _TOLERANCE)
+    start = np.append(np.clip(simpler.best.place, 0.01, 0.99), 0.0)
+    nearest = least_squares(left, start, bounds=(low, high), x_scale=high - low)
+    size = np.linalg.norm(reflected(felt) - reflected(0.0 * felt))
+    return bool(np.linalg.norm(nearest.fun) < _ALIKE * size)
+
+
+def _elsewhere(one: Candidate) -> Effects:
+    """Its effects that are not linear and at the load."""
+    return tuple(e for e in one.hypothesis.effects if CATALOGUE[e].added_inertia is None)
