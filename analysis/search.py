@@ -226,7 +226,8 @@ def _see_it_predict(fine: Hunt) -> None:
 def _weigh_parts(fine: Hunt) -> None:
     """See what the causes of a leading pair do alone where it has them, with runs enough.
 
-    A resonance that had been looked at elsewhere lay 300 behind itself and a brake it has not.
+    A resonance that had been looked at elsewhere lay 300 behind itself and a brake it has not, and
+    friction that another sort of friction stood for was not looked at alone at all.
     """
     leader = fine.best
     if len(leader.hypothesis.effects) < 2:
@@ -234,7 +235,7 @@ def _weigh_parts(fine: Hunt) -> None:
     places = {
         part: place
         for part, place in places_of_parts(leader).items()
-        if part in fine.found and len(fine.found[part].population) <= len(leader.population)
+        if part not in fine.found or len(fine.found[part].population) <= len(leader.population)
     }
     if places:
         fine.start(places, _LAST_GROUPS)

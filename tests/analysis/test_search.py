@@ -99,9 +99,9 @@ def test_a_part_that_was_looked_at_elsewhere_is_weighed_where_the_pair_has_it(ru
 
 
 def test_nothing_more_is_simulated_where_no_pair_leads_or_its_parts_have_runs_enough(runs):
-    pair, part = ("amplifier-lag", "load-inertia"), ("load-inertia",)
+    pair, parts = ("amplifier-lag", "load-inertia"), (("amplifier-lag",), ("load-inertia",))
     looking = synthetic_search.hunted([0.8], 1)
-    looking.start({part: np.array([0.4, 0.8])}, 8)
+    looking.start({part: np.array([0.4, 0.8]) for part in parts}, 8)
     runs.clear()
     search._weigh_parts(looking)
     assert not runs
@@ -111,10 +111,16 @@ def test_nothing_more_is_simulated_where_no_pair_leads_or_its_parts_have_runs_en
     assert not runs
 
 
-@pytest.mark.parametrize(("runs_of_part", "weighed"), [(79, True), (80, True), (81, False)])
-def test_a_part_with_as_many_runs_elsewhere_is_weighed_where_the_pair_has_it(runs_of_part, weighed):
+@pytest.mark.parametrize(
+    ("runs_of_part", "weighed"), [(0, True), (79, True), (80, True), (81, False)]
+)
+def test_a_part_with_no_more_runs_than_a_pair_is_weighed_where_the_pair_has_it(
+    runs_of_part, weighed
+):
     pair, part = ("amplifier-gain", "payload-flexibility"), ("payload-flexibility",)
-    started = []
+    known, started = {("amplifier-gain",): SimpleNamespace(population=range(200))}, []
+    if runs_of_part:
+        known[part] = SimpleNamespace(population=range(runs_of_part))
     leader = SimpleNamespace(
         hypothesis=Hypothesis(ADSS, pair),
         best=SimpleNamespace(place=np.array([0.1, 0.5, 0.2, 0.3, 0.4])),
@@ -122,7 +128,7 @@ def test_a_part_with_as_many_runs_elsewhere_is_weighed_where_the_pair_has_it(run
     )
     fine = SimpleNamespace(
         best=leader,
-        found={pair: leader, part: SimpleNamespace(population=range(runs_of_part))},
+        found={pair: leader, **known},
         start=lambda places, groups: started.append(places),
         leading=lambda *_: [pair, part],
         settle=lambda chosen, groups: started.append(chosen),
@@ -131,6 +137,7 @@ def test_a_part_with_as_many_runs_elsewhere_is_weighed_where_the_pair_has_it(run
     search._weigh_parts(fine)
     assert len(started) == (2 if weighed else 0)
     if weighed:
+        assert list(started[0]) == [part]
         assert started[0][part].tolist() == [0.1, 0.2, 0.3, 0.4]
         assert started[1] == [part]
 
