@@ -21,8 +21,9 @@ _ALIKE = 1.0 / 3.0
 """Share of what a set adds at the load that may be left where a simpler one stands in its place:
 a tenth, squared, of what it explains better than the plain model."""
 
-_TOLERANCE = 0.015
-"""Of the load's own inertia, three standard deviations: it cannot be told from what is added."""
+_TOLERANCE = 0.021
+"""Of the load's inertia, which cannot be told from what is added: three standard deviations of its
+own, and as much of the shaft's stiffness, with which it resonates."""
 
 
 def is_felt_alike(one: Candidate, simpler: Candidate) -> bool:
