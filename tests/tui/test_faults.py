@@ -15,7 +15,7 @@ def outcomes(tmp_path_factory):
     patch.setattr("daq.hp35670a.Timing", short_timing)
     patch.setattr("daq.hp35670a_safe._BUDGET_S", 4.0)
     faults = {name: ordered(name) for name in CATALOGUE}
-    # Well under the second that an answer may take here: a busy machine adds to it.
+    # Well under what an answer may take here: a busy machine adds to it.
     faults["slow-reply"] += ",seconds=0.3"
     try:
         return provoke_all(tmp_path_factory.mktemp("faults"), faults)
