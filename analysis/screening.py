@@ -29,17 +29,17 @@ from sim.unit import Unit
 
 __all__ = ["Place", "ranked", "screen_further", "screen_pairs", "screen_singles"]
 
-_WIDTHS = {1: (0.06,), 2: (0.1, 0.13), 3: (0.12, 0.15, 0.2)}
+_WIDTHS = {1: (0.06,), 2: (0.1, 0.13), 3: (0.12, 0.15, 0.2), 4: (0.15, 0.25, 0.25, 0.25)}
 """Distances over which a coarse surface reaches, by number of coordinates."""
 
-_ENOUGH = {1: 4.0, 2: 5.0, 3: 6.0}
+_ENOUGH = {1: 4.0, 2: 5.0, 3: 6.0, 4: 25.0}
 """How many runs a regression takes, by number of coordinates: so few of so coarse an atlas, lest
 what is far away counts. True pairs then rank best."""
 
 _FELT_WIDTHS, _FELT_ENOUGH = (0.15, 0.3, 0.3), 12.0
 """The same where the load is seen by what it reflects."""
 
-_COUNTS = {1: (31,), 2: (21, 25), 3: (13, 9, 5)}
+_COUNTS = {1: (31,), 2: (21, 25), 3: (13, 9, 5), 4: (11, 5, 5, 5)}
 """Places looked at along each coordinate."""
 
 _FELT_COUNTS, _REFINED = (10, 4, 16, 2), (0.5, 0.25)
@@ -242,10 +242,10 @@ def _plain_surface(
 
 
 def _best_place(surface: Surface) -> Place:
-    d = surface.places.shape[1]
-    if d not in _COUNTS:
+    if surface.chart is not None:
         return _refined(surface, _mesh([_centres(count) for count in _FELT_COUNTS]))
-    return _best_of(surface, _mesh([np.linspace(0.0, 1.0, count) for count in _COUNTS[d]]))
+    counts = _COUNTS[surface.places.shape[1]]
+    return _best_of(surface, _mesh([np.linspace(0.0, 1.0, count) for count in counts]))
 
 
 def _refined(surface: Surface, grid: NDArray[np.float64]) -> Place:

@@ -15,8 +15,9 @@ SWINGING, BRAKED, HEAVY, TIED = (
     ("payload-flexibility",), ("load-viscous-damping",), ("load-inertia",), ("cable-stiffness",)
 )  # fmt: skip
 LOW, HIGH = FREQUENCIES[0], FREQUENCIES[-1]
-FAR_BELOW, FAR_ABOVE, AMID = [0.2 * J_L, 0.1 * LOW, 0.5], [0.2 * J_L, 5.0 * HIGH, 0.02], [
-    0.2 * J_L, 140.0, 0.03]  # fmt: skip
+FAR_BELOW, FAR_ABOVE, AMID = (
+    [0.2 * J_L, f_p, zeta] for f_p, zeta in [(0.1 * LOW, 2.0), (5.0 * HIGH, 0.02), (140.0, 0.03)]
+)
 
 
 def believed(effects, values=None):
@@ -36,7 +37,7 @@ def believed(effects, values=None):
     [
         (FAR_ABOVE, HEAVY, True), (FAR_ABOVE, BRAKED, False), (FAR_ABOVE, TIED, False),
         # Below its resonance a damped payload hangs behind: a brake, hardly heavier.
-        ([0.2 * J_L, 0.1 * LOW, 2.0], BRAKED, True), ([0.2 * J_L, 0.1 * LOW, 2.0], HEAVY, False),
+        (FAR_BELOW, BRAKED, True), (FAR_BELOW, HEAVY, False), (FAR_BELOW, TIED, False),
         (AMID, HEAVY, False), (AMID, BRAKED, False), (AMID, TIED, False),
     ],
 )  # fmt: skip

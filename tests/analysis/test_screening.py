@@ -15,6 +15,7 @@ from analysis.placement import _FAR
 from analysis.population import Population
 from analysis.screening import _rows_of, screen_further, screen_pairs, screen_singles
 from daq.plan import SweepPlan
+from sim.catalogue import CATALOGUE
 
 SINGLE = ("amplifier-lag", "load-inertia", "mesh1-damping", "shaft-stiffness", "tachometer-gain")
 
@@ -192,6 +193,19 @@ def test_what_swings_on_the_load_is_placed_by_all_that_is_felt_there():
     _, inertia, resonance, _ = np.median(off, axis=0)
     assert inertia < 0.1
     assert resonance < 0.03
+
+
+def test_a_cause_of_three_sizes_elsewhere_than_at_the_load_is_placed_by_its_own_runs(monkeypatch):
+    """As one might be that somebody adds to the catalogue; here a payload that does not tell."""
+    silent = {key: replace(effect, added_inertia=None) for key, effect in CATALOGUE.items()}
+    rng = np.random.default_rng(1)
+    atlas = {(): felt_population((), 3, rng), SWINGING: felt_population(SWINGING, 60, rng)}
+    seen = synthetic.observation(felt(SWINGING, np.array([[0.4, 0.5, 0.9, 0.5]]), rng)[0])
+    monkeypatch.setattr("analysis.chart.CATALOGUE", silent)
+    found = screen_singles(ADSS, seen, atlas, [SWINGING])[SWINGING]
+    assert found.place[0] == pytest.approx(0.4, abs=0.2)
+    assert screen_pairs(ADSS, seen, atlas) == {}
+    assert not screening._surfaces(ADSS, seen, atlas)[SWINGING].chart
 
 
 def test_runs_of_all_causes_at_the_load_tell_of_what_swings_there():
