@@ -6,10 +6,12 @@ the runs are nor how near they have to be.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["TAIL", "TAIL_SCALE", "regress"]
+__all__ = ["TAIL", "TAIL_SCALE", "Planes", "fit_planes", "regress"]
 
 _RIDGE = 0.1
 """Ridge of the slopes, in units of the kernel's reach: few runs must not make a wild slope."""
@@ -20,6 +22,41 @@ TAIL = 4.0
 TAIL_SCALE = float(np.sqrt((TAIL - 2.0) / TAIL))
 
 _TAIL_ITERATIONS = 5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Planes:
+    """Fits of values by planes, p problems with c columns over n runs.
+
+    `coefficients` (p, c, 1 + k): value and slopes; `squares` (p, c, n): of what is
+    left of every run; `weighed` (p, 1 + k, n): weights times basis; `inverse`
+    (p, 1 + k, 1 + k): of the normal matrix.
+    """
+
+    coefficients: NDArray[np.float64]
+    squares: NDArray[np.float64]
+    weighed: NDArray[np.float64]
+    inverse: NDArray[np.float64]
+
+
+def fit_planes(
+    offset: NDArray[np.float64],
+    weight: NDArray[np.float64],
+    ridge: NDArray[np.float64],
+    values: NDArray[np.float64],
+) -> Planes:
+    """Planes through values (p, c, n) at offsets (1 or p, n, k), with weights (p, n).
+
+    `ridge` (p,) holds the slopes.
+    """
+    count, n, k = offset.shape
+    basis = np.concatenate([np.ones((count, 1, n)), offset.transpose(0, 2, 1)], axis=1)
+    weighed = basis * weight[:, None]
+    diagonal = np.column_stack([np.full(len(ridge), 1e-9), np.tile(ridge, (k, 1)).T])
+    normal = weighed @ basis.transpose(0, 2, 1) + diagonal[:, :, None] * np.eye(k + 1)
+    inverse = np.linalg.inv(normal)
+    coefficients = values @ weighed.transpose(0, 2, 1) @ inverse
+    return Planes(coefficients, (values - coefficients @ basis) ** 2, weighed, inverse)
 
 
 def regress(
@@ -44,18 +81,9 @@ def regress(
         Whether the scatter is that of Student's t, which a few runs far out do not
         blow up (slower), or a mean square.
     """
-    w = weight[:, None]
-    count, n, k = offset.shape
-    basis = np.concatenate([np.ones((count, 1, n)), offset.transpose(0, 2, 1)], axis=1)
-    weighed = basis * w
-    ridge = np.zeros((len(reach), k + 1))
-    ridge[:, 0] = 1e-9
     # The ridge is for slopes in units of the kernel's reach.
-    ridge[:, 1:] = _RIDGE * reach[:, None] ** 2
-    normal = weighed @ basis.transpose(0, 2, 1) + ridge[:, :, None] * np.eye(k + 1)
-    inverse = np.linalg.inv(normal)
-    coefficients = values @ weighed.transpose(0, 2, 1) @ inverse
-    squares = (values - coefficients @ basis) ** 2
+    planes = fit_planes(offset, weight, _RIDGE * reach**2, values)
+    w, squares, weighed, inverse = weight[:, None], planes.squares, planes.weighed, planes.inverse
     total, most = w.sum(axis=2), w * squares
     variance = most.sum(axis=2) / total
     for _ in range(_TAIL_ITERATIONS if tailed else 0):
@@ -66,4 +94,4 @@ def regress(
     variance *= total / np.maximum(total - used, 0.3 * total)
     leverage = ((inverse[:, :1] @ weighed) ** 2).sum(axis=2)
     variance *= 1.0 + leverage
-    return coefficients[:, :, 0], variance
+    return planes.coefficients[:, :, 0], variance

@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.regression import fit_planes
+
 __all__ = ["learn_width"]
 
 _WIDEST = 4.0
@@ -37,23 +39,16 @@ def learn_width(
     (1 or rows, 1, k).
     """
     offset = (coordinates - centre) / width
-    count, n, k = offset.shape
-    basis = np.concatenate([np.ones((count, n, 1)), offset], axis=2)
-    # Gain and phase: all rows are one problem where they share their coordinates.
-    values = np.nan_to_num(difference[:, :2]).transpose(2, 0, 1)
-    values = values if count > 1 else values.transpose(1, 2, 0).reshape(1, n, -1)
-    weight, reach = _weigh(np.sum(offset**2, axis=2), _RUNS_PER_COORDINATE * k)
-    ridge = np.zeros((count, k + 1))
-    ridge[:, 0], ridge[:, 1:] = 1e-9, _RIDGE * reach[:, None] ** 2
-    weighed = (basis * weight[..., None]).transpose(0, 2, 1)
-    normal = weighed @ basis + ridge[:, :, None] * np.eye(k + 1)
-    slopes = np.linalg.solve(normal, weighed @ values)
-    squares = (values - basis @ slopes) ** 2
-    variance = (weight[:, None] @ squares)[:, 0] / weight.sum(axis=1)[:, None]
-    channels = variance if count > 1 else variance.reshape(2, -1).T
+    # Where rows share their coordinates they are one problem with many columns.
+    values = np.nan_to_num(difference[:, :2]).transpose(2, 1, 0)
+    values = values.reshape(len(offset), -1, len(difference))
+    weight, reach = _weigh(np.sum(offset**2, axis=2), _RUNS_PER_COORDINATE * len(width))
+    planes = fit_planes(offset, weight, _RIDGE * reach**2, values)
+    variance = (planes.squares @ weight[..., None])[..., 0] / weight.sum(axis=1)[:, None]
+    channels = variance.reshape(-1, 2)
     shared = channels + _SHARED * np.median(channels, axis=0) + _LEAST_VARIANCE
-    variance = shared if count > 1 else shared.T.reshape(1, -1)
-    change = np.sqrt(np.mean(slopes[:, 1:] ** 2 / variance[:, None], axis=(0, 2)))
+    slopes = planes.coefficients[..., 1:].reshape(-1, len(width))
+    change = np.sqrt(np.mean(slopes**2 / shared.reshape(-1, 1), axis=0))
     return np.asarray(width * np.clip(change.max() / np.maximum(change, 1e-9), 1.0, _WIDEST))
 
 
