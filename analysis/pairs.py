@@ -13,7 +13,14 @@ from analysis.atlas import Atlas, coarse_stride
 from analysis.candidate import Candidate, Effects
 from analysis.hunt import Hunt
 from analysis.parts import earns, parts_of, places_of_parts
-from analysis.screening import Place, ranked, screen_further, screen_pairs
+from analysis.screening import (
+    Additions,
+    Place,
+    add_causes,
+    ranked,
+    screen_further,
+    screen_pairs,
+)
 
 __all__ = ["search_pairs"]
 
@@ -36,7 +43,8 @@ def search_pairs(rough: Hunt, atlas: Atlas) -> None:
     AnalysisError
         If a motion grew without bound.
     """
-    places = screen_pairs(rough.unit, rough.observation, atlas)
+    additions = add_causes(rough.unit, rough.observation, atlas)
+    places = screen_pairs(additions)
     favoured = ranked(places)
     if not favoured:
         return
@@ -45,10 +53,12 @@ def search_pairs(rough: Hunt, atlas: Atlas) -> None:
     rough.take_over(_glance(rough, {key: places[key] for key in chosen}, _CLOSER), _GROUPS[0])
     looked_at = set(rough.among(chosen)[:_AFTER])
     rough.look_closer(sorted(looked_at), _GROUPS[1])
-    _hold_against_neighbours(rough, atlas, looked_at)
+    _hold_against_neighbours(rough, atlas, additions, looked_at)
 
 
-def _hold_against_neighbours(rough: Hunt, atlas: Atlas, looked_at: set[Effects]) -> None:
+def _hold_against_neighbours(
+    rough: Hunt, atlas: Atlas, additions: Additions, looked_at: set[Effects]
+) -> None:
     """Look at others with a cause of the leading pair: true pairs nearly all share one with it."""
     before: Effects = ()
     leader = rough.among(looked_at)[0]
@@ -56,8 +66,11 @@ def _hold_against_neighbours(rough: Hunt, atlas: Atlas, looked_at: set[Effects])
         _look_at_parts(rough, leader)
         if not earns(leader, rough.found):
             return  # One of its causes does as well alone.
+        if additions.coarse is not rough.observation:
+            # Another reading noise was heard since.
+            additions = add_causes(rough.unit, rough.observation, atlas)
         fresh = set(parts_of(leader, rough.found)) - set(parts_of(before, rough.found))
-        looked_at = looked_at | _swap(rough, atlas, sorted(fresh), looked_at)
+        looked_at = looked_at | _swap(rough, additions, sorted(fresh), looked_at)
         before, leader = leader, rough.among(looked_at)[0]
         if leader == before:
             return
@@ -71,7 +84,7 @@ def _look_at_parts(rough: Hunt, leader: Effects) -> None:
 
 
 def _swap(
-    rough: Hunt, atlas: Atlas, kept: Sequence[Effects], looked_at: Collection[Effects]
+    rough: Hunt, additions: Additions, kept: Sequence[Effects], looked_at: Collection[Effects]
 ) -> set[Effects]:
     """Look at others beside what is kept of a leading pair; those that are worth it closer.
 
@@ -79,7 +92,7 @@ def _swap(
     """
     places: dict[Effects, Place] = {}
     for part in kept:
-        further = screen_further(rough.observation, atlas, rough.found[part])
+        further = screen_further(additions, rough.found[part])
         others = [key for key in ranked(further) if key not in looked_at]
         places |= {key: further[key] for key in others[:_SWAPS]}
     closer = _glance(rough, places, _SWAPS_CLOSER)

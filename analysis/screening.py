@@ -27,7 +27,15 @@ from analysis.population import Population
 from analysis.surface import Surface, differences
 from sim.unit import Unit
 
-__all__ = ["Place", "ranked", "screen_further", "screen_pairs", "screen_singles"]
+__all__ = [
+    "Additions",
+    "Place",
+    "add_causes",
+    "ranked",
+    "screen_further",
+    "screen_pairs",
+    "screen_singles",
+]
 
 _WIDTHS = {1: (0.06,), 2: (0.1, 0.13), 3: (0.12, 0.15, 0.2), 4: (0.15, 0.25, 0.25, 0.25)}
 """Distances over which a coarse surface reaches, by number of coordinates."""
@@ -73,11 +81,9 @@ def screen_singles(
     return found
 
 
-def screen_pairs(
-    unit: Unit, coarse: Observation, atlas: Atlas, beside: Effects = ()
-) -> dict[Effects, Place]:
-    """The best place of every pair of causes of an atlas, or of those with one of `beside`."""
-    plain, added = _every_added(unit, coarse, atlas)
+def screen_pairs(additions: Additions, beside: Effects = ()) -> dict[Effects, Place]:
+    """The best place of every pair of causes, or of those with one of `beside`."""
+    plain, added = additions.plain, additions.added
     return {
         (*first, *second): _best_pair(plain, added[first], added[second])
         for first, second in combinations(sorted(added), 2)
@@ -85,20 +91,18 @@ def screen_pairs(
     }
 
 
-def screen_further(coarse: Observation, atlas: Atlas, known: Candidate) -> dict[Effects, Place]:
+def screen_further(additions: Additions, known: Candidate) -> dict[Effects, Place]:
     """The best place of every set that has one cause more than a candidate.
 
     What a cause adds to the baseline is added to the candidate wherever there are runs of it,
     for with a further cause its best place is another.
     """
-    rows = _rows_of(coarse, known.surface.observation)
+    rows = _rows_of(additions.coarse, known.surface.observation)
     shown = [np.array(known.surface.expected(p))[..., rows] for p in known.population.places]
-    unit = known.hypothesis.unit
-    _, added = _every_added(unit, coarse, atlas)
     ratios = _centres(_PAIR_RATIOS)
     nearest = [int(np.argmin(abs(ratios - p[0]))) for p in known.population.places]
     found = {}
-    for effects, further in added.items():
+    for effects, further in additions.added.items():
         if set(effects) <= set(known.hypothesis.effects):
             continue
         likelihood = np.array(
@@ -112,7 +116,7 @@ def screen_further(coarse: Observation, atlas: Atlas, known: Candidate) -> dict[
         one, size = np.unravel_index(np.argmax(likelihood), likelihood.shape)
         both, place = known.hypothesis.joined(
             known.population.places[one],
-            Hypothesis(unit, effects),
+            Hypothesis(known.hypothesis.unit, effects),
             further.sizes[size],
         )
         found[both.effects] = Place(place, float(likelihood[one, size]))
@@ -141,14 +145,25 @@ class _Added:
     std: NDArray[np.float64]
 
 
-def _every_added(
-    unit: Unit, coarse: Observation, atlas: Atlas
-) -> tuple[NDArray[np.float64], dict[Effects, _Added]]:
-    """What the baseline shows at every ratio (ratios, 3, rows), and what each cause adds."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Additions:
+    """What the baseline shows, and what every cause of an atlas adds to it.
+
+    `coarse`: the observation that it was held against. `plain` (ratios, 3, rows).
+    """
+
+    coarse: Observation
+    plain: NDArray[np.float64]
+    added: Mapping[Effects, _Added]
+
+
+def add_causes(unit: Unit, coarse: Observation, atlas: Atlas) -> Additions:
+    """Look at every cause at all ratios and sizes: seconds, so once for many pairs."""
     surfaces = _surfaces(unit, coarse, atlas)
     ratios = _centres(_PAIR_RATIOS)
     plain = np.array([surfaces[()].expected(np.array([ratio]))[0] for ratio in ratios])
-    return plain, {e: _added(surface, plain) for e, surface in surfaces.items() if e}
+    added = {e: _added(surface, plain) for e, surface in surfaces.items() if e}
+    return Additions(coarse, plain, added)
 
 
 def _added(surface: Surface, plain: NDArray[np.float64]) -> _Added:

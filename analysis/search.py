@@ -24,7 +24,7 @@ from analysis.pairs import search_pairs
 from analysis.parts import earns, parts_of, places_of_parts
 from analysis.plausibility import is_pressed
 from analysis.progress import Progress, part_of
-from analysis.screening import ranked, screen_further, screen_pairs, screen_singles
+from analysis.screening import add_causes, ranked, screen_further, screen_pairs, screen_singles
 from sim.unit import Unit
 
 __all__ = ["search_causes"]
@@ -173,7 +173,7 @@ def _look_beside(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator
     if len(leader) != 1:
         return
     alone = screen_singles(rough.unit, rough.observation, atlas, [leader])[leader]
-    places = screen_pairs(rough.unit, rough.observation, atlas, leader)
+    places = screen_pairs(add_causes(rough.unit, rough.observation, atlas), leader)
     poor = hold_out(fine.best, fine.observation).rms_sigma > AT_NOISE
     enough = -np.inf if poor else alone.log_likelihood - _LITTLE
     chosen = [k for k in ranked(places)[: _BESIDE[poor]] if places[k].log_likelihood > enough]
@@ -187,7 +187,7 @@ def _look_beside(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator
 
 def _search_triples(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator) -> None:
     """See whether a third cause makes up for what a leading pair leaves."""
-    places = screen_further(rough.observation, atlas, fine.best)
+    places = screen_further(add_causes(rough.unit, rough.observation, atlas), fine.best)
     starts = {key: places[key].place for key in ranked(places)[:_TRIPLES]}
     kept = _narrow(rough, starts, _TRIPLES_CLOSER, _TRIPLE_GROUPS)[:_TRIPLES_AFTER]
     if kept:

@@ -44,6 +44,8 @@ def test_a_pair_is_found_where_there_are_no_others_to_hold_it_against(runs):
 class Standings:
     """A hunt that has looked at hypotheses already, of these log-likelihoods."""
 
+    unit, observation = None, "as heard at first"
+
     def __init__(self, likelihood):
         self.found = {
             key: SimpleNamespace(best=SimpleNamespace(log_likelihood=value))
@@ -86,7 +88,7 @@ def test_others_are_tried_beside_the_causes_of_a_leading_pair(
     likelihood |= {(cause,): part for cause in "abcdef"}
     beside, alone, known = [], [], [{("a", "b"), ("a", "c")}]
 
-    def swap(rough, atlas, kept, looked_at):
+    def swap(rough, additions, kept, looked_at):
         beside.append(list(kept))
         assert looked_at == known[-1]
         new = set(brought_in[len(beside) - 1])
@@ -95,8 +97,36 @@ def test_others_are_tried_beside_the_causes_of_a_leading_pair(
 
     monkeypatch.setattr(pairs, "_swap", swap)
     monkeypatch.setattr(pairs, "_look_at_parts", lambda rough, leader: alone.append(leader))
-    pairs._hold_against_neighbours(Standings(likelihood), {}, known[0])
+    additions = SimpleNamespace(coarse=Standings.observation)
+    pairs._hold_against_neighbours(Standings(likelihood), {}, additions, known[0])
     assert (beside, alone) == (swapped, weighed)
+
+
+@pytest.mark.parametrize(("heard_anew", "added_up"), [([False, False], 0), ([True, False], 1)])
+def test_what_causes_add_is_looked_at_again_where_another_noise_was_heard(
+    monkeypatch, heard_anew, added_up
+):
+    rough = Standings({("a", "b"): 100.0, ("a", "e"): 200.0, ("a",): 60.0, ("b",): 60.0})
+    first, anew, used, heard = SimpleNamespace(coarse=rough.observation), [], [], iter(heard_anew)
+
+    def look(rough, leader):
+        if next(heard, False):
+            rough.observation = "as heard since"
+
+    def add(unit, coarse, atlas):
+        anew.append(SimpleNamespace(coarse=coarse))
+        return anew[-1]
+
+    def swap(rough, additions, kept, looked_at):
+        used.append(additions)
+        return {("a", "e")}
+
+    monkeypatch.setattr(pairs, "_look_at_parts", look)
+    monkeypatch.setattr(pairs, "add_causes", add)
+    monkeypatch.setattr(pairs, "_swap", swap)
+    pairs._hold_against_neighbours(rough, {}, first, {("a", "b")})
+    assert len(anew) == added_up
+    assert used == [anew[0] if added_up else first] * 2
 
 
 def test_what_the_atlas_adds_to_each_part_is_tried_but_for_what_was_looked_at(monkeypatch):
@@ -119,10 +149,10 @@ def test_what_the_atlas_adds_to_each_part_is_tried_but_for_what_was_looked_at(mo
         best = [SimpleNamespace(hypothesis=SimpleNamespace(effects=key)) for key in places]
         return best[-most:]
 
-    monkeypatch.setattr(pairs, "screen_further", lambda _, __, known: further[known])
+    monkeypatch.setattr(pairs, "screen_further", lambda _, known: further[known])
     monkeypatch.setattr(pairs, "_glance", glance)
     looked_at = {("a", "x00"), ("a", "x03"), ("b", "x01")}
-    closer = pairs._swap(rough, {}, [("a",), ("b",)], looked_at)
+    closer = pairs._swap(rough, None, [("a",), ("b",)], looked_at)
     eight = [("a", f"x{i:02}") for i in (1, 2, 4, 5, 6, 7, 8, 9)]
     assert tried == [*eight, ("b", "x00"), ("b", "x02")]
     assert closer == {("a", "x08"), ("a", "x09"), ("b", "x00"), ("b", "x02")}

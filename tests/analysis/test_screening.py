@@ -13,7 +13,7 @@ from analysis.causes import Hypothesis
 from analysis.chart import reflections
 from analysis.placement import _FAR
 from analysis.population import Population
-from analysis.screening import _rows_of, screen_further, screen_pairs, screen_singles
+from analysis.screening import _rows_of, add_causes, screen_further, screen_pairs, screen_singles
 from daq.plan import SweepPlan
 from sim.catalogue import CATALOGUE
 
@@ -53,7 +53,8 @@ def test_the_hidden_pair_is_among_the_first_and_placed(atlas, seed):
     # Sizes that are seen: between one and four tenths from where they do nothing.
     sizes = 0.5 + rng.uniform(0.1, 0.4, 2) * rng.choice([-1.0, 1.0], 2)
     ratio = rng.uniform(0.1, 0.9)
-    found = screen_pairs(ADSS, seen(dict(zip(pair, sizes, strict=True)), ratio, seed), atlas)
+    observed = seen(dict(zip(pair, sizes, strict=True)), ratio, seed)
+    found = screen_pairs(add_causes(ADSS, observed, atlas))
     ranked = sorted(found, key=lambda key: -found[key].log_likelihood)
     # First in 78 of 80 draws, the other two times another came between.
     assert pair in ranked[:3]
@@ -63,7 +64,7 @@ def test_the_hidden_pair_is_among_the_first_and_placed(atlas, seed):
 
 
 def test_every_pair_is_looked_at_once_in_the_order_of_its_effects(atlas):
-    found = screen_pairs(ADSS, seen({}, 0.4, 1), atlas)
+    found = screen_pairs(add_causes(ADSS, seen({}, 0.4, 1), atlas))
     assert len(found) == len(SINGLE) * (len(SINGLE) - 1) // 2
     for key, place in found.items():
         assert key == tuple(sorted(set(key)))
@@ -84,18 +85,15 @@ def test_a_pair_does_not_ask_its_parts_to_lead_alone(atlas, sizes, stands_in):
     singles = screen_singles(ADSS, observed, atlas)
     alone = max(singles, key=lambda key: singles[key].log_likelihood)
     assert alone == (stands_in,)
-    found = screen_pairs(ADSS, observed, atlas)
+    found = screen_pairs(add_causes(ADSS, observed, atlas))
     best = max(found, key=lambda key: found[key].log_likelihood)
     assert best == tuple(sizes)
     assert found[best].log_likelihood > singles[alone].log_likelihood + 200.0
 
 
 def test_pairs_beside_a_cause_are_those_that_hold_it(atlas):
-    observed = seen({"load-inertia": 0.8}, 0.3, 4)
-    every, some = (
-        screen_pairs(ADSS, observed, atlas),
-        screen_pairs(ADSS, observed, atlas, ("load-inertia",)),
-    )
+    additions = add_causes(ADSS, seen({"load-inertia": 0.8}, 0.3, 4), atlas)
+    every, some = screen_pairs(additions), screen_pairs(additions, ("load-inertia",))
     assert set(some) == {key for key in every if "load-inertia" in key}
     assert all(some[k].log_likelihood == every[k].log_likelihood for k in some)
 
@@ -121,7 +119,7 @@ def test_a_third_cause_is_seen_beside_a_pair_and_placed(atlas, seed):
     ratio = rng.uniform(0.2, 0.8)
     observed = seen(dict(zip(three, sizes, strict=True)), ratio, seed)
     known = candidate(observed, three[:2], np.array([ratio, *sizes[:2]]), rng)
-    found = screen_further(observed, atlas, known)
+    found = screen_further(add_causes(ADSS, observed, atlas), known)
     assert set(found) == {tuple(sorted((*three[:2], e))) for e in SINGLE if e not in three[:2]}
     best = max(found, key=lambda key: found[key].log_likelihood)
     assert best == three
@@ -148,7 +146,7 @@ def test_rows_of_a_thinned_sweep_are_found_where_levels_have_their_own_frequenci
 
 
 def test_a_population_without_any_cause_gives_no_pairs(atlas):
-    assert screen_pairs(ADSS, seen({}, 0.4, 2), {(): atlas[()]}) == {}
+    assert screen_pairs(add_causes(ADSS, seen({}, 0.4, 2), {(): atlas[()]})) == {}
 
 
 AT_LOAD = ("cable-stiffness", "load-inertia", "load-viscous-damping", "payload-flexibility")
@@ -204,7 +202,7 @@ def test_a_cause_of_three_sizes_elsewhere_than_at_the_load_is_placed_by_its_own_
     monkeypatch.setattr("analysis.chart.CATALOGUE", silent)
     found = screen_singles(ADSS, seen, atlas, [SWINGING])[SWINGING]
     assert found.place[0] == pytest.approx(0.4, abs=0.2)
-    assert screen_pairs(ADSS, seen, atlas) == {}
+    assert screen_pairs(add_causes(ADSS, seen, atlas)) == {}
     assert not screening._surfaces(ADSS, seen, atlas)[SWINGING].chart
 
 

@@ -76,6 +76,7 @@ def test_more_pairs_are_tried_behind_a_cause_that_predicts_badly(
     )
     fine = SimpleNamespace(best=found[leader], observation=None)
     monkeypatch.setattr(search, "screen_singles", lambda *_: {leader: standing(100.0)})
+    monkeypatch.setattr(search, "add_causes", lambda *_: None)
     monkeypatch.setattr(search, "screen_pairs", lambda *_: pairs)
     monkeypatch.setattr(search, "hold_out", lambda *_: SimpleNamespace(rms_sigma=missed))
     search._look_beside(rough, fine, {leader: None}, None)
@@ -159,6 +160,7 @@ def test_two_of_three_causes_are_weighed_where_the_three_lead(monkeypatch):
         found[three.effects] = standing(three.effects, 200.0)
 
     rough = SimpleNamespace(
+        unit=ADSS,
         observation=None,
         found=found,
         among=list,
@@ -170,6 +172,7 @@ def test_two_of_three_causes_are_weighed_where_the_three_lead(monkeypatch):
         take_over=lambda candidates, groups: setattr(fine, "best", candidates[0]),
         start=lambda places, groups: looked.append(set(places)),
     )
+    monkeypatch.setattr(search, "add_causes", lambda *_: None)
     monkeypatch.setattr(
         search, "screen_further", lambda *_: {three.effects: standing(three.effects, 1.0).best}
     )
