@@ -16,6 +16,7 @@ import numpy as np
 from analysis.candidate import Candidate
 from analysis.holdout import HeldOut, hold_out_surface
 from analysis.own_runs import MOST_RUNS, own_runs
+from analysis.structure import judge_structure
 
 __all__ = ["Adequacy", "judge_adequacy", "judge_chance", "misses_alike"]
 
@@ -27,10 +28,12 @@ class Adequacy:
     """How the fit of an observation compares with those of a hypothesis's own runs.
 
     `sigma`: by how many standard deviations it is worse, negative where it is
-    better than most. `own`: the runs' log-likelihoods.
+    better than most. `structure`: by how many it leaves more structure. `own`:
+    the runs' log-likelihoods.
     """
 
     sigma: float
+    structure: float
     own: tuple[float, ...]
 
 
@@ -40,11 +43,14 @@ def judge_adequacy(candidate: Candidate, rng: np.random.Generator) -> Adequacy:
     The runs are given reading noise; each is fitted without the group that
     shares its deviations.
     """
-    own = [run.alone.climb(run.place, tries=1).log_likelihood for run in own_runs(candidate, rng)]
+    fits = [run.alone.climb(run.place, tries=1) for run in own_runs(candidate, rng)]
+    surface, best = candidate.surface, candidate.best
+    own = [fit.log_likelihood for fit in fits]
     centre = float(np.median(own))
     below = [centre - value for value in own if value <= centre]
     spread = 1.4826 * float(np.median(below))
-    return Adequacy((centre - candidate.best.log_likelihood) / max(spread, 1e-9), tuple(own))
+    structure = judge_structure(best, fits, surface.observation, surface.sigmas)
+    return Adequacy((centre - best.log_likelihood) / max(spread, 1e-9), structure, tuple(own))
 
 
 def judge_chance(simpler: Candidate, alleged: Candidate, rng: np.random.Generator) -> float:

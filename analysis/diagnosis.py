@@ -134,6 +134,10 @@ class Diagnosis:
                 "baseline": self.verdict.baseline.misfit,
                 "extended": self.verdict.best.misfit,
             },
+            "structure_sigma": {
+                "baseline": self.verdict.baseline.structure,
+                "extended": self.verdict.best.structure,
+            },
             "next_measurement": None if proposal is None else proposal.to_json(),
             "warnings": list(self.warnings),
             "elapsed_s": self.elapsed_s,
@@ -166,8 +170,10 @@ class Diagnosis:
         lines.append("  sets judged, by probability:")
         for one in self.verdict.judged:
             name = " + ".join(one.effects) or "nothing hidden"
-            against = f"  ({one.objection})" if one.refused else ""
-            lines.append(f"    {one.probability:6.3f}  {name}{against}")
+            remark = self.verdict.remark(one)
+            lines.append(
+                f"    {one.probability:6.3f}  {name}" + (f"  ({remark})" if remark else "")
+            )
         if self.next_measurement is not None:
             proposal = self.next_measurement
             lines.append(

@@ -63,9 +63,9 @@ _TOO_FAR, _HOPELESS = 200.0, 300.0
 last ones its parts, and from which there is no second chance."""
 
 _DOUBT = 2.0
-"""Misfit of the best single cause, in standard deviations, from which pairs are tried; and the
-root mean square of what it misses of levels not fitted, in theirs: where few runs of its own fit
-each other the first is blind, and the second is not."""
+"""Misfit of the best single cause, and the structure that it leaves, in standard deviations, from
+which pairs are tried; and the root mean square of what it misses of levels not fitted, in theirs:
+where few runs of its own fit each other the first two are blind, and the last is not."""
 
 _LEAST_SURE = 1.5
 """What a pair may miss of levels not fitted, in their standard deviations, before a third cause is
@@ -284,7 +284,8 @@ def _singles(unit: Unit, coarse: Observation, atlas: Atlas) -> Starts:
 
 
 def _is_doubtful(candidate: Candidate, rng: np.random.Generator, missed: float = _DOUBT) -> bool:
-    if judge_adequacy(candidate, rng).sigma > _DOUBT:
+    fitted = judge_adequacy(candidate, rng)
+    if max(fitted.sigma, fitted.structure) > _DOUBT:
         return True
     return hold_out(candidate, candidate.surface.observation).rms_sigma > missed
 

@@ -1,5 +1,6 @@
 """Sets that say the same of the load: a payload far from what was measured is no payload."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -70,10 +71,15 @@ def test_nothing_is_like_a_set_with_as_many_sizes():
 
 
 @pytest.mark.parametrize(("alike", "rivals"), [(True, []), (False, [SWINGING])])
-def test_what_says_the_same_with_more_sizes_is_no_rival(monkeypatch, alike, rivals):
-    monkeypatch.setattr(rules, "is_felt_alike", lambda *_: alike)
+def test_what_says_the_same_with_more_sizes_is_no_rival_and_marked_so(monkeypatch, alike, rivals):
     verdict = standing([(BRAKED, 0.0), (SWINGING, -10.0), ((), -300.0)])
+    payload = verdict.judged[1]
+    monkeypatch.setattr(rules, "is_felt_alike", lambda one, _: alike and one is payload.candidate)
     assert [one.effects for one in verdict.rivals] == rivals
+    said = ["", "says the same with more sizes" if alike else "", ""]
+    assert [verdict.remark(one) for one in verdict.judged] == said
+    refused = replace(payload, objection="wants a size that no bench has")
+    assert verdict.remark(refused) == refused.objection
 
 
 @pytest.mark.parametrize(
@@ -93,7 +99,7 @@ def test_the_simpler_of_two_that_say_the_same_is_named_where_they_tie(
 def standing(scores):
     """A verdict over sets with such scores, all of them adequate."""
     judged = tuple(
-        rules.Judged(believed(effects), SimpleNamespace(rms_sigma=0.8), score, 0.0, 0.0, "")
+        rules.Judged(believed(effects), SimpleNamespace(rms_sigma=0.8), score, 0.0, 0.0, 0.0, "")
         for effects, score in scores
     )
     return rules.Verdict("explained", judged[0], judged, judged[-1])

@@ -17,6 +17,7 @@ from analysis.verdict import judge_candidates
 
 TRUE, WRONG = ("load-inertia",), ("shaft-stiffness",)
 THREE = (*TRUE, *WRONG, "shaft-damping")
+FITS = adequacy.Adequacy(0.0, 0.0, ())
 SETS = ((), TRUE, WRONG, ("cable-stiffness",), ("amplifier-gain",))
 
 
@@ -83,6 +84,19 @@ def test_a_cause_that_nobody_knows_is_not_blamed_on_another(seed):
     assert verdict.word == "unexplained"
 
 
+def test_a_cause_that_leaves_a_shape_behind_is_not_blamed():
+    """It fits nearly as well as its own runs do, and predicts the other level: of these eight one
+    is told by the fit, and six by the structure alone."""
+    refused = []
+    for seed in range(8):
+        values = read(TRUE, np.array([0.5, 0.5]), np.random.default_rng(seed)) + 0.05 * shape(77)
+        verdict = judge(observation(values), ((), TRUE), 10 * seed)
+        (cause,) = (one for one in verdict.judged if one.effects == TRUE)
+        assert verdict.word == ("unexplained" if cause.refused else "explained")
+        refused.append(cause.objection == "leaves structure that its own runs do not")
+    assert sum(refused) >= 5
+
+
 def test_two_causes_that_look_the_same_are_both_named(monkeypatch):
     import synthetic
 
@@ -138,7 +152,7 @@ def test_a_size_that_wants_to_be_beyond_its_range_is_no_explanation(size, steep,
     )
     assert is_pressed(one) is pressed
     held_out = SimpleNamespace(rms_sigma=1.0)
-    against = rules._find_objection(one, held_out, 0.0, np.random.default_rng(0))
+    against = rules._find_objection(one, held_out, FITS, np.random.default_rng(0))
     assert against == ("wants a size that no bench has" if pressed else "")
 
 
@@ -208,9 +222,11 @@ def test_what_misses_other_levels_must_have_own_runs_that_do(
     rng = np.random.default_rng(0)
     held_out = SimpleNamespace(rms_sigma=missed)
     against = "" if adequate else "does not predict the other levels"
-    assert rules._find_objection(candidate, held_out, 0.0, rng) == against
-    unlike = rules._find_objection(candidate, held_out, 4.1, rng)
+    assert rules._find_objection(candidate, held_out, FITS, rng) == against
+    unlike = rules._find_objection(candidate, held_out, replace(FITS, sigma=4.1), rng)
     assert unlike == "does not look like its own runs"
+    shaped = rules._find_objection(candidate, held_out, replace(FITS, structure=2.6), rng)
+    assert shaped == "leaves structure that its own runs do not"
 
 
 @pytest.mark.parametrize(
