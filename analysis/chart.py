@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from analysis.causes import Hypothesis
 from sim.catalogue import CATALOGUE
 
-__all__ = ["Chart", "added_inertias", "reflected", "reflections"]
+__all__ = ["Chart", "added_inertias", "is_at_load", "reflected", "reflections"]
 
 _RATIO, _SIZE, _REFLECTED = 0.08, 0.06, 0.16
 """Widths near the answer: of the ratio, of a size, of a reflection."""
@@ -42,12 +42,12 @@ class Chart:
     @property
     def at_load(self) -> bool:
         """Whether all there is is linear, and at the load."""
-        return all(CATALOGUE[e].added_inertia is not None for e in self.hypothesis.effects)
+        return all(is_at_load(e) for e in self.hypothesis.effects)
 
     @cached_property
     def bent(self) -> NDArray[np.bool_]:
         """(d,): which coordinates of a place are replaced."""
-        at_load = [CATALOGUE[e].added_inertia is not None for e, _ in self.hypothesis.parameters]
+        at_load = [is_at_load(e) for e, _ in self.hypothesis.parameters]
         return np.array([False, *at_load]) & (sum(at_load) > _PARTS)
 
     @property
@@ -70,6 +70,11 @@ class Chart:
         felt = reflections(self.hypothesis, places, self.frequency_hz).T
         beside = np.broadcast_to(kept, (*felt.shape, kept.shape[1]))
         return np.concatenate([beside, felt.real[..., None], felt.imag[..., None]], axis=2)
+
+
+def is_at_load(effect: str) -> bool:
+    """Whether an effect is linear, and at the load."""
+    return CATALOGUE[effect].added_inertia is not None
 
 
 def reflections(

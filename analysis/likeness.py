@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from analysis.candidate import Candidate, Effects
-from analysis.chart import added_inertias, reflected
-from sim.catalogue import CATALOGUE
+from analysis.chart import added_inertias, is_at_load, reflected
 
 __all__ = ["is_felt_alike"]
 
@@ -53,4 +52,4 @@ def is_felt_alike(one: Candidate, simpler: Candidate) -> bool:
 
 def _elsewhere(one: Candidate) -> Effects:
     """Its effects that are not linear and at the load."""
-    return tuple(e for e in one.hypothesis.effects if CATALOGUE[e].added_inertia is None)
+    return tuple(e for e in one.hypothesis.effects if not is_at_load(e))

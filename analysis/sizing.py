@@ -23,7 +23,7 @@ def size_candidate(
 ) -> Calibrated:
     """Mean (d,) and covariance (d, d) of the coordinates, from runs left out in turn."""
     runs, surface = candidate.population, candidate.surface
-    bent = len(surface.width) != candidate.hypothesis.d
+    bent = surface.chart is not None and surface.chart.bent.any()
     emulator = Emulator(
         runs.places,
         runs.deviations,
