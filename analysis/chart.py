@@ -30,14 +30,16 @@ _PARTS = 2
 class Chart:
     """How places of a hypothesis look at the rows of an observation.
 
-    Where what is at the load has more sizes than the two parts of a complex
-    number, these stand in for them, last; else coordinates are the place itself.
+    Where what is at the load has more than `most` sizes, if not told otherwise
+    the two parts of a complex number, these stand in for them, last; else
+    coordinates are the place itself.
 
     `frequency_hz` (rows,).
     """
 
     hypothesis: Hypothesis
     frequency_hz: NDArray[np.float64]
+    most: int = _PARTS
 
     @property
     def at_load(self) -> bool:
@@ -48,7 +50,7 @@ class Chart:
     def bent(self) -> NDArray[np.bool_]:
         """(d,): which coordinates of a place are replaced."""
         at_load = [is_at_load(e) for e, _ in self.hypothesis.parameters]
-        return np.array([False, *at_load]) & (sum(at_load) > _PARTS)
+        return np.array([False, *at_load]) & (sum(at_load) > self.most)
 
     @property
     def width(self) -> NDArray[np.float64]:

@@ -30,7 +30,8 @@ Starts = Mapping[Effects, NDArray[np.float64]]
 
 
 _MANY = 4
-"""Coordinates from which on half of further runs lie along the places that agree."""
+"""Coordinates from which on a first look takes more groups, as two are a line in a room, and half
+of further runs of several causes lie along the places that agree."""
 
 
 class Hunt:
@@ -78,15 +79,16 @@ class Hunt:
         few, noise_v = self.observation.thinned(stride), self.observation.noise_v
         return Hunt(self.unit, few, self._rng, self._executor, self._report(), noise_v)
 
-    def start(self, places: Starts, groups: int) -> None:
-        """Simulate hypotheses about places, or more of them than before about other places."""
-        self._simulate(
-            [
-                group
-                for key, place in places.items()
-                for group in groups_about(Hypothesis(self.unit, key), place, groups, self._rng)
-            ]
-        )
+    def start(self, places: Starts, groups: int, of_many: int = 0) -> None:
+        """Simulate hypotheses about places, or more of them than before about other places.
+
+        In so many groups each; in `of_many`, if more, those with many coordinates.
+        """
+        wanted: list[Group] = []
+        for key, place in places.items():
+            count = max(groups, of_many if len(place) >= _MANY else 0)
+            wanted += groups_about(Hypothesis(self.unit, key), place, count, self._rng)
+        self._simulate(wanted)
         known = {key: self.found[key].best.place for key in places if key in self.found}
         self._form({**places, **known})
         for key in known:
@@ -104,8 +106,10 @@ class Hunt:
         """Simulate more of some candidates, about what their runs tell of their parameters."""
         more: list[Group] = []
         for c in (self.found[key] for key in chosen):
-            # What is learned of many parameters is far wider than a resonance is sharp.
-            along = groups // 2 if c.hypothesis.d >= _MANY else 0
+            # What is learned of many parameters is far wider than a resonance is sharp. Of one
+            # cause it tells more than what agrees, which tends to lie where the runs do.
+            several = len(c.hypothesis.effects) > 1
+            along = groups // 2 if several and c.hypothesis.d >= _MANY else 0
             learned = size_candidate(c, self.observation, self._rng)
             more += groups_around(c.hypothesis, learned, groups - along, self._rng)
             more += groups_along(c, along, self._rng)

@@ -4,8 +4,9 @@ Owns the comparison of an atlas with a thinned observation. Pairs are not in
 the atlas: what each of two causes adds to the baseline at the same ratio is
 added up. That is wrong in detail and good enough to decide what to simulate,
 and it asks nothing of either cause alone: the best place of one of a pair by
-itself is seldom its place within the pair. A third cause is added to what runs
-of a pair showed. It simulates nothing itself.
+itself is seldom its place within the pair. Where both are at the load it is
+wrong altogether, but what the load is felt as adds up exactly there. A third
+cause is added to what runs of a pair showed. It simulates nothing itself.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from analysis.atlas import Atlas
 from analysis.branches import Motions
 from analysis.candidate import Candidate, Effects
 from analysis.causes import Hypothesis
-from analysis.chart import Chart
+from analysis.chart import Chart, is_at_load
 from analysis.observation import Observation
 from analysis.population import Population
 from analysis.surface import Surface, differences
@@ -57,6 +58,9 @@ then looked for more closely: the surface is smooth enough for it, and a resonan
 _PAIR_RATIOS, _PAIR_SIZES = 15, {2: (13,), 3: (9, 3), 4: (4, 15, 2)}
 """The same for pairs, whose ratio is common to both, and for each cause by its coordinates."""
 
+_FELT_PAIR_COUNTS = (10, 8, 8)
+"""Places looked at along each coordinate of two causes of one size each, both at the load."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Place:
@@ -84,11 +88,16 @@ def screen_singles(
 def screen_pairs(additions: Additions, beside: Effects = ()) -> dict[Effects, Place]:
     """The best place of every pair of causes, or of those with one of `beside`."""
     plain, added = additions.plain, additions.added
-    return {
-        (*first, *second): _best_pair(plain, added[first], added[second])
-        for first, second in combinations(sorted(added), 2)
-        if not beside or set(beside) & {*first, *second}
-    }
+    found = {}
+    for first, second in combinations(sorted(added), 2):
+        key = *first, *second
+        if beside and not set(beside) & set(key):
+            continue
+        if key in additions.felt:
+            found[key] = _refined(additions.felt[key], _FELT_PAIR_COUNTS)
+        else:
+            found[key] = _best_pair(plain, added[first], added[second])
+    return found
 
 
 def screen_further(additions: Additions, known: Candidate) -> dict[Effects, Place]:
@@ -150,11 +159,13 @@ class Additions:
     """What the baseline shows, and what every cause of an atlas adds to it.
 
     `coarse`: the observation that it was held against. `plain` (ratios, 3, rows).
+    `felt`: surfaces of pairs of one size each at the load.
     """
 
     coarse: Observation
     plain: NDArray[np.float64]
     added: Mapping[Effects, _Added]
+    felt: Mapping[Effects, Surface]
 
 
 def add_causes(unit: Unit, coarse: Observation, atlas: Atlas) -> Additions:
@@ -163,7 +174,7 @@ def add_causes(unit: Unit, coarse: Observation, atlas: Atlas) -> Additions:
     ratios = _centres(_PAIR_RATIOS)
     plain = np.array([surfaces[()].expected(np.array([ratio]))[0] for ratio in ratios])
     added = {e: _added(surface, plain) for e, surface in surfaces.items() if e}
-    return Additions(coarse, plain, added)
+    return Additions(coarse, plain, added, _felt_pairs(unit, coarse, atlas))
 
 
 def _added(surface: Surface, plain: NDArray[np.float64]) -> _Added:
@@ -188,41 +199,51 @@ def _best_pair(plain: NDArray[np.float64], first: _Added, second: _Added) -> Pla
     return Place(where, top)
 
 
+def _felt_pairs(unit: Unit, coarse: Observation, atlas: Atlas) -> dict[Effects, Surface]:
+    """A surface for every pair of one size each at the load."""
+    at_load = sorted(k for k in atlas if len(k) == 1 and is_at_load(k[0]))
+    one_size = [k for k in at_load if Hypothesis(unit, k).d == 2]
+    charts = [
+        Chart(Hypothesis(unit, (*first, *second)), coarse.frequency_hz, most=0)
+        for first, second in combinations(one_size, 2)
+    ]
+    return _felt_surfaces(unit, coarse, atlas, charts)
+
+
 def _surfaces(unit: Unit, coarse: Observation, atlas: Atlas) -> dict[Effects, Surface]:
     """A surface for every hypothesis of an atlas.
 
     A load that is felt alike does alike, whatever hangs on it: what swings on the load is seen by
     all runs with something linear there.
     """
+    charts = [Chart(Hypothesis(unit, effects), coarse.frequency_hz) for effects in atlas]
+    felt = _felt_surfaces(unit, coarse, atlas, [chart for chart in charts if chart.bent.any()])
+    return {k: felt[k] if k in felt else _surface(coarse, atlas[k]) for k in atlas}
+
+
+def _felt_surfaces(
+    unit: Unit, coarse: Observation, atlas: Atlas, wanted: Sequence[Chart]
+) -> dict[Effects, Surface]:
+    """Surfaces over the ratio and what the load reflects, by all runs of what is at the load."""
+    if not wanted:
+        return {}
     charts = {effects: Chart(Hypothesis(unit, effects), coarse.frequency_hz) for effects in atlas}
-    at_load = [k for k, chart in charts.items() if chart.at_load]
-    return {
-        k: _felt_surface(coarse, atlas, charts, k, at_load)
-        if charts[k].bent.any()
-        else _surface(coarse, atlas[k])
-        for k in atlas
-    }
-
-
-def _felt_surface(
-    coarse: Observation,
-    atlas: Atlas,
-    charts: Mapping[Effects, Chart],
-    effects: Effects,
-    at_load: Sequence[Effects],
-) -> Surface:
-    """A surface over the ratio and what the load reflects, by the runs of many hypotheses."""
+    at_load = [effects for effects, chart in charts.items() if chart.at_load]
     runs = np.concatenate([differences(coarse, atlas[k]) for k in at_load])
     felt = np.concatenate([charts[k].felt(atlas[k].places) for k in at_load], axis=1)
-    return _plain_surface(
-        coarse,
-        atlas[effects].places,
-        runs,
-        _FELT_WIDTHS,
-        _FELT_ENOUGH,
-        chart=charts[effects],
-        coordinates=felt,
-    )
+    return {
+        chart.hypothesis.effects: _plain_surface(
+            coarse,
+            # Where the runs are says nothing of a range that other hypotheses have.
+            np.array([np.zeros(chart.hypothesis.d), np.ones(chart.hypothesis.d)]),
+            runs,
+            _FELT_WIDTHS,
+            _FELT_ENOUGH,
+            chart=chart,
+            coordinates=felt,
+        )
+        for chart in wanted
+    }
 
 
 def _surface(coarse: Observation, population: Population) -> Surface:
@@ -258,16 +279,16 @@ def _plain_surface(
 
 def _best_place(surface: Surface) -> Place:
     if surface.chart is not None:
-        return _refined(surface, _mesh([_centres(count) for count in _FELT_COUNTS]))
+        return _refined(surface, _FELT_COUNTS)
     counts = _COUNTS[surface.places.shape[1]]
     return _best_of(surface, _mesh([np.linspace(0.0, 1.0, count) for count in counts]))
 
 
-def _refined(surface: Surface, grid: NDArray[np.float64]) -> Place:
+def _refined(surface: Surface, counts: Sequence[int]) -> Place:
     """The best place about the best of a grid, in ever finer steps."""
-    best = _best_of(surface, grid)
+    best = _best_of(surface, _mesh([_centres(count) for count in counts]))
     for share in _REFINED:
-        lines = [share / count * np.array([-1.0, 0.0, 1.0]) for count in _FELT_COUNTS]
+        lines = [share / count * np.array([-1.0, 0.0, 1.0]) for count in counts]
         best = _best_of(surface, np.clip(best.place + _mesh(lines), 0.0, 1.0))
     return best
 

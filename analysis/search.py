@@ -29,10 +29,11 @@ from sim.unit import Unit
 
 __all__ = ["search_causes"]
 
-_FIRST, _FIRST_GROUPS = 9, 2
+_FIRST, _FIRST_GROUPS, _FIRST_OF_MANY = 9, 2, 4
 _SECOND, _SECOND_GROUPS = 5, 4
 _THIRD, _THIRD_GROUPS = 4, 4
-"""How many hypotheses are looked at in each round, and in how many groups of runs each."""
+"""How many hypotheses are looked at in each round, and in how many groups of runs each; at first
+in more where one has many sizes."""
 
 _BESIDE, _BESIDE_CLOSER, _BESIDE_GROUPS = (5, 8), (2, 4), (2, 4)
 """How many pairs with a leader that is not doubted are tried, and how many looked at closer, where
@@ -80,6 +81,9 @@ _PREDICTED, _NOT_PREDICTED, _MORE_ROUNDS, _ROUNDS_ALONE = 1.3, 2.5, 3, 7
 and up to which that may help; how many times, and how many where it leaves all others far behind:
 a pair with four parameters took six rounds to be seen as the truth that it was."""
 
+_CLOSER_LOOKS = 2
+"""How often a doubtful leader that is far ahead gets more runs before pairs are looked at."""
+
 _COMMON = 0.2
 """Share of the baseline's own runs that the leader explains better by as much, from which on there
 is nothing to be found, and nothing more is simulated."""
@@ -120,7 +124,7 @@ def search_causes(
     atlas = {k: v for k, v in atlas.items() if not set(k) & set(without)}
     rng = np.random.default_rng(seed)
     rough = Hunt(unit, coarse, rng, executor, part_of(progress, 0.4, 0.6, "narrowing down"))
-    rough.start(_singles(unit, coarse, atlas), _FIRST_GROUPS)
+    rough.start(_singles(unit, coarse, atlas), _FIRST_GROUPS, _FIRST_OF_MANY)
     rough.hear()
     rough.look_closer(_with_baseline(rough.leading(_SECOND, _TOO_FAR)), _SECOND_GROUPS)
     rough.hear()
@@ -142,7 +146,7 @@ def search_causes(
     fine.take_over([rough.found[key] for key in third], _THIRD_GROUPS)
     fine.hear()
     while True:
-        if not doubted and _is_doubtful(fine.best, rng):
+        if not doubted and _is_doubtful_still(fine, rng):
             # More rows, or more runs, show that a single cause will not do after all.
             doubted = True
             search_pairs(rough, atlas)
@@ -173,10 +177,13 @@ def _look_beside(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator
     if len(leader) != 1:
         return
     alone = screen_singles(rough.unit, rough.observation, atlas, [leader])[leader]
-    places = screen_pairs(add_causes(rough.unit, rough.observation, atlas), leader)
+    additions = add_causes(rough.unit, rough.observation, atlas)
+    places = screen_pairs(additions, leader)
     poor = hold_out(fine.best, fine.observation).rms_sigma > AT_NOISE
     enough = -np.inf if poor else alone.log_likelihood - _LITTLE
     chosen = [k for k in ranked(places)[: _BESIDE[poor]] if places[k].log_likelihood > enough]
+    # Of what adds up exactly the place is right, and how likely it is not comparable.
+    chosen += [k for k in places if k in additions.felt and k not in chosen]
     starts = {key: places[key].place for key in chosen}
     kept = _narrow(rough, starts, _BESIDE_CLOSER[poor], _BESIDE_GROUPS)[: _BESIDE_CLOSER[0]]
     if kept:
@@ -288,6 +295,21 @@ def _is_doubtful(candidate: Candidate, rng: np.random.Generator, missed: float =
     if max(fitted.sigma, fitted.structure) > _DOUBT:
         return True
     return hold_out(candidate, candidate.surface.observation).rms_sigma > missed
+
+
+def _is_doubtful_still(fine: Hunt, rng: np.random.Generator) -> bool:
+    """Whether the leader is doubtful with more runs, too, where it leaves all others far behind.
+
+    Few runs leave a shape of their own beside a sharp resonance, and pairs cost far more.
+    """
+    for _ in range(_CLOSER_LOOKS):
+        if not _is_doubtful(fine.best, rng):
+            return False
+        leader = fine.best.hypothesis.effects
+        if not leader or len(fine.leading(2, _TOO_FAR)) > 1:
+            return True
+        _settle(fine, [leader])
+    return _is_doubtful(fine.best, rng)
 
 
 def _is_nothing_missing(fine: Hunt, rng: np.random.Generator) -> bool:

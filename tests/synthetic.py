@@ -17,9 +17,11 @@ from analysis.observation import Observation
 from analysis.population import DEVIATING, Population
 from analysis.surface import Surface
 from daq.plan import SweepPlan
+from sim.effects import drivetrain_with
 from sim.unit import load_unit
 
 ADSS = load_unit("adss")
+PAYLOAD = Hypothesis(ADSS, ("payload-flexibility",))
 FREQUENCIES = tuple(np.linspace(100.0, 180.0, 24))
 LEVELS = (1.5, 4.0)
 ROWS = len(FREQUENCIES) * len(LEVELS)
@@ -52,6 +54,23 @@ def read(effects, place, rng, deviations=None, scatter=1.0):
     value = BASE + RATIO_SLOPE * (place[0] - 0.5) + effect_slope(effects) * size
     value = value + np.tensordot(deviations, DEVIATION_SLOPES, axes=1)
     return value + scatter * SCATTER * rng.standard_normal((3, ROWS))
+
+
+def population(places, runs) -> Population:
+    """Runs (m, 3, rows) at places (m, d) of units as their datasheet says."""
+    mean = np.exp(runs[:, 0] + 1j * runs[:, 1])
+    none = np.zeros((len(runs), len(DEVIATING)))
+    return Population(places, none, mean, np.exp(2.0 * runs[:, 2]))
+
+
+def payload_runs(places):
+    """Gain, phase and no scatter (m, 3, rows) of payloads on a drive without play."""
+    shown = []
+    for place in places:
+        transfer = drivetrain_with(ADSS, 0.4, PAYLOAD.settings(place)).system().transfer
+        log = np.log(transfer(np.array(FREQUENCIES)))
+        shown.append(np.tile([log.real, log.imag, 0.0 * log.real], len(LEVELS)))
+    return np.array(shown)
 
 
 def observation(values) -> Observation:

@@ -10,10 +10,9 @@ from analysis.branches import Motions
 from analysis.causes import Hypothesis
 from analysis.chart import Chart, reflections
 from analysis.surface import Surface
-from sim.effects import drivetrain_with
 
 ADSS, FREQUENCIES = synthetic.ADSS, np.tile(synthetic.FREQUENCIES, len(synthetic.LEVELS))
-PAYLOAD = Hypothesis(ADSS, ("payload-flexibility",))
+PAYLOAD = synthetic.PAYLOAD
 
 
 @pytest.mark.parametrize("effects", [
@@ -62,16 +61,6 @@ def test_what_is_reflected_of_known_loads():
     assert np.allclose(reflections(PAYLOAD, still[None], FREQUENCIES), 1j, atol=1e-3)
 
 
-def linear_runs(places):
-    """Gain, phase and no scatter (m, 3, rows) of payloads on a drive without play."""
-    shown = []
-    for place in places:
-        transfer = drivetrain_with(ADSS, 0.4, PAYLOAD.settings(place)).system().transfer
-        log = np.log(transfer(np.array(synthetic.FREQUENCIES)))
-        shown.append(np.tile([log.real, log.imag, 0.0 * log.real], len(synthetic.LEVELS)))
-    return np.array(shown)
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_a_regression_over_what_is_reflected_foretells_a_resonance_and_one_over_sizes_does_not(
     seed,
@@ -83,12 +72,12 @@ def test_a_regression_over_what_is_reflected_foretells_a_resonance_and_one_over_
     rng = np.random.default_rng(seed)
     low, high = [0.4, 0.3, 0.5, 0.3], [0.4, 0.7, 0.7, 0.7]
     runs, asked = rng.uniform(low, high, (120, 4)), rng.uniform(low, high, (40, 4))
-    base = linear_runs(asked[:1])[0]
+    base = synthetic.payload_runs(asked[:1])[0]
     seen = synthetic.observation(base)
-    difference = linear_runs(runs) - base
+    difference = synthetic.payload_runs(runs) - base
     difference[:, 1] = np.angle(np.exp(1j * difference[:, 1]))
     none, alike = np.empty((0, 3, synthetic.ROWS)), Motions.unknown(120, synthetic.ROWS)
-    truth = linear_runs(asked) - base
+    truth = synthetic.payload_runs(asked) - base
     chart = Chart(PAYLOAD, FREQUENCIES)
 
     def missed(width, chart):

@@ -2,7 +2,10 @@
 
 import numpy as np
 import pytest
+import synthetic
 import synthetic_search
+
+from analysis import hunt
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -24,3 +27,40 @@ def test_a_look_at_the_right_place_mends_one_at_a_wrong_place(runs, seed):
     looking.start({key: np.array([0.4, 0.8])}, 4)
     assert looking.found[key].best.log_likelihood > wrong + 100.0
     assert looking.found[key].best.place == pytest.approx([0.4, 0.8], abs=0.1)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_payload_is_found_though_its_damping_was_placed_badly(monkeypatch, seed):
+    """As the coarse look does it: a quarter of the range off, as in four measurements of seven.
+
+    In eight draws 0.09 of the range was left at most; with runs as close as for other
+    causes, 0.19 at least.
+    """
+    key = synthetic.PAYLOAD.effects
+
+    def simulate(unit, groups, observation, rng, executor=None, progress=None):
+        places = np.concatenate([group.places for group in groups])
+        runs = synthetic.payload_runs(places)
+        runs += synthetic.SCATTER * rng.standard_normal(runs.shape)
+        return {key: synthetic.population(places, runs)}
+
+    monkeypatch.setattr(hunt, "simulate_groups", simulate)
+    rng = np.random.default_rng(seed)
+    place = np.array([0.4, *rng.uniform([0.5, 0.55, 0.5], [0.7, 0.7, 0.65])])
+    seen = synthetic.observation(synthetic.payload_runs(place[None])[0])
+    looking = hunt.Hunt(synthetic.ADSS, seen, rng, None, None)
+    coarse = place + [0.0, *rng.choice([-1.0, 1.0], 2) * [0.1, 0.02], 0.25]
+    looking.start({key: coarse}, 2, of_many=4)
+    looking.look_closer([key], 4)
+    _, inertia, resonance, damping = np.abs(looking.found[key].best.place - place)
+    assert len(looking.found[key].population) == 80
+    assert damping < 0.15
+    assert inertia < 0.1
+    assert resonance < 0.02
+
+
+def test_many_sizes_take_more_groups_at_first_and_few_do_not(runs):
+    looking = synthetic_search.hunted([0.8], 1)
+    both = {("load-inertia",): [0.4, 0.8], ("payload-flexibility",): [0.4, 0.5, 0.5, 0.5]}
+    looking.start({key: np.array(place) for key, place in both.items()}, 2, of_many=4)
+    assert runs == {("load-inertia",): 20, ("payload-flexibility",): 40}

@@ -12,7 +12,6 @@ from analysis.candidate import form_candidates
 from analysis.causes import Hypothesis
 from analysis.chart import reflections
 from analysis.placement import _FAR
-from analysis.population import Population
 from analysis.screening import _rows_of, add_causes, screen_further, screen_pairs, screen_singles
 from daq.plan import SweepPlan
 from sim.catalogue import CATALOGUE
@@ -32,8 +31,7 @@ def population(effects, rng):
         for ratio in (np.arange(10) + rng.uniform()) / 10:
             places.append([ratio, size][: 1 + len(effects)])
             runs.append(channels(dict.fromkeys(effects, size), ratio, rng))
-    mean, scatter = np.exp(np.array([r[0] + 1j * r[1] for r in runs])), np.array(runs)[:, 2]
-    return Population(np.array(places), np.zeros((len(runs), 5)), mean, np.exp(2.0 * scatter))
+    return synthetic.population(np.array(places), np.array(runs))
 
 
 @pytest.fixture(scope="module")
@@ -106,8 +104,7 @@ def candidate(observed, effects, place, rng):
         for ratio in np.clip(place[0] + rng.uniform(-0.2, 0.2, 10), 0.0, 1.0):
             places.append([ratio, *sizes])
             runs.append(channels(dict(zip(effects, sizes, strict=True)), ratio, rng))
-    mean, scatter = np.exp(np.array([r[0] + 1j * r[1] for r in runs])), np.array(runs)[:, 2]
-    made = Population(np.array(places), np.zeros((80, 5)), mean, np.exp(2.0 * scatter))
+    made = synthetic.population(np.array(places), np.array(runs))
     return form_candidates(synthetic.ADSS, observed, {effects: made}, {effects: place})[effects]
 
 
@@ -168,9 +165,7 @@ def felt_population(effects, groups, rng):
     sizes = np.repeat(rng.uniform(size=(groups, d - 1)), 10, axis=0)
     ratios = np.tile((np.arange(10) + 0.5) / 10, groups)
     places = np.column_stack([ratios, sizes])
-    runs = felt(effects, places, rng)
-    mean = np.exp(runs[:, 0] + 1j * runs[:, 1])
-    return Population(places, np.zeros((len(runs), 5)), mean, np.exp(2.0 * runs[:, 2]))
+    return synthetic.population(places, felt(effects, places, rng))
 
 
 def test_what_swings_on_the_load_is_placed_by_all_that_is_felt_there():
@@ -191,6 +186,27 @@ def test_what_swings_on_the_load_is_placed_by_all_that_is_felt_there():
     _, inertia, resonance, _ = np.median(off, axis=0)
     assert inertia < 0.1
     assert resonance < 0.03
+
+
+def test_two_causes_at_the_load_are_placed_by_what_they_are_felt_as_together():
+    """A cable and a heavier or lighter load: what each does alone does not add up.
+
+    Of sixteen draws two were placed further off than 0.15 by what is felt: that three of five
+    are has less than two chances in a hundred. Added up, ten of the sixteen were.
+    """
+    pair, felt_together, added_up = ("cable-stiffness", "load-inertia"), [], []
+    for seed in range(5):
+        rng = np.random.default_rng([seed, 11])
+        keys = [(), ("amplifier-lag",), *((e,) for e in pair)]
+        atlas = {key: felt_population(key, 8, rng) for key in keys}
+        place = np.array([rng.uniform(0.1, 0.9), *rng.uniform(0.5, 0.8, 2)])
+        seen = synthetic.observation(felt(pair, place[None], rng)[0])
+        additions = add_causes(ADSS, seen, atlas)
+        assert list(additions.felt) == [pair]
+        for given, off in ((additions, felt_together), (replace(additions, felt={}), added_up)):
+            off.append(np.abs(screen_pairs(given)[pair].place - place)[1:].max())
+    assert np.median(felt_together) < 0.15
+    assert np.median(felt_together) < np.median(added_up)
 
 
 def test_a_cause_of_three_sizes_elsewhere_than_at_the_load_is_placed_by_its_own_runs(monkeypatch):

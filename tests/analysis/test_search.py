@@ -53,11 +53,17 @@ def test_nothing_is_looked_for_behind_a_cause_that_explains_all(runs):
     assert all(count <= 60 for key, count in runs.items() if len(key) > 1)
 
 
-@pytest.mark.parametrize(("missed", "tried", "closer"), [(1.0, 2, 2), (1.1, 8, 4)])
+@pytest.mark.parametrize(
+    ("missed", "felt", "tried", "closer"),
+    [(1.0, [], 2, 2), (1.1, [], 8, 4), (1.0, [1, 11], 3, 2), (1.1, [11], 9, 4)],
+)
 def test_more_pairs_are_tried_behind_a_cause_that_predicts_badly(
-    monkeypatch, missed, tried, closer
+    monkeypatch, missed, felt, tried, closer
 ):
-    """In the coarse look two are nearly as good as their part; none earns its place."""
+    """In the coarse look two are nearly as good as their part; none earns its place.
+
+    Those at the load, whose likelihood there is another, are tried however far behind they are.
+    """
     looked, leader = [], ("load-inertia",)
 
     def standing(likelihood):
@@ -76,11 +82,14 @@ def test_more_pairs_are_tried_behind_a_cause_that_predicts_badly(
     )
     fine = SimpleNamespace(best=found[leader], observation=None)
     monkeypatch.setattr(search, "screen_singles", lambda *_: {leader: standing(100.0)})
-    monkeypatch.setattr(search, "add_causes", lambda *_: None)
+    ranked = list(pairs)
+    additions = SimpleNamespace(felt=[ranked[i] for i in felt])
+    monkeypatch.setattr(search, "add_causes", lambda *_: additions)
     monkeypatch.setattr(search, "screen_pairs", lambda *_: pairs)
     monkeypatch.setattr(search, "hold_out", lambda *_: SimpleNamespace(rms_sigma=missed))
     search._look_beside(rough, fine, {leader: None}, None)
-    assert looked == [list(pairs)[:tried], list(pairs)[:closer]]
+    asked = ranked[: tried - (11 in felt)] + [ranked[i] for i in felt if i == 11]
+    assert looked == [asked, asked[:closer]]
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -277,7 +286,7 @@ def test_where_nothing_is_missing_the_search_ends_early(runs):
 
 def test_what_is_left_out_of_the_catalogue_is_not_looked_at(runs, monkeypatch):
     monkeypatch.setattr(search, "_TRIPLES", 0)
-    without = ("load-inertia", "payload-flexibility")
+    without = ("load-inertia", *synthetic_search.FELT)
     found, verdict = synthetic_search.diagnosed(("load-inertia",), [0.8], 5, without=without)
     assert not any("load-inertia" in key for key in runs)
     assert verdict.word == "unexplained"
@@ -290,3 +299,28 @@ def test_every_candidate_is_held_against_the_same_noise(runs):
     heard = {one.surface.observation.noise_v for one in found}
     assert len(heard) == 1
     assert USUAL_NOISE_V <= heard.pop() <= 4.0 * USUAL_NOISE_V
+
+
+@pytest.mark.parametrize(
+    ("leader", "alone", "doubts", "still", "settled"),
+    [
+        (("load-inertia",), True, [False], False, 0),
+        (("load-inertia",), True, [True, False], False, 1),
+        (("load-inertia",), True, [True, True, True], True, 2),
+        (("load-inertia",), False, [True], True, 0),
+        ((), True, [True], True, 0),
+    ],
+)
+def test_a_doubted_leader_far_ahead_gets_more_runs_before_pairs_are_looked_at(
+    monkeypatch, leader, alone, doubts, still, settled
+):
+    more = []
+    fine = SimpleNamespace(
+        best=SimpleNamespace(hypothesis=SimpleNamespace(effects=leader)),
+        leading=lambda most, behind: [leader] if alone else [leader, ("mesh1-damping",)],
+    )
+    monkeypatch.setattr(search, "_is_doubtful", lambda *_: doubts.pop(0))
+    monkeypatch.setattr(search, "_settle", lambda hunt, chosen: more.append(chosen))
+    assert search._is_doubtful_still(fine, None) is still
+    assert more == [[leader]] * settled
+    assert not doubts
