@@ -28,6 +28,9 @@ _ESCAPED = re.compile(rb"([\r\n\x1b+])")
 _PATIENCE_S = 1.5
 """Wait for one answer of the adapter; an Arduino that resets on opening is deaf for about 2 s."""
 
+_ASK_AGAIN_S = 0.4
+"""Wait for a version text before it is asked for again: an adapter that starts hears nothing."""
+
 _QUIET_S = 0.1
 """Silence after which an adapter is taken to have said all."""
 
@@ -115,23 +118,35 @@ class Adapter:
 
         The adapter works its lines off in order, so nothing older can follow
         the answer to this question. Answers still owed to earlier ones count.
+        One that is starting just then hears nothing, so it is asked again.
         """
-        self.send(b"++ver", deadline)
-        self._versions_due += 1
         heard = False
+        while not heard:
+            self.send(b"++ver", deadline)
+            self._versions_due += 1
+            heard = self._hears_version(deadline)
+            if deadline.expired:
+                break
+        if heard:
+            self._versions_due = 0  # those of before a reset never come
+        self.inbox.clear()
+        return heard
+
+    def _hears_version(self, deadline: Deadline) -> bool:
+        """Whether a version text came; drops what came before it, and waits for those owed."""
+        heard = False
+        patience = deadline.within(_ASK_AGAIN_S)
         while self._versions_due:
-            line = self._next_line(deadline)
+            line = self._next_line(patience)
             if line is None:
                 break
             # A cut reply without line feed stands before the version on the same line.
             if line.endswith(self.version):
                 self._versions_due -= 1
                 heard = True
-            elif deadline.expired:
+                patience = deadline.within(_ASK_AGAIN_S)
+            elif patience.expired:
                 break  # it talks on and on
-        if heard:
-            self._versions_due = 0  # those of before a reset never come
-        self.inbox.clear()
         return heard
 
     def has_forgotten(self, deadline: Deadline) -> bool:

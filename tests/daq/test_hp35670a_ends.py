@@ -2,7 +2,7 @@
 
 import threading
 import time
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 
 import numpy as np
 import pytest
@@ -241,8 +241,10 @@ def test_a_plan_of_one_frequency_can_be_measured():
     ],
 )
 def test_a_fault_ends_in_its_own_error_and_an_honest_state(wire, fault, error, state):
-    with serving(fault) as (instrument, addresses):
-        analyser = HP35670A(open_transport(url_of(wire, addresses)), timing=IMPATIENT)
+    with (
+        serving(fault) as (instrument, addresses),
+        closing(HP35670A(open_transport(url_of(wire, addresses)), timing=IMPATIENT)) as analyser,
+    ):
         started = time.monotonic()
         with pytest.raises(error) as raised:
             measured(analyser, np.linspace(60.0, 190.0, 8))
@@ -251,7 +253,6 @@ def test_a_fault_ends_in_its_own_error_and_an_honest_state(wire, fault, error, s
         assert analyser.make_safe() is state
         assert (instrument.output_vpk == 0.0) is (state is SourceState.CONFIRMED_OFF)
         assert "\n" not in str(raised.value)
-        analyser.close()
     assert time.monotonic() - started < 10.0
 
 

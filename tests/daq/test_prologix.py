@@ -266,6 +266,24 @@ def test_a_clear_through_a_silent_adapter_is_a_lost_link():
         transport.device_clear(soon())
 
 
+@pytest.mark.parametrize("deaf_for", range(3))
+def test_an_adapter_that_starts_while_it_is_asked_is_asked_again(deaf_for):
+    adapter = TinyAdapter(echo_number)
+    transport = opened(adapter)
+    lost, hear = [], adapter.feed
+
+    def deaf(data: bytes) -> bytes:
+        if data.startswith(b"++ver") and len(lost) < deaf_for:
+            lost.append(data)
+            return b""
+        return hear(data)
+
+    adapter.feed = deaf
+    assert transport.device_clear(Deadline.after(3.0))
+    assert len(lost) == deaf_for
+    assert ask(transport, "1?", soon()) == "+1"
+
+
 def test_an_answer_from_before_is_never_taken_for_a_new_one():
     adapter = TinyAdapter(echo_number)
     transport = opened(adapter)
