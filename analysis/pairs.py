@@ -30,6 +30,9 @@ _CLOSER, _AFTER, _GROUPS = 10, 5, (2, 3)
 they are simulated at first, and in how many groups; how many are looked at closer, twice. What
 two causes do together is seldom the sum of what each does, and few runs rank them by chance."""
 
+_FELT_GROUPS = 4
+"""Groups in which two causes of one size each at the load are simulated, whatever is favoured."""
+
 _SWAPS, _SWAPS_CLOSER, _SWAP_ROUNDS = 8, 4, 2
 """Pairs with each cause of the leading one that are looked at then, how many of them closer, and
 how often, where one of them takes the lead."""
@@ -50,8 +53,11 @@ def search_pairs(rough: Hunt, atlas: Atlas) -> None:
         return
     partners = [key for key in favoured if rough.best_single[0] in key]
     chosen = dict.fromkeys([*favoured[:_PAIRS], *partners[:_PARTNERS]])
-    rough.take_over(_glance(rough, {key: places[key] for key in chosen}, _CLOSER), _GROUPS[0])
-    looked_at = set(rough.among(chosen)[:_AFTER])
+    glanced_at = {key: places[key] for key in chosen if key not in additions.felt}
+    rough.take_over(_glance(rough, glanced_at, _CLOSER), _GROUPS[0])
+    # What adds up exactly is placed too well for a glance, and is likely by another measure.
+    rough.start({key: places[key].place for key in additions.felt}, _FELT_GROUPS)
+    looked_at = set(rough.among([*glanced_at, *additions.felt])[:_AFTER])
     rough.look_closer(sorted(looked_at), _GROUPS[1])
     _hold_against_neighbours(rough, atlas, additions, looked_at)
 

@@ -76,10 +76,11 @@ _LITTLE = 10.0
 """Log-likelihood in the coarse look that a pair may lack of its leading part, and be looked at;
 any where that part predicts badly, for pairs are looked at in coarser steps."""
 
-_PREDICTED, _NOT_PREDICTED, _MORE_ROUNDS, _ROUNDS_ALONE = 1.3, 2.5, 3, 7
-"""What a leader misses of levels not fitted, in standard deviations, from which it gets more runs
-and up to which that may help; how many times, and how many where it leaves all others far behind:
-a pair with four parameters took six rounds to be seen as the truth that it was."""
+_PREDICTED, _NOT_PREDICTED, _MORE_ROUNDS, _ROUNDS_ALONE = (1.3, 1.0), 2.5, 3, 7
+"""What a leader of one cause, or of several, misses of levels not fitted, in standard deviations,
+from which it gets more runs (several are refused for less, `analysis.verdict`) and up to which
+that may help; how many times, and how many where it leaves all others far behind: a pair with four
+parameters took six rounds to be seen as the truth that it was."""
 
 _CLOSER_LOOKS = 2
 """How often a doubtful leader that is far ahead gets more runs before pairs are looked at."""
@@ -219,7 +220,8 @@ def _see_it_predict(fine: Hunt) -> None:
     """Give a leader, and who is close to it, more runs where it predicts badly: few runs do."""
     for done in range(_ROUNDS_ALONE):
         missed = hold_out(fine.best, fine.observation).rms_sigma
-        if not fine.best.hypothesis.effects or not _PREDICTED < missed < _NOT_PREDICTED:
+        causes = len(fine.best.hypothesis.effects)
+        if not causes or not _PREDICTED[causes > 1] < missed < _NOT_PREDICTED:
             break
         if len(fine.leading(2, _TOO_FAR)) == 1:
             fine.settle([fine.best.hypothesis.effects], _LAST_GROUPS)

@@ -191,21 +191,27 @@ def test_two_of_three_causes_are_weighed_where_the_three_lead(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("missed", "second", "rounds"),
+    ("causes", "missed", "second", "rounds"),
     [
-        ([1.0], 10.0, 0),
-        ([1.29], 10.0, 0),
-        ([1.6, 1.1], 10.0, 1),
-        ([1.6, 1.5, 1.2], 10.0, 2),
-        ([1.6] * 4, 10.0, 3),
-        ([1.6] * 4, 199.0, 3),
-        ([1.6] * 5 + [1.2], 201.0, 5),
-        ([1.6] * 9, 201.0, 7),
-        ([2.6], 10.0, 0),
+        (1, [1.0], 10.0, 0),
+        (1, [1.29], 10.0, 0),
+        (1, [1.6, 1.1], 10.0, 1),
+        (1, [1.6, 1.5, 1.2], 10.0, 2),
+        (1, [1.6] * 4, 10.0, 3),
+        (1, [1.6] * 4, 199.0, 3),
+        (1, [1.6] * 5 + [1.2], 201.0, 5),
+        (1, [1.6] * 9, 201.0, 7),
+        (1, [2.6], 10.0, 0),
+        (2, [0.99], 201.0, 0),
+        (2, [1.1, 1.1, 0.9], 201.0, 2),
+        (3, [1.6, 1.2, 0.9], 10.0, 2),
+        (2, [2.6], 10.0, 0),
+        (0, [1.6], 10.0, 0),
     ],
 )
-def test_a_leader_that_predicts_badly_gets_more_runs(monkeypatch, missed, second, rounds):
-    settled, left, leader = [], iter(missed), ("load-inertia",)
+def test_a_leader_that_predicts_badly_gets_more_runs(monkeypatch, causes, missed, second, rounds):
+    settled, left = [], iter(missed)
+    leader = ("amplifier-lag", "load-inertia", "motor-constant")[:causes]
     best = SimpleNamespace(hypothesis=Hypothesis(ADSS, leader))
     fine = SimpleNamespace(
         best=best,
