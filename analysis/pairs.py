@@ -7,7 +7,7 @@ It leaves what it found in the hunt, and does not tell whether a pair is called 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from analysis.atlas import Atlas, coarse_stride
 from analysis.candidate import Candidate, Effects
@@ -17,12 +17,13 @@ from analysis.screening import (
     Additions,
     Place,
     add_causes,
+    near,
     ranked,
     screen_further,
     screen_pairs,
 )
 
-__all__ = ["search_pairs"]
+__all__ = ["look_at_felt", "search_pairs"]
 
 _PAIRS, _PARTNERS, _GLANCE_FREQUENCIES, _GLANCE_GROUPS = 20, 10, 10, 2
 _CLOSER, _AFTER, _GROUPS = 10, 5, (2, 3)
@@ -30,8 +31,9 @@ _CLOSER, _AFTER, _GROUPS = 10, 5, (2, 3)
 they are simulated at first, and in how many groups; how many are looked at closer, twice. What
 two causes do together is seldom the sum of what each does, and few runs rank them by chance."""
 
-_FELT_GROUPS = 4
-"""Groups in which two causes of one size each at the load are simulated, whatever is favoured."""
+_FELT_GROUPS = (2, 2, 2)
+"""Groups of each look at a pair that is placed by what the load is felt as: ever closer ones told a
+true one from a cable alone, as many runs about the first place did not."""
 
 _SWAPS, _SWAPS_CLOSER, _SWAP_ROUNDS = 8, 4, 2
 """Pairs with each cause of the leading one that are looked at then, how many of them closer, and
@@ -53,13 +55,22 @@ def search_pairs(rough: Hunt, atlas: Atlas) -> None:
         return
     partners = [key for key in favoured if rough.best_single[0] in key]
     chosen = dict.fromkeys([*favoured[:_PAIRS], *partners[:_PARTNERS]])
-    glanced_at = {key: places[key] for key in chosen if key not in additions.felt}
+    felt = {key: places[key] for key in additions.felt}
+    glanced_at = {key: places[key] for key in chosen if key not in felt}
     rough.take_over(_glance(rough, glanced_at, _CLOSER), _GROUPS[0])
     # What adds up exactly is placed too well for a glance, and is likely by another measure.
-    rough.start({key: places[key].place for key in additions.felt}, _FELT_GROUPS)
-    looked_at = set(rough.among([*glanced_at, *additions.felt])[:_AFTER])
+    felt = near(felt, max((one.log_likelihood for one in felt.values()), default=0.0))
+    look_at_felt(rough, felt)
+    looked_at = set(rough.among([*glanced_at, *felt])[:_AFTER])
     rough.look_closer(sorted(looked_at), _GROUPS[1])
     _hold_against_neighbours(rough, atlas, additions, looked_at)
+
+
+def look_at_felt(rough: Hunt, places: Mapping[Effects, Place]) -> None:
+    """Look ever closer at pairs that are placed by what the load is felt as."""
+    rough.start({key: one.place for key, one in places.items()}, _FELT_GROUPS[0])
+    for groups in _FELT_GROUPS[1:]:
+        rough.look_closer(list(places), groups)
 
 
 def _hold_against_neighbours(

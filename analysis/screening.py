@@ -32,7 +32,9 @@ __all__ = [
     "Additions",
     "Place",
     "add_causes",
+    "near",
     "ranked",
+    "screen_felt",
     "screen_further",
     "screen_pairs",
     "screen_singles",
@@ -61,6 +63,10 @@ _PAIR_RATIOS, _PAIR_SIZES = 15, {2: (13,), 3: (9, 3), 4: (4, 15, 2)}
 _FELT_PAIR_COUNTS = (10, 8, 8)
 """Places looked at along each coordinate of two causes of one size each, both at the load."""
 
+_NEAR = 80.0
+"""Log-likelihood within which hypotheses seen by what the load is felt as are worth a look. True
+pairs lay up to 45 behind another such pair (thirteen drawn), and 8 behind a payload (eight)."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Place:
@@ -83,6 +89,17 @@ def screen_singles(
     for effects in atlas if wanted is None else wanted:
         found[effects] = _best_place(surfaces[effects])
     return found
+
+
+def screen_felt(additions: Additions) -> dict[Effects, Place]:
+    """The best place of every pair that is seen by what the load is felt as."""
+    return {key: _refined(one, _FELT_PAIR_COUNTS) for key, one in additions.felt.items()}
+
+
+def near(places: Mapping[Effects, Place], log_likelihood: float) -> dict[Effects, Place]:
+    """Those of some places, all seen by what the load is felt as, not far behind that."""
+    least = log_likelihood - _NEAR
+    return {key: one for key, one in places.items() if one.log_likelihood > least}
 
 
 def screen_pairs(additions: Additions, beside: Effects = ()) -> dict[Effects, Place]:

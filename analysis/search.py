@@ -16,15 +16,25 @@ import numpy as np
 from analysis.adequacy import judge_adequacy, judge_chance
 from analysis.atlas import Atlas, coarse_stride, make_atlas
 from analysis.candidate import Candidate, Effects
+from analysis.causes import Hypothesis
+from analysis.chart import Chart
 from analysis.executor import Executor
 from analysis.holdout import AT_NOISE, hold_out
 from analysis.hunt import Hunt, Starts
 from analysis.observation import Observation
-from analysis.pairs import search_pairs
+from analysis.pairs import look_at_felt, search_pairs
 from analysis.parts import earns, parts_of, places_of_parts
 from analysis.plausibility import is_pressed
 from analysis.progress import Progress, part_of
-from analysis.screening import add_causes, ranked, screen_further, screen_pairs, screen_singles
+from analysis.screening import (
+    add_causes,
+    near,
+    ranked,
+    screen_felt,
+    screen_further,
+    screen_pairs,
+    screen_singles,
+)
 from sim.unit import Unit
 
 __all__ = ["search_causes"]
@@ -186,7 +196,13 @@ def _look_beside(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator
     # Of what adds up exactly the place is right, and how likely it is not comparable.
     chosen += [k for k in places if k in additions.felt and k not in chosen]
     starts = {key: places[key].place for key in chosen}
-    kept = _narrow(rough, starts, _BESIDE_CLOSER[poor], _BESIDE_GROUPS)[: _BESIDE_CLOSER[0]]
+    kept = _narrow(rough, starts, _BESIDE_CLOSER[poor], _BESIDE_GROUPS)
+    if Chart(Hypothesis(rough.unit, leader), rough.observation.frequency_hz).bent.any():
+        # What swings on the load has stood for two causes there, and is likely by that measure.
+        stood_for = near(screen_felt(additions), alone.log_likelihood)
+        look_at_felt(rough, stood_for)
+        kept = rough.among([*kept, *(key for key in stood_for if earns(key, rough.found))])
+    kept = kept[: _BESIDE_CLOSER[0]]
     if kept:
         fine.take_over([rough.found[key] for key in kept], _THIRD_GROUPS)
         if set(kept) & set(fine.leading(len(fine.found), _CLOSE)):

@@ -160,10 +160,10 @@ def test_what_the_atlas_adds_to_each_part_is_tried_but_for_what_was_looked_at(mo
 
 
 def test_pairs_that_add_up_exactly_are_looked_at_whatever_is_favoured(monkeypatch):
-    felt = ("cable-stiffness", "load-inertia")
+    felt, unlike = ("cable-stiffness", "load-inertia"), ("cable-stiffness", "load-viscous-damping")
     others = [("a", f"x{i:02}") for i in range(40)]
     places = {key: Place(None, -float(i)) for i, key in enumerate(others)}
-    places[felt] = Place("where it is felt alike", -1000.0)
+    places |= {felt: Place("where it is felt alike", -1000.0), unlike: Place(None, -1081.0)}
     glanced, started, closer = [], [], []
     rough = SimpleNamespace(
         unit=None,
@@ -174,15 +174,16 @@ def test_pairs_that_add_up_exactly_are_looked_at_whatever_is_favoured(monkeypatc
         among=lambda keys: [felt, *others] if felt in keys else others,
         look_closer=lambda keys, groups: closer.append(keys),
     )
-    monkeypatch.setattr(pairs, "add_causes", lambda *_: SimpleNamespace(felt={felt: None}))
+    monkeypatch.setattr(pairs, "add_causes", lambda *_: SimpleNamespace(felt=[felt, unlike]))
     monkeypatch.setattr(pairs, "screen_pairs", lambda *_: places)
     monkeypatch.setattr(pairs, "_glance", lambda _, places, most: glanced.extend(places))
     monkeypatch.setattr(pairs, "_hold_against_neighbours", lambda *_: None)
     pairs.search_pairs(rough, {})
-    assert felt not in glanced
+    assert not {felt, unlike} & set(glanced)
     assert set(others[:20]) <= set(glanced)
     assert started == [{felt: "where it is felt alike"}]
-    assert felt in closer[0]
+    assert closer[:2] == [[felt], [felt]]
+    assert felt in closer[2]
 
 
 def test_nothing_to_glance_at_is_no_trouble(runs):

@@ -11,6 +11,7 @@ from analysis import search
 from analysis.causes import Hypothesis
 from analysis.executor import LocalExecutor
 from analysis.observation import USUAL_NOISE_V
+from analysis.screening import Place
 from sim.catalogue import CATALOGUE
 
 ADSS = synthetic.ADSS
@@ -74,7 +75,7 @@ def test_more_pairs_are_tried_behind_a_cause_that_predicts_badly(
     found[leader] = SimpleNamespace(best=standing(90.0), hypothesis=Hypothesis(ADSS, leader))
     rough = SimpleNamespace(
         unit=ADSS,
-        observation=None,
+        observation=SimpleNamespace(frequency_hz=None),
         found=found,
         among=list,
         start=lambda places, groups: looked.append(list(places)),
@@ -90,6 +91,55 @@ def test_more_pairs_are_tried_behind_a_cause_that_predicts_badly(
     search._look_beside(rough, fine, {leader: None}, None)
     asked = ranked[: tried - (11 in felt)] + [ranked[i] for i in felt if i == 11]
     assert looked == [asked, asked[:closer]]
+
+
+@pytest.mark.parametrize(
+    ("leader", "behind", "pair_is_at", "looked_at", "taken_over"),
+    [
+        ("payload-flexibility", 79.0, 120.0, True, True),
+        ("payload-flexibility", 79.0, 95.0, True, False),
+        ("payload-flexibility", -300.0, 120.0, True, True),
+        ("payload-flexibility", 81.0, 120.0, False, False),
+        ("motor-constant", 0.0, 120.0, False, False),
+    ],
+)
+def test_a_payload_is_held_against_two_causes_at_the_load_that_it_may_stand_for(
+    monkeypatch, leader, behind, pair_is_at, looked_at, taken_over
+):
+    """Where what is felt says that they may, and on all rows if they beat their own parts."""
+    pair, key, part = ("cable-stiffness", "load-inertia"), (leader,), ("load-inertia",)
+
+    def standing(effects, likelihood):
+        best = SimpleNamespace(place=None, log_likelihood=likelihood)
+        return SimpleNamespace(best=best, hypothesis=Hypothesis(ADSS, effects))
+
+    found = {key: standing(key, 110.0), part: standing(part, 90.0)}
+    looked, taken = [], []
+
+    def look(rough, places):
+        looked.extend(places)
+        rough.found |= {one: standing(one, pair_is_at) for one in places}
+
+    rough = SimpleNamespace(
+        unit=ADSS, observation=SimpleNamespace(frequency_hz=None), found=found, among=list
+    )
+    fine = SimpleNamespace(
+        best=found[key],
+        found={},
+        observation=None,
+        take_over=lambda candidates, groups: taken.extend(candidates),
+        leading=lambda most, behind: [],
+    )
+    felt = {pair: Place(None, 100.0 - behind)}
+    monkeypatch.setattr(search, "screen_singles", lambda *_: {key: Place(None, 100.0)})
+    monkeypatch.setattr(search, "add_causes", lambda *_: SimpleNamespace(felt=felt))
+    monkeypatch.setattr(search, "screen_pairs", lambda *_: {})
+    monkeypatch.setattr(search, "screen_felt", lambda additions: additions.felt)
+    monkeypatch.setattr(search, "look_at_felt", look)
+    monkeypatch.setattr(search, "hold_out", lambda *_: SimpleNamespace(rms_sigma=1.0))
+    search._look_beside(rough, fine, {key: None}, None)
+    assert looked == ([pair] if looked_at else [])
+    assert taken == ([found[pair]] if taken_over else [])
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
