@@ -4,7 +4,8 @@ Owns the step from draws to a place and its uncertainty. Points of a sweep err
 together, along branches of a chaotic motion, so that the curvature of a
 likelihood promises too much. Here a regression learns the free numbers from
 the channels of simulated runs, each run is predicted by a regression that has
-not seen it, and the spread of what that gets wrong is the error bar. It runs
+not seen it, and the spread of what that gets wrong is the error bar. What nobody
+knows of a bench differs from run to run, so that the bar holds it too. It runs
 no simulation.
 """
 
@@ -15,8 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.emulator import GAIN_TOLERANCE, Emulator
-from analysis.observation import Observation
+from analysis.emulator import GAIN_TOLERANCE
+from analysis.observation import Observation, channels_of_readings
+from analysis.population import Population
+from analysis.reading_noise import draw_noises
 
 __all__ = ["Calibrated", "calibrate"]
 
@@ -48,22 +51,28 @@ class Calibrated:
         return np.asarray(weight / weight.sum())
 
 
-def calibrate(observation: Observation, emulator: Emulator, rng: np.random.Generator) -> Calibrated:
-    """Estimate the place of an observation among the draws of an emulator.
+def calibrate(
+    observation: Observation,
+    runs: Population,
+    width: NDArray[np.float64],
+    rng: np.random.Generator,
+) -> Calibrated:
+    """Estimate the place of an observation among runs.
 
-    Kernel ridge regression from squashed channels to places, its ridge chosen
-    by what it gets wrong about machines left out, first among all draws, then among the nearest.
+    Kernel ridge regression from squashed channels to places, its ridge chosen by what it gets
+    wrong about machines left out, first among all runs, then among the nearest. `width` (d,):
+    distance over which the response changes smoothly.
     """
-    readings = _readings(observation, emulator, rng)
-    kin = _kin(emulator.deviations)
-    first = _regress(observation, readings, emulator.places, kin)
-    distance = np.abs((emulator.places - first.mean) / emulator.width).max(axis=1)
+    readings = _readings(observation, runs, rng)
+    kin = _kin(runs.deviations)
+    first = _regress(observation, readings, runs.places, kin)
+    distance = np.abs((runs.places - first.mean) / width).max(axis=1)
     near = np.sort(np.argsort(distance, kind="stable")[:_NEAREST])
-    return _regress(observation, readings[near], emulator.places[near], kin[near])
+    return _regress(observation, readings[near], runs.places[near], kin[near])
 
 
 def _kin(deviations: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Label (draws,): machines that share their deviations share it, the rest stand alone."""
+    """Label (runs,): machines that share their deviations share it, the rest stand alone."""
     _, label = np.unique(deviations, axis=0, return_inverse=True)
     label = np.asarray(label, dtype=np.int64).reshape(-1)
     alone = ~np.any(deviations != 0.0, axis=1)
@@ -72,12 +81,14 @@ def _kin(deviations: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def _readings(
-    observation: Observation, emulator: Emulator, rng: np.random.Generator
+    observation: Observation, runs: Population, rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """Channels of the draws with what a bench adds: reading noise and the tachometer's spread."""
-    values = emulator.channels.copy()
+    """Channels of the runs with what a bench adds: reading noise and the tachometer's spread."""
+    noises = draw_noises(observation, len(runs), rng)[:, None]
+    noise = observation.noise * (noises / observation.noise_v)
+    values = channels_of_readings(runs.mean, runs.variance, noise)
     values[:, 0] += rng.normal(0.0, GAIN_TOLERANCE, (len(values), 1))
-    values[:, :2] += rng.standard_normal(values[:, :2].shape) * observation.noise
+    values[:, :2] += rng.standard_normal(values[:, :2].shape) * noise[:, None]
     return values
 
 
@@ -119,7 +130,7 @@ def _regress(
 def _features(
     observation: Observation, readings: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Channels as numbers of order one: of the draws (draws, seen) and of the observation."""
+    """Channels as numbers of order one: of the runs (runs, seen) and of the observation."""
     values, asked = readings.copy(), observation.values.copy()
     turn = np.angle(np.mean(np.exp(1j * values[:, 1]), axis=0))
     values[:, 1] = np.angle(np.exp(1j * (values[:, 1] - turn)))

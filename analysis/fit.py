@@ -23,6 +23,7 @@ from analysis.executor import Executor
 from analysis.library import run_families
 from analysis.likelihood import Match, match_prediction
 from analysis.observation import Observation
+from analysis.population import DEVIATING, Population
 from analysis.progress import Progress
 from analysis.reading_noise import likeliest_noise, possible_noises
 from sim.response import START_SPREAD
@@ -30,9 +31,6 @@ from sim.unit import Unit
 
 __all__ = ["Axis", "Posterior", "RATIO", "fit_posterior"]
 
-
-_SIMULATED = ("R_m", "k_t", "J_L", "k_s1", "k_a")
-"""Datasheet values whose spread is simulated; that of k_ts scales the gain alone."""
 
 _WIDE_FAMILIES, _NEAR_FAMILIES = 5, 8
 """Families of machines that share their deviations, and so are stepped together, per axis."""
@@ -114,19 +112,22 @@ def fit_posterior(
         )
 
     rng = np.random.default_rng(seed)
-    axes, possible = tuple(axes), possible_noises(observation)
+    axes = tuple(axes)
     scales = np.array([axis.scale for axis in axes])
     wide = _wide_families(axes, _kin(observation), seed)
     draws = runs(wide, 0.0, 0.5, "simulating the range")
-    observation = _heard(possible, axes, draws, scales, seed)
-    found = calibrate(observation, _Look(observation, axes, draws, scales).emulator, rng)
+    found = calibrate(observation, _population(axes, draws), scales, rng)
     near = _near_families(axes, found, _kin(observation), seed)
     draws = draws.joined(runs(near, 0.5, 0.95, "simulating near the answer"))
-    observation = _heard(possible, axes, draws, 0.6 * scales, seed)
-    look = _Look(observation, axes, draws, 0.6 * scales)
-    calibrated = calibrate(observation, look.emulator, rng)
+    population, width = _population(axes, draws), 0.6 * scales
+    calibrated = calibrate(observation, population, width, rng)
     weight = calibrated.density(_grid(axes))
     best = np.clip(calibrated.mean, [axis.low for axis in axes], [axis.high for axis in axes])
+
+    def match(seen: Observation) -> Match:
+        return match_prediction(seen, _emulator(seen, population, width).predict(best))
+
+    heard = likeliest_noise(possible_noises(observation), lambda s: match(s).log_likelihood)
     if progress is not None:
         progress(1.0, "done")
     return Posterior(
@@ -134,57 +135,33 @@ def fit_posterior(
         tuple(np.linspace(axis.low, axis.high, _fine_count(axis)) for axis in axes),
         weight.reshape(tuple(_fine_count(axis) for axis in axes)),
         tuple(float(v) for v in best),
-        look.match(best),
+        match(heard),
         draws,
     )
 
 
-def _heard(
-    possible: Sequence[Observation],
-    axes: tuple[Axis, ...],
-    draws: Draws,
-    width: NDArray[np.float64],
-    seed: int,
-) -> Observation:
-    """The observation with the reading noise that its best fit makes likeliest."""
-
-    def likelihood(seen: Observation) -> float:
-        look = _Look(seen, axes, draws, width)
-        found = calibrate(seen, look.emulator, np.random.default_rng([seed, 3]))
-        low, high = [axis.low for axis in axes], [axis.high for axis in axes]
-        return look.match(np.clip(found.mean, low, high)).log_likelihood
-
-    return likeliest_noise(possible, likelihood)
+def _population(axes: Sequence[Axis], draws: Draws) -> Population:
+    """Runs with the places of their machines along the axes."""
+    places = np.array([[_value(axis, m) for axis in axes] for m in draws.machines])
+    deviations = np.array(
+        [[dict(m.deviations).get(s, 0.0) for s in DEVIATING] for m in draws.machines]
+    )
+    return Population(places, deviations, draws.mean, draws.variance)
 
 
-class _Look:
-    """An emulator over draws, asked for likelihoods at places."""
-
-    def __init__(
-        self,
-        observation: Observation,
-        axes: Sequence[Axis],
-        draws: Draws,
-        width: NDArray[np.float64],
-    ) -> None:
-        self._observation = observation
-        places = np.array([[_value(axis, m) for axis in axes] for m in draws.machines])
-        deviations = np.array(
-            [[dict(m.deviations).get(s, 0.0) for s in _SIMULATED] for m in draws.machines]
-        )
-        used = np.any(deviations != 0.0, axis=0)
-        symbols = [s for s, u in zip(_SIMULATED, used, strict=True) if u]
-        self.emulator = Emulator(
-            places,
-            deviations[:, used],
-            draws.channels(observation),
-            observation.blocks,
-            width,
-            np.array([TOLERANCES[s] for s in symbols]),
-        )
-
-    def match(self, place: NDArray[np.float64]) -> Match:
-        return match_prediction(self._observation, self.emulator.predict(place))
+def _emulator(
+    observation: Observation, population: Population, width: NDArray[np.float64]
+) -> Emulator:
+    """What machines between these would show on the bench of an observation."""
+    used = np.any(population.deviations != 0.0, axis=0)
+    return Emulator(
+        population.places,
+        population.deviations[:, used],
+        population.channels(observation),
+        observation.blocks,
+        width,
+        np.array([TOLERANCES[s] for s, u in zip(DEVIATING, used, strict=True) if u]),
+    )
 
 
 def _value(axis: Axis, machine: Machine) -> float:
@@ -256,7 +233,7 @@ def _families(
     families = []
     for family in range(count):
         deviations = tuple(
-            (symbol, float(rng.normal(0.0, TOLERANCES[symbol]))) for symbol in _SIMULATED
+            (symbol, float(rng.normal(0.0, TOLERANCES[symbol]))) for symbol in DEVIATING
         )
         # Evenly along every axis, in an order of its own along each.
         strata = np.stack([rng.permutation(kin) for _ in axes], axis=1)

@@ -45,9 +45,10 @@ class Observation:
     `values` (3, rows): the channels; NaN where the response does not hold one.
     `source_vpk`, `frequency_hz` (rows,). `noise_v`: the reading's own noise
     per component at the input of the analyser, V. `noise` (rows,): the same
-    relative to the response. `plans`: the sweep that a simulation must take,
-    one for each set of levels that share their frequencies, with their rows.
-    `blocks`: the rows of each level.
+    relative to the response. `loudest_v`: what the quietest points show, V; it
+    can be no more. `plans`: the sweep that a simulation must take, one for each
+    set of levels that share their frequencies, with their rows. `blocks`: the
+    rows of each level.
     """
 
     values: NDArray[np.float64]
@@ -55,6 +56,7 @@ class Observation:
     frequency_hz: NDArray[np.float64]
     noise_v: float
     noise: NDArray[np.float64]
+    loudest_v: float
     plans: tuple[tuple[SweepPlan, NDArray[np.int64]], ...]
 
     @property
@@ -128,6 +130,7 @@ def observe(response: FrequencyResponse) -> Observation:
         frequency_hz=frequency,
         noise_v=noise_v,
         noise=noise_v / (level * np.abs(gain)),
+        loudest_v=noise_v,
         plans=_plans(response, level, frequency),
     )
 
@@ -146,6 +149,7 @@ def unread(plan: SweepPlan, noise_v: float) -> Observation:
         frequency_hz=np.tile(np.sort(plan.frequencies_hz), len(plan.levels_vpk)),
         noise_v=noise_v,
         noise=noise_v / level,
+        loudest_v=noise_v,
         plans=((replace(plan, levels_vpk=tuple(sorted(plan.levels_vpk))), rows),),
     )
 
@@ -211,7 +215,7 @@ def readings_of_cycles(
 def channels_of_readings(
     mean: NDArray[np.complex128], variance: NDArray[np.float64], noise: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Channels (..., 3, rows) of readings (..., rows) with reading noise (rows,)."""
+    """Channels (..., 3, rows) of readings (..., rows) with reading noise (..., rows)."""
     scatter = 0.5 * np.log(variance + 2.0 * noise**2)
     log_gain = np.log(mean)
     return np.stack([log_gain.real, log_gain.imag, scatter], axis=-2)

@@ -4,7 +4,8 @@ Owns which noises are worth trying and how believable each is. Where the motion
 chatters at every point, the quietest of them show more than the reading's own
 noise, and a noise that is taken for too loud hides chatter: a machine with
 less of it then looks right. Simulations decide between the noises that are
-possible; nothing is simulated here.
+possible, as far as they can; what is learned from runs has to allow for all of
+them. Nothing is simulated here.
 """
 
 from __future__ import annotations
@@ -12,11 +13,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.likelihood import HEAT
 from analysis.observation import USUAL_NOISE_V, Observation
 
-__all__ = ["likeliest_noise", "possible_noises"]
+__all__ = ["draw_noises", "likeliest_noise", "possible_noises"]
 
 _NEAR = 1.3
 """Quietest points this close to the usual noise show it, and leave nothing to be tried."""
@@ -28,11 +30,29 @@ _SPREAD = 0.5
 
 def possible_noises(observation: Observation) -> Sequence[Observation]:
     """The observation with every noise worth trying: from the usual one to what it shows itself."""
-    loudest = observation.noise_v
-    if loudest <= _NEAR * USUAL_NOISE_V:
+    if not _is_doubtful(observation):
         return [observation]
-    noises = np.geomspace(USUAL_NOISE_V, loudest, _NOISES)
+    noises = np.geomspace(USUAL_NOISE_V, observation.loudest_v, _NOISES)
     return [observation.with_noise(float(noise)) for noise in noises]
+
+
+def draw_noises(
+    observation: Observation, count: int, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """Noises (count,) in V that runs may be read with, for what they tell of the observation.
+
+    Where it is in doubt evenly, by logarithm, over all that are worth trying: the likeliest alone
+    hides how far the answer depends on it, and a bench louder than most is not thought of by a
+    belief about benches.
+    """
+    if not _is_doubtful(observation):
+        return np.full(count, observation.noise_v)
+    share = rng.permutation((np.arange(count) + rng.uniform(size=count)) / count)
+    return np.asarray(USUAL_NOISE_V * (observation.loudest_v / USUAL_NOISE_V) ** share)
+
+
+def _is_doubtful(observation: Observation) -> bool:
+    return observation.loudest_v > _NEAR * USUAL_NOISE_V
 
 
 def likeliest_noise(

@@ -12,7 +12,6 @@ import numpy as np
 
 from analysis.calibration import Calibrated, calibrate
 from analysis.candidate import Candidate
-from analysis.emulator import Emulator
 from analysis.observation import Observation
 
 __all__ = ["size_candidate"]
@@ -24,14 +23,7 @@ def size_candidate(
     """Mean (d,) and covariance (d, d) of the coordinates, from runs left out in turn."""
     runs, surface = candidate.population, candidate.surface
     bent = surface.chart is not None and surface.chart.bent.any()
-    emulator = Emulator(
-        runs.places,
-        runs.deviations,
-        runs.channels(observation),
-        observation.blocks,
-        # The widths of a chart are not those of the places.
-        runs.places.std(axis=0) + 1e-6 if bent else surface.width,
-        surface.sigmas,
-    )
-    found = calibrate(observation, emulator, rng)
+    # The widths of a chart are not those of the places.
+    width = runs.places.std(axis=0) + 1e-6 if bent else surface.width
+    found = calibrate(observation, runs, width, rng)
     return replace(found, mean=np.clip(found.mean, 0.0, 1.0))

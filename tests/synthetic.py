@@ -82,6 +82,7 @@ def observation(values) -> Observation:
         frequency_hz=np.tile(FREQUENCIES, len(LEVELS)),
         noise_v=1e-5,
         noise=np.full(ROWS, 1e-5),
+        loudest_v=1e-5,
         plans=((plan, np.arange(ROWS)),),
     )
 

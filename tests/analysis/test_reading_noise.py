@@ -56,12 +56,12 @@ def test_noise_and_chatter_are_told_apart_by_what_simulations_show(chatter_v, no
     # Both benches read about 2 mV everywhere: one is noisy, the other's motion chatters.
     rng = np.random.default_rng(seed)
     read = np.log(np.sqrt(2.0) * np.hypot(chatter_v, noise_v)) + 0.1 * rng.standard_normal(ROWS)
-    shown = replace(seen(1.0), noise_v=2e-3, noise=np.full(ROWS, 2e-3))
+    shown = replace(seen(1.0), noise_v=2e-3, noise=np.full(ROWS, 2e-3), loudest_v=2e-3)
     heard = likeliest_noise(possible_noises(shown), scatter_likelihood(chatter_v, read))
     assert heard.noise_v == pytest.approx(noise_v, rel=0.35)
 
 
 def test_where_chatter_drowns_it_the_noise_is_taken_for_the_usual_one():
-    shown = replace(seen(1.0), noise_v=5e-3, noise=np.full(ROWS, 5e-3))
+    shown = replace(seen(1.0), noise_v=5e-3, noise=np.full(ROWS, 5e-3), loudest_v=5e-3)
     heard = likeliest_noise(possible_noises(shown), lambda _: 0.0)
     assert heard.noise_v == pytest.approx(USUAL_NOISE_V)

@@ -1,5 +1,6 @@
 """The search, where everything but the simulations is real."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -350,7 +351,7 @@ def test_what_is_left_out_of_the_catalogue_is_not_looked_at(runs, monkeypatch):
 
 def test_every_candidate_is_held_against_the_same_noise(runs):
     observed = synthetic_search.observed(("load-inertia",), [0.8], np.random.default_rng(6))
-    loud = observed.with_noise(4.0 * USUAL_NOISE_V)
+    loud = replace(observed.with_noise(4.0 * USUAL_NOISE_V), loudest_v=4.0 * USUAL_NOISE_V)
     found = search.search_causes(ADSS, loud, seed=6)
     heard = {one.surface.observation.noise_v for one in found}
     assert len(heard) == 1
