@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.observation import USUAL_NOISE_V, channels_of_readings, unread
-from analysis.reading_noise import likeliest_noise, possible_noises
+from analysis.reading_noise import draw_noises, likeliest_noise, possible_noises
 from daq.plan import SweepPlan
 
 ROWS = 40
@@ -65,3 +65,20 @@ def test_where_chatter_drowns_it_the_noise_is_taken_for_the_usual_one():
     shown = replace(seen(1.0), noise_v=5e-3, noise=np.full(ROWS, 5e-3), loudest_v=5e-3)
     heard = likeliest_noise(possible_noises(shown), lambda _: 0.0)
     assert heard.noise_v == pytest.approx(USUAL_NOISE_V)
+
+
+def test_runs_are_read_with_the_noise_that_quiet_points_show():
+    rng = np.random.default_rng(1)
+    np.testing.assert_array_equal(draw_noises(seen(4e-4), 7, rng), np.full(7, 4e-4))
+    # Answers for quiet benches do not depend on what is done about others.
+    assert rng.random() == np.random.default_rng(1).random()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_where_the_noise_is_in_doubt_runs_are_read_with_all_that_are_possible(seed):
+    heard = seen(8.0 * USUAL_NOISE_V).with_noise(1.1 * USUAL_NOISE_V).thinned(2)
+    noises = draw_noises(heard, 48, np.random.default_rng(seed))
+    shares = np.sort(np.log(noises / USUAL_NOISE_V) / np.log(8.0))
+    # One in each of as many equal parts.
+    np.testing.assert_array_equal(np.floor(48 * shares), np.arange(48))
+    assert not np.array_equal(noises, np.sort(noises))
