@@ -48,6 +48,7 @@ blind: $(READY)
 	@$(BIN)/python tests/campaigns/blind_study.py
 	@$(BIN)/python tests/campaigns/ties.py
 	@$(BIN)/python tests/campaigns/smallest.py
+	@$(BIN)/python tests/campaigns/other_causes.py
 
 faults: $(READY)
 	@$(BIN)/python tests/campaigns/faults.py

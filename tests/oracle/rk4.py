@@ -22,15 +22,24 @@ from sim.compiling import njit
 
 STATES = (
     "i_a", "th_m", "w_m", "th_g1", "w_g1", "th_s1", "w_s1", "th_p2", "w_p2",
-    "th_L", "w_L", "V_o", "dV_o", "u_a", "th_p", "w_p",
+    "th_L", "w_L", "V_o", "dV_o", "u_a", "th_p", "w_p", "z_L",
 )  # fmt: skip
-"""Order of the state vector; u_a is the lagged amplifier voltage, th_p, w_p the payload."""
+"""Order of the state vector; u_a is the lagged amplifier voltage, th_p, w_p the payload, z_L how
+far the load's friction is bent before it slips."""
 
 HARMONICS = 4
 
 
 class Machine(NamedTuple):
-    """Every number in the equations; the paper's symbols, SI, half plays in rad."""
+    """Every number in the equations; the paper's symbols, SI, half plays in rad.
+
+    The last six are causes that the project itself knows nothing of, for studies of what it says
+    then: `V_d`, a dead zone of the amplifier about 0 (V at the motor); `u_p`, the share by which it
+    gives more where its output is positive; `i_max`, a limit of the current that makes torque;
+    `T_cog`, amplitude of a cogging torque on the motor, 24 times a turn; `D_L`, drag of air on the
+    load, N.m.s2/rad2; `s_L`, stiffness of the load's friction before it slips, N.m/rad
+    (P. R. Dahl, 1968).
+    """
 
     L_a: float
     R_m: float
@@ -70,6 +79,12 @@ class Machine(NamedTuple):
     zeta_p: float = 0.0
     V_sat: float = math.inf
     tau_a: float = 0.0
+    V_d: float = 0.0
+    u_p: float = 0.0
+    i_max: float = math.inf
+    T_cog: float = 0.0
+    D_L: float = 0.0
+    s_L: float = 0.0
 
 
 PAPER_FILTER = {"filter_numerator": 723439.0, "filter_a1": 1710.0, "filter_a0": 723439.0}
@@ -120,17 +135,22 @@ def _shaft_torque(m, angle, rate):
 def _derivative(m, V_i, y, dy):
     i_a, th_m, w_m, th_g1, w_g1 = y[0], y[1], y[2], y[3], y[4]
     th_s1, w_s1, th_p2, w_p2, th_L, w_L = y[5], y[6], y[7], y[8], y[9], y[10]
-    V_o, dV_o, u_a, th_p, w_p = y[11], y[12], y[13], y[14], y[15]
+    V_o, dV_o, u_a, th_p, w_p, z_L = y[11], y[12], y[13], y[14], y[15], y[16]
 
     # (1), with a lag and a clip of the motor voltage; (2a), (2b)
     V_m = m.k_a * V_i
+    V_m = max(V_m - m.V_d, 0.0) + min(V_m + m.V_d, 0.0)
+    if V_m > 0.0:
+        V_m *= 1.0 + m.u_p
     dy[13] = 0.0
     if m.tau_a > 0.0:
         dy[13] = (V_m - u_a) / m.tau_a
         V_m = u_a
     V_m = min(max(V_m, -m.V_sat), m.V_sat)
     dy[0] = (V_m - m.R_m * i_a - m.k_b * w_m) / m.L_a
-    T_m = m.k_t * i_a
+    T_m = m.k_t * min(max(i_a, -m.i_max), m.i_max)
+    if m.T_cog != 0.0:
+        T_m += m.T_cog * math.sin(24.0 * th_m)
 
     # (6), (7) and (11), (12)
     T_g1 = _mesh_torque(m.k_g1, m.c_g1, th_m / m.N_1 - th_g1, w_m / m.N_1 - w_g1, m.delta_1)
@@ -153,7 +173,12 @@ def _derivative(m, V_i, y, dy):
     T_f = m.T_f_L
     if m.T_s_L != 0.0:
         T_f += m.T_s_L * math.exp(-((w_L / m.omega_s) ** 2))
-    torque = T_L - T_f * _sign(w_L) - m.B_L * w_L - m.K_c * th_L + m.T_b
+    held = T_f * _sign(w_L)
+    dy[16] = 0.0
+    if m.s_L > 0.0:
+        held = m.s_L * z_L
+        dy[16] = w_L - abs(w_L) * held / T_f
+    torque = T_L - held - m.B_L * w_L - m.D_L * w_L * abs(w_L) - m.K_c * th_L + m.T_b
     dy[14] = 0.0
     dy[15] = 0.0
     if m.J_p > 0.0:
@@ -255,7 +280,7 @@ def simulate_cycles(
     """Drive with V_i = offset + A sin(2 pi f t) for whole cycles, phase 0 first.
 
     Returns coefficients, shape (cycles, 4), and the state at the end, shape
-    (16,) in the order of `STATES`. Column 0 is the mean of V_o over A, column
+    (17,) in the order of `STATES`. Column 0 is the mean of V_o over A, column
     1 the gain V_o/V_i, columns 2 and 3 the phasor of that harmonic of V_o, on
     the source's phasor like the gain: column h is the c in
     V_o = A |c| sin(h w t + arg c).
@@ -281,7 +306,7 @@ def record(
     dc_offset_v: float = 0.0,
     every: int = 1,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Times (s), shape (rows,), and states, shape (rows, 16), at each `every`-th step."""
+    """Times (s), shape (rows,), and states, shape (rows, 17), at each `every`-th step."""
     m = machine(parameters, delta1, delta2, extras)
     steps = steps_per_cycle(frequency_hz, step_s)
     kept = _record(m, source_vpk, dc_offset_v, frequency_hz, steps, cycles, _start(state), every)

@@ -197,6 +197,84 @@ def test_resonance_of_adss_with_all_play_in_stage_1_at_two_microseconds():
     assert band[np.abs(gains.mean(axis=1)).argmax()] in (152.0, 153.0)
 
 
+def answer_at(frequency, extras, source_vpk=2.5):
+    """Coefficients of the smooth chain, settled."""
+    cycles = round(0.8 * frequency)
+    parameters = ADSS | SMOOTH
+    return rk4.simulate_cycles(
+        parameters, 0.0, 0.0, source_vpk, frequency, cycles, extras=DAMPED | extras
+    )[0][-1]
+
+
+def test_a_dead_zone_takes_from_the_fundamental_what_its_describing_function_says():
+    delta = 0.2
+    V_d = delta * ADSS["k_a"] * 2.5
+    left = 1.0 - 2.0 / math.pi * (math.asin(delta) + delta * math.sqrt(1.0 - delta**2))
+    plain = linear_response(ADSS | SMOOTH, DAMPED, [95.0])[0]
+    assert answer_at(95.0, {"V_d": V_d})[1] == pytest.approx(left * plain, rel=1e-4)
+    assert np.all(answer_at(95.0, {"V_d": 5.1 * V_d}) == 0.0)
+
+
+def test_an_amplifier_that_gives_more_one_way_drives_the_load_round():
+    u_p = 0.3
+    plain = linear_response(ADSS | SMOOTH, DAMPED, [95.0, 1e-6])
+    answer = answer_at(95.0, {"u_p": u_p})
+    assert answer[1] == pytest.approx((1.0 + 0.5 * u_p) * plain[0], rel=1e-4)
+    assert answer[0].real == pytest.approx(u_p / math.pi * plain[1].real, rel=1e-4)
+
+
+def free_run(start, cycles, parameters=None, extras=None):
+    """Time and states by name, with nothing at the source and so much play that none meets none."""
+    state = np.zeros(len(rk4.STATES))
+    for name, value in start.items():
+        state[rk4.STATES.index(name)] = value
+    free = ADSS | SMOOTH | {"k_b": 0.0, "k_t": 0.0, "B_m": 0.0} | (parameters or {})
+    t, y = rk4.record(free, 1e3, 1e3, 0.0, 100.0, cycles, state=state, extras=extras, every=10)
+    return t, dict(zip(rk4.STATES, y.T, strict=True))
+
+
+def period(t, x):
+    """Mean time between rising passages of a swing through 0."""
+    rising = np.flatnonzero((x[:-1] < 0.0) & (x[1:] >= 0.0))
+    at = t[rising] - x[rising] * (t[rising + 1] - t[rising]) / (x[rising + 1] - x[rising])
+    assert len(at) > 3
+    return float(np.diff(at).mean())
+
+
+def test_cogging_holds_the_motor_like_a_spring_between_two_teeth():
+    T_cog, middle = 0.02, math.pi / 24.0
+    t, found = free_run({"th_m": middle + 1e-3}, 20, extras={"T_cog": T_cog})
+    expected = 2.0 * math.pi * math.sqrt(ADSS["J_m"] / (24.0 * T_cog))
+    assert period(t, found["th_m"] - middle) == pytest.approx(expected, rel=1e-3)
+
+
+def test_no_more_current_than_its_limit_makes_torque():
+    start, i_max = {"i_a": 2.0}, 0.5
+    parameters = {"k_t": ADSS["k_t"], "L_a": 1e3}
+    t, found = free_run(start, 1, parameters, {"i_max": i_max})
+    expected = ADSS["k_t"] * i_max / ADSS["J_m"] * t
+    assert found["w_m"] == pytest.approx(expected, rel=1e-6, abs=1e-12)
+
+
+def test_drag_of_air_brakes_with_the_square_of_the_speed():
+    D_L, w_0 = 0.05, 3.0
+    t, found = free_run({"w_L": w_0}, 20, extras={"D_L": D_L})
+    assert found["w_L"] == pytest.approx(w_0 / (1.0 + D_L * w_0 / ADSS["J_L"] * t), rel=1e-6)
+
+
+def test_friction_that_bends_first_is_a_spring_and_then_the_friction_that_it_was():
+    s_L, T_f_L = 50.0, 0.01
+    parameters, extras = {"T_f_L": T_f_L}, {"s_L": s_L}
+    small = 1e-3 * T_f_L / s_L * math.sqrt(s_L / ADSS["J_L"])
+    t, found = free_run({"w_L": small}, 40, parameters, extras)
+    expected = 2.0 * math.pi * math.sqrt(ADSS["J_L"] / s_L)
+    assert period(t, found["th_L"]) == pytest.approx(expected, rel=1e-3)
+    t, found = free_run({"w_L": 1.0}, 10, parameters, extras)
+    late = t > 0.05
+    braked = np.polyfit(t[late], found["w_L"][late], 1)[0]
+    assert braked == pytest.approx(-T_f_L / ADSS["J_L"], rel=1e-6)
+
+
 def test_an_unknown_extra_is_refused():
     with pytest.raises(KeyError, match="c_s2"):
         rk4.machine(ADSS, 0.0, 0.0, {"c_s2": 1.0})
