@@ -37,12 +37,16 @@ __all__ = ["Cause", "Diagnosis", "Size", "diagnose_response"]
 
 @dataclass(frozen=True, slots=True)
 class Size:
-    """The fitted value of one parameter of an effect, with one standard deviation."""
+    """The fitted value of one parameter of an effect, with one standard deviation.
+
+    `datasheet`: what the unit has without the effect, None where its datasheet does not know.
+    """
 
     name: str
     value: float
     std: float
     unit_symbol: str
+    datasheet: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +115,7 @@ class Diagnosis:
                     "probability": cause.probability,
                     "site": CATALOGUE[cause.effect].site,
                     "meaning": CATALOGUE[cause.effect].meaning,
+                    "check": CATALOGUE[cause.effect].check,
                 }
                 for cause in self.causes
             ],
@@ -152,6 +157,7 @@ class Diagnosis:
             sizes = ", ".join(_worded(size) for size in cause.sizes)
             lines.append(f"  {cause.effect} ({_WHERE[effect.site]}): {sizes}")
             lines.append(f"    {effect.meaning} On the bench: {effect.bench_cause}.")
+            lines.append(f"    To make sure: {effect.check}.")
         base, extended = self.ratio_baseline, self.ratio_extended
         lines.append(f"  contribution ratio, plain model      {base[0]:.3f} +- {base[1]:.3f}")
         if self.causes:
@@ -295,7 +301,8 @@ def _causes(named: Judged, found: Calibrated) -> tuple[Cause, ...]:
     stds = values * stretch * np.sqrt(np.diag(found.covariance)[1:])
     sizes: dict[str, list[Size]] = {}
     for (effect, parameter), value, std in zip(hypothesis.parameters, values, stds, strict=True):
-        size = Size(parameter.name, float(value), float(std), parameter.unit_symbol)
+        known = parameter.nominal(hypothesis.unit)
+        size = Size(parameter.name, float(value), float(std), parameter.unit_symbol, known)
         sizes.setdefault(effect, []).append(size)
     return tuple(Cause(e, tuple(of), named.probability) for e, of in sizes.items())
 
@@ -357,4 +364,5 @@ def _uncertain(pair: tuple[float, float]) -> dict[str, float]:
 
 def _worded(size: Size) -> str:
     symbol = "" if size.unit_symbol == "1" else f" {size.unit_symbol}"
-    return f"{size.name} = {size.value:.4g} +- {size.std:.2g}{symbol}"
+    known = "" if size.datasheet is None else f" (datasheet {size.datasheet:.4g}{symbol})"
+    return f"{size.name} = {size.value:.4g} +- {size.std:.2g}{symbol}{known}"

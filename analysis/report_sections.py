@@ -269,6 +269,11 @@ def _causes(diagnosis: Data) -> Markup:
         f"{' + '.join(rival['causes']) or 'nothing hidden'} ({rival['probability']:.2f})"
         for rival in diagnosis["rivals"]
     ]
+    parts += [
+        element("p", f"To make sure of {cause['effect']}: {cause['check']}.")
+        for cause in diagnosis["causes"]
+        if cause.get("check")
+    ]
     if rivals:
         parts.append(element("p", f"Other sets judged: {'; '.join(rivals)}."))
     return joined(parts)

@@ -55,10 +55,11 @@ class Effect:
     """One entry of the catalogue.
 
     `site` says whether the fault sits in the mechanics ("plant") or in the
-    measuring chain ("chain"). Exactly one of `on_unit` and `on_drivetrain`
-    is given. `added_inertia`, of what is linear and acts on the load alone: by
-    how much the load is felt to have more inertia at an angular frequency
-    (rad/s), kg.m^2, complex where it brakes or swings.
+    measuring chain ("chain"), `check` how to make sure of it by other means.
+    Exactly one of `on_unit` and `on_drivetrain` is given. `added_inertia`, of
+    what is linear and acts on the load alone: by how much the load is felt to
+    have more inertia at an angular frequency (rad/s), kg.m^2, complex where it
+    brakes or swings.
     """
 
     id: str
@@ -66,6 +67,7 @@ class Effect:
     site: Literal["plant", "chain"]
     meaning: str
     bench_cause: str
+    check: str
     on_unit: Callable[[Unit, Mapping[str, float]], Unit] | None = None
     on_drivetrain: Callable[[Drivetrain, Unit, Mapping[str, float]], Drivetrain] | None = None
     added_inertia: Callable[[Unit, Mapping[str, Any], Any], Any] | None = None
@@ -194,6 +196,7 @@ _ALL = (
         "plant",
         "The load is braked in proportion to its speed.",
         "grease or a seal dragging on the load, or eddy currents",
+        "motor off, pull the load at two speeds with a spring scale; the pull grows with speed",
         on_drivetrain=_add_load_damper,
         added_inertia=lambda unit, v, omega: v["B_L"] / (1j * omega),
     ),
@@ -203,6 +206,7 @@ _ALL = (
         "plant",
         "Shaft 1 loses energy as it twists.",
         "a press fit or coupling that works on shaft 1",
+        "hold the motor, strike the load and time how it rings out; compare another shaft 1",
         on_drivetrain=_add_shaft_dampers,
     ),
     Effect(
@@ -211,6 +215,7 @@ _ALL = (
         "plant",
         "Gear 1 loses energy while its teeth touch.",
         "thick or fresh grease in gear stage 1",
+        "warm gear stage 1 by ten kelvin and measure again; the answer goes with the grease",
         on_drivetrain=lambda d, unit, v: d.replacing("mesh1", c=v["c_g1"]),
     ),
     Effect(
@@ -219,6 +224,7 @@ _ALL = (
         "plant",
         "Gear 2 loses energy while its teeth touch.",
         "thick or fresh grease in gear stage 2",
+        "warm gear stage 2 by ten kelvin and measure again; the answer goes with the grease",
         on_drivetrain=_damp_mesh2,
     ),
     Effect(
@@ -227,6 +233,7 @@ _ALL = (
         "plant",
         "The dry friction of the load differs from its datasheet.",
         "a preloaded or dirty bearing of the load",
+        "take the load off its gear and pull it with a spring scale; as much at any speed",
         on_unit=_table_1("T_f_L"),
     ),
     Effect(
@@ -238,6 +245,7 @@ _ALL = (
         "plant",
         "The friction of the load peaks near standstill and falls as it moves.",
         "a lubricated bearing that runs dry at low speed",
+        "take the load off its gear and pull it with a spring scale; more to start than to go on",
         on_drivetrain=lambda d, unit, v: d.replacing(
             "load_friction", T_s=v["T_s_L"], omega_s=v["omega_s"]
         ),
@@ -248,6 +256,7 @@ _ALL = (
         "plant",
         "The dry friction of the motor differs from its datasheet.",
         "worn brushes, or a preloaded motor bearing",
+        "take the motor off its gear and read the current at which it just turns; times k_t",
         on_unit=_table_1("T_f_m"),
     ),
     Effect(
@@ -256,6 +265,7 @@ _ALL = (
         "plant",
         "The viscous friction of the motor differs from its datasheet.",
         "stiff grease in the motor bearings, cold running",
+        "take the motor off its gear and read its current at two speeds; the difference grows",
         on_unit=_table_1("B_m"),
     ),
     Effect(
@@ -264,6 +274,7 @@ _ALL = (
         "plant",
         "The inertia of the load differs from its datasheet.",
         "another payload, or a counterweight moved or missing",
+        "compare what is mounted with the drawing; add a known inertia and measure again",
         on_unit=_table_1("J_L"),
         added_inertia=lambda unit, v, omega: v["J_L"] - unit.load.J_L + 0j * omega,
     ),
@@ -273,6 +284,7 @@ _ALL = (
         "plant",
         "Shaft 1 is softer or stiffer than its datasheet.",
         "a loose clamp, a crack, or another shaft",
+        "hold the motor, load the output with a known torque, read the twist with a dial gauge",
         on_unit=_table_1("k_s1"),
     ),
     Effect(
@@ -281,6 +293,7 @@ _ALL = (
         "plant",
         "Shaft 1 gets stiffer the more it twists.",
         "a spline or coupling that closes up under torque",
+        "hold the motor and read the load's twist at two known torques; not in proportion",
         on_drivetrain=_harden_shaft,
     ),
     Effect(
@@ -289,6 +302,7 @@ _ALL = (
         "plant",
         "The total backlash differs from the value it was given.",
         "wear, or a centre distance that was changed since it was measured",
+        "hold the motor, rock the load and read its play with a dial gauge",
         on_unit=_table_1("b_t_deg"),
     ),
     Effect(
@@ -297,6 +311,7 @@ _ALL = (
         "plant",
         "A spring ties the load to ground.",
         "a stiff cable bundle or hose across the joint",
+        "undo cables and hoses across the joint and measure again",
         on_drivetrain=lambda d, unit, v: d.adding(cable=Spring({"th_L": 1.0}, v["K_c"])),
         added_inertia=lambda unit, v, omega: -v["K_c"] / omega**2,
     ),
@@ -306,6 +321,7 @@ _ALL = (
         "plant",
         "A constant torque pulls on the load.",
         "an imbalance, a hanging cable or a tilted base",
+        "see whether the load, off its gear, stays where it is put; tilt the base, measure again",
         on_drivetrain=lambda d, unit, v: d.adding(bias=ConstantTorque("th_L", v["T_b"])),
     ),
     Effect(
@@ -318,6 +334,7 @@ _ALL = (
         "plant",
         "Something on the load swings on a spring of its own.",
         "a loose bracket, lens or cable clamp on the load",
+        "tap what is mounted, with an accelerometer on it; take it off and measure again",
         on_drivetrain=_add_payload,
         added_inertia=_payload_felt,
     ),
@@ -327,6 +344,7 @@ _ALL = (
         "chain",
         "The gain of the amplifier differs from its datasheet.",
         "a trimmer that was turned, or a changed supply",
+        "compare the voltages at the motor and at the source with a meter",
         on_unit=_table_1("k_a"),
     ),
     Effect(
@@ -335,6 +353,7 @@ _ALL = (
         "chain",
         "The amplifier clips.",
         "a low supply voltage or a current limit that is set too low",
+        "look at the motor's voltage at the highest level with an oscilloscope; it is cut off flat",
         on_drivetrain=_amplifier(V_sat="V_sat"),
     ),
     Effect(
@@ -343,6 +362,7 @@ _ALL = (
         "chain",
         "The amplifier answers late.",
         "a noise filter or an ageing output stage in the amplifier",
+        "measure from the source to the motor's voltage alone; its phase falls with frequency",
         on_drivetrain=_amplifier(tau_a="tau_a"),
     ),
     Effect(
@@ -351,6 +371,7 @@ _ALL = (
         "plant",
         "The resistance of the motor differs from its datasheet.",
         "a hot winding, worn brushes or a bad contact in the motor lead",
+        "measure the winding with a meter, cold, and again at once after a sweep",
         on_unit=_table_1("R_m"),
     ),
     Effect(
@@ -359,6 +380,7 @@ _ALL = (
         "plant",
         "Torque constant and back-EMF constant are both off by one factor.",
         "magnets that lost or differ in strength",
+        "turn the motor at a known speed and read its open-circuit voltage",
         on_unit=_scaled("k_t", "k_b"),
     ),
     Effect(
@@ -367,6 +389,7 @@ _ALL = (
         "chain",
         "The gain of the tachometer differs from its datasheet.",
         "a loaded tachometer output or a changed tachometer",
+        "turn the tachometer at a known speed and read its voltage, connected as in the sweep",
         on_unit=_table_1("k_ts"),
     ),
     Effect(
@@ -375,6 +398,7 @@ _ALL = (
         "chain",
         "The corner frequency of the tachometer's filter is off.",
         "a filter part of another value, or drift of it",
+        "measure the response of the filter alone, fed from the source",
         on_drivetrain=_move_corner,
     ),
 )

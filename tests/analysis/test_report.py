@@ -18,6 +18,7 @@ from analysis.markup import Markup, data_block, element
 from analysis.report import file_origin, write_report
 from analysis.report_data import Origin
 from daq.errors import AnalysisError, InputError
+from sim.catalogue import CATALOGUE
 from sim.unit import load_unit, unit_from_mapping
 
 ADSS = load_unit("adss")
@@ -132,6 +133,12 @@ def test_the_diagnosis_has_its_causes_gain_and_pictures(report, explained):
     assert "Departures left with the causes: none beyond chance" in page.text
     assert path.read_text().count("<svg") == 4
     assert page.data["diagnosis"]["causes"] == document["causes"]
+    (cause,) = document["causes"]
+    assert cause["check"] == CATALOGUE["load-inertia"].check
+    assert f"To make sure of load-inertia: {cause['check']}." in page.text
+    told = "\n".join(explained.summary())
+    assert f"kg.m^2 (datasheet {ADSS.load.J_L:.4g} kg.m^2)\n" in told
+    assert f"    To make sure: {cause['check']}.\n" in told
 
 
 @pytest.mark.parametrize(

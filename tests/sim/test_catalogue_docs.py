@@ -19,3 +19,4 @@ def test_every_effect_stands_on_the_page_with_its_parameters():
         assert row[3].strip() == effect.site
         assert row[4].strip() == effect.meaning
         assert row[5].strip() == effect.bench_cause
+        assert row[6].strip() == effect.check

@@ -155,6 +155,7 @@ def diagnosis_lines(document: Mapping[str, Any]) -> list[str]:
     for rank, cause in enumerate(document["causes"], start=1):
         lines.append(f" {rank}. {cause['effect']}  probability {cause['probability']:.2f}")
         lines.append(f"    {_explained(cause['effect'])}{_parameters(cause['parameters'])}")
+        lines += [f"    {text}" for text in _checked(cause["effect"])]
     if document.get("rivals"):
         lines += ["", "Rivals"]
         for rival in document["rivals"]:
@@ -180,6 +181,13 @@ def _explained(effect: str) -> str:
     if known is None:
         return ""
     return f"{known.meaning.rstrip('.')}; on the bench: {known.bench_cause.rstrip('.')}."
+
+
+def _checked(effect: str) -> list[str]:
+    from sim.catalogue import CATALOGUE
+
+    known = CATALOGUE.get(effect)
+    return [] if known is None else [f"To make sure: {known.check}."]
 
 
 def _parameters(parameters: Mapping[str, Any]) -> str:
