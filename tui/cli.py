@@ -14,7 +14,7 @@ import traceback
 from collections.abc import Sequence
 from importlib.metadata import version
 
-from cyclopts import App, CycloptsError, Parameter
+from cyclopts import App, CycloptsError, MissingArgumentError, Parameter
 
 from daq.errors import InputError, LashbenchError
 from tui.commands.bench import is_terminal
@@ -154,8 +154,17 @@ def _verdict(error: BaseException, words: list[str]) -> tuple[str, int]:
         return str(error), error.exit_code
     if isinstance(error, CycloptsError):
         verb = f"{words[0]} " if words and words[0] in VERBS else ""
-        return f"{str(error).rstrip('. ')}; see lashbench {verb}--help", _USAGE
+        return f"{_usage(error).rstrip('. ')}; see lashbench {verb}--help", _USAGE
     return f"internal error: {type(error).__name__}: {error}; run with --debug and report it", 1
+
+
+def _usage(error: CycloptsError) -> str:
+    # A list of commands that is cut short is of less use than the help that is pointed to.
+    text = str(error).partition(" Available commands")[0]
+    if not isinstance(error, MissingArgumentError) or not error.argument or "Did you mean" in text:
+        return text
+    given = error.keyword is not None or error.argument.tokens
+    return f"{error.argument.name} {'has no value' if given else 'is missing'}"
 
 
 if __name__ == "__main__":

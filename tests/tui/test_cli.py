@@ -123,6 +123,21 @@ def test_a_usage_error_is_one_line_and_exit_2(line, capsys):
     assert err.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("diagnose x.csv", "--unit is missing; see lashbench diagnose --help"),
+        ("diagnose x.csv --unit", "--unit has no value; see lashbench diagnose --help"),
+        ("measure --unit adss", "--instrument is missing; see lashbench measure --help"),
+        ("diagnos", 'Unknown command "diagnos". Did you mean "diagnose"?; see lashbench --help'),
+        ("tidy", 'Unknown command "tidy"; see lashbench --help'),
+    ],
+)
+def test_what_a_line_lacks_is_said_plainly(line, said, capsys):
+    assert cli.main(line.split()) == 2
+    assert capsys.readouterr().err == f"error: {said}\n"
+
+
 def test_a_reader_that_has_seen_enough_is_no_error():
     program = (
         "import sys, types; from tui import cli, output;"
