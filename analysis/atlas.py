@@ -58,28 +58,36 @@ def make_atlas(
     cache: Path | None = None,
     executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
+    *,
+    rare: bool = False,
 ) -> Atlas:
     """Simulate the atlas of a unit for the plan of a thinned observation, or read it from `cache`.
+
+    Of the baseline and every usual cause, or of every rare one.
 
     Raises
     ------
     AnalysisError
         If a motion grew without bound.
     """
-    file = None if cache is None else cache / f"atlas-{_fingerprint(unit, coarse)}.npz"
+    file = (
+        None
+        if cache is None
+        else cache / f"{'rare' if rare else 'atlas'}-{_fingerprint(unit, coarse)}.npz"
+    )
     if file is not None and (known := _read(file)) is not None:
         return known
     rng = np.random.default_rng(_SEED)
-    atlas = simulate_groups(unit, list(_groups(unit, rng)), coarse, rng, executor, progress)
+    atlas = simulate_groups(unit, list(_groups(unit, rng, rare)), coarse, rng, executor, progress)
     if file is not None:
         _write(file, atlas)
     return atlas
 
 
-def _groups(unit: Unit, rng: np.random.Generator) -> Iterator[Group]:
-    for _ in range(_BASELINE_GROUPS):
+def _groups(unit: Unit, rng: np.random.Generator, rare: bool) -> Iterator[Group]:
+    for _ in range(0 if rare else _BASELINE_GROUPS):
         yield Group(Hypothesis(unit), _spread(_RATIOS, rng), np.empty(0))
-    for hypothesis in every_single_cause(unit):
+    for hypothesis in every_single_cause(unit, rare):
         for sizes in _sizes(hypothesis, rng):
             yield Group(hypothesis, _spread(_RATIOS, rng), sizes)
 

@@ -137,7 +137,8 @@ class Hypothesis:
         return tuple(sorted({CATALOGUE[effect].site for effect in self.effects}))
 
 
-def every_single_cause(unit: Unit) -> Iterator[Hypothesis]:
-    """The hypotheses of one effect each, in the order of the catalogue."""
-    for effect in CATALOGUE:
-        yield Hypothesis(unit, (effect,))
+def every_single_cause(unit: Unit, rare: bool = False) -> Iterator[Hypothesis]:
+    """The hypotheses of one effect each, in the order of the catalogue: the usual or the rare."""
+    for effect in CATALOGUE.values():
+        if effect.rare == rare:
+            yield Hypothesis(unit, (effect.id,))

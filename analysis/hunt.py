@@ -77,7 +77,7 @@ class Hunt:
     def thinned(self, stride: int) -> Hunt:
         """A hunt on every so manieth of the frequencies, with nothing simulated yet."""
         few, noise_v = self.observation.thinned(stride), self.observation.noise_v
-        return Hunt(self.unit, few, self._rng, self._executor, self._report(), noise_v)
+        return Hunt(self.unit, few, self._rng, self._executor, self.report(), noise_v)
 
     def start(self, places: Starts, groups: int, of_many: int = 0) -> None:
         """Simulate hypotheses about places, or more of them than before about other places.
@@ -136,7 +136,7 @@ class Hunt:
 
     def _simulate(self, groups: Sequence[Group]) -> None:
         made = simulate_groups(
-            self.unit, groups, self.observation, self._rng, self._executor, self._report()
+            self.unit, groups, self.observation, self._rng, self._executor, self.report()
         )
         for key, population in made.items():
             known = self._runs.get(key)
@@ -146,8 +146,11 @@ class Hunt:
         runs = {key: self._runs[key] for key in starts}
         self.found |= form_candidates(self.unit, self.observation, runs, starts)
 
-    def _report(self) -> Callable[[float], None] | None:
-        """Half of what is left of the bar, as nobody knows how many rounds are to come."""
+    def report(self) -> Callable[[float], None] | None:
+        """What is told the share of further work: half of what is left of the bar.
+
+        Nobody knows how many rounds are to come.
+        """
         if self._progress is None:
             return None
         progress, begin = self._progress, 1.0 - self._left

@@ -26,6 +26,7 @@ from analysis.pairs import look_at_felt, search_pairs
 from analysis.parts import earns, parts_of, places_of_parts
 from analysis.plausibility import is_pressed
 from analysis.progress import Progress, part_of
+from analysis.rarities import look_at_rare
 from analysis.screening import (
     add_causes,
     near,
@@ -178,6 +179,12 @@ def search_causes(
         _weigh_parts(fine)
         if len(fine.best.hypothesis.effects) == 2 and _is_doubtful(fine.best, rng, _LEAST_SURE):
             _search_triples(rough, fine, atlas, rng)
+            _see_it_predict(fine)
+        rare = make_atlas(unit, coarse, cache, executor, fine.report(), rare=True)
+        rare = {k: v for k, v in rare.items() if not set(k) & set(without)}
+        if kept := look_at_rare(rough, fine, rare):
+            fine.take_over([rough.found[key] for key in kept], _THIRD_GROUPS)
+            _compare(fine, rng)
             _see_it_predict(fine)
     return sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
 

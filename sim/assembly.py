@@ -97,6 +97,7 @@ class Assembly:
 
     inertias: dict[str, float] = field(default_factory=dict)
     signals: list[str] = field(default_factory=list)
+    output: dict[str, float] = field(default_factory=lambda: {"V_o": 1.0})
     _torques: list[tuple[Along, Along, float, float]] = field(default_factory=list)
     _couplings: list[tuple[str, str, float]] = field(default_factory=list)
     _inputs: dict[str, float] = field(default_factory=dict)
@@ -161,8 +162,8 @@ class Assembly:
             (name, law, acts_on, looks_at, feedthrough, stiffness, damping, parameters)
         )
 
-    def build(self, output: Along) -> PiecewiseLinearSystem:
-        """Matrices and laws, with `output` as the row of V_o over state names."""
+    def build(self, output: Along | None = None) -> PiecewiseLinearSystem:
+        """Matrices and laws, with `output` as the row of what is read, V_o where not given."""
         at = _States(self.signals, self.inertias)
         n = len(at.names)
         A, energy = np.zeros((n, n)), np.zeros((n, n))
@@ -199,7 +200,7 @@ class Assembly:
             A=A,
             b=b,
             f=f,
-            o=at.row(output),
+            o=at.row(self.output if output is None else output),
             nonlinearities=nonlinearities,
             states=at.names,
             energy=energy,

@@ -11,12 +11,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any
 
 from daq.errors import ConfigurationError
 from sim.drivetrain import Drivetrain, shaft_end
+from sim.effect import Effect, EffectParameter, around, drive_voltage, span, table_1, times
 from sim.elements import (
     ConstantTorque,
     Damper,
@@ -24,66 +25,10 @@ from sim.elements import (
     Inertia,
     Spring,
 )
+from sim.rare_effects import RARE
 from sim.unit import Unit
 
-__all__ = ["CATALOGUE", "Effect", "EffectParameter"]
-
-
-@dataclass(frozen=True, slots=True)
-class EffectParameter:
-    """One physical parameter of an effect.
-
-    `range` gives the plausible span for a unit, in `unit_symbol`; values
-    outside `allowed` have no physical meaning and are refused.
-    """
-
-    name: str
-    unit_symbol: str
-    range: Callable[[Unit], tuple[float, float]]
-    allowed: tuple[float, float] = (0.0, math.inf)
-
-    def nominal(self, unit: Unit) -> float | None:
-        """What a unit without the effect has: its datasheet's value, or 1 of a factor on some.
-
-        None where the effect adds what the datasheet does not know.
-        """
-        return 1.0 if self.name == "scale" else unit.parameters.get(self.name)
-
-
-@dataclass(frozen=True, slots=True)
-class Effect:
-    """One entry of the catalogue.
-
-    `site` says whether the fault sits in the mechanics ("plant") or in the
-    measuring chain ("chain"), `check` how to make sure of it by other means.
-    Exactly one of `on_unit` and `on_drivetrain` is given. `added_inertia`, of
-    what is linear and acts on the load alone: by how much the load is felt to
-    have more inertia at an angular frequency (rad/s), kg.m^2, complex where it
-    brakes or swings.
-    """
-
-    id: str
-    parameters: tuple[EffectParameter, ...]
-    site: Literal["plant", "chain"]
-    meaning: str
-    bench_cause: str
-    check: str
-    on_unit: Callable[[Unit, Mapping[str, float]], Unit] | None = None
-    on_drivetrain: Callable[[Drivetrain, Unit, Mapping[str, float]], Drivetrain] | None = None
-    added_inertia: Callable[[Unit, Mapping[str, Any], Any], Any] | None = None
-
-
-def _table_1(symbol: str) -> Callable[[Unit, Mapping[str, float]], Unit]:
-    return lambda unit, values: unit.with_parameters(**{symbol: values[symbol]})
-
-
-def _around(symbol: str, low: float, high: float) -> Callable[[Unit], tuple[float, float]]:
-    """A range as multiples of the datasheet's value."""
-    return lambda unit: (low * unit.parameters[symbol], high * unit.parameters[symbol])
-
-
-def _span(low: float, high: float) -> Callable[[Unit], tuple[float, float]]:
-    return lambda unit: (low, high)
+__all__ = ["CATALOGUE", "COMMON", "Effect", "EffectParameter"]
 
 
 def _load_critical(unit: Unit) -> float:
@@ -167,14 +112,6 @@ def _move_corner(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrai
     )
 
 
-def _times(scale: Callable[[Unit], float], low: float, high: float) -> Callable[[Unit], Any]:
-    return lambda unit: (low * scale(unit), high * scale(unit))
-
-
-def _drive_voltage(unit: Unit) -> float:
-    return unit.electronics.k_a * unit.limits.source_vpk
-
-
 def _stall_torque(unit: Unit) -> float:
     """Torque at the load for 1 V at the amplifier, a natural scale of load torques, N.m."""
     motor = unit.motor
@@ -192,7 +129,7 @@ _TORQUE, _DAMPING, _STIFFNESS = "N.m", "N.m.s/rad", "N.m/rad"
 _ALL = (
     Effect(
         "load-viscous-damping",
-        (_P("B_L", _DAMPING, _times(_load_critical, 3e-4, 0.1)),),
+        (_P("B_L", _DAMPING, times(_load_critical, 3e-4, 0.1)),),
         "plant",
         "The load is braked in proportion to its speed.",
         "grease or a seal dragging on the load, or eddy currents",
@@ -202,7 +139,7 @@ _ALL = (
     ),
     Effect(
         "shaft-damping",
-        (_P("c_s1", _DAMPING, _times(_shaft_critical, 1e-3, 0.3)),),
+        (_P("c_s1", _DAMPING, times(_shaft_critical, 1e-3, 0.3)),),
         "plant",
         "Shaft 1 loses energy as it twists.",
         "a press fit or coupling that works on shaft 1",
@@ -211,7 +148,7 @@ _ALL = (
     ),
     Effect(
         "mesh1-damping",
-        (_P("c_g1", _DAMPING, _span(1e-3, 10.0)),),
+        (_P("c_g1", _DAMPING, span(1e-3, 10.0)),),
         "plant",
         "Gear 1 loses energy while its teeth touch.",
         "thick or fresh grease in gear stage 1",
@@ -220,7 +157,7 @@ _ALL = (
     ),
     Effect(
         "mesh2-damping",
-        (_P("c_2", _DAMPING, _span(1e-2, 100.0)),),
+        (_P("c_2", _DAMPING, span(1e-2, 100.0)),),
         "plant",
         "Gear 2 loses energy while its teeth touch.",
         "thick or fresh grease in gear stage 2",
@@ -229,18 +166,18 @@ _ALL = (
     ),
     Effect(
         "load-coulomb-friction",
-        (_P("T_f_L", _TORQUE, _around("T_f_L", 0.0, 40.0)),),
+        (_P("T_f_L", _TORQUE, around("T_f_L", 0.0, 40.0)),),
         "plant",
         "The dry friction of the load differs from its datasheet.",
         "a preloaded or dirty bearing of the load",
         "take the load off its gear and pull it with a spring scale; as much at any speed",
-        on_unit=_table_1("T_f_L"),
+        on_unit=table_1("T_f_L"),
     ),
     Effect(
         "load-stribeck-friction",
         (
-            _P("T_s_L", _TORQUE, _around("T_f_L", 0.3, 40.0)),
-            _P("omega_s", "rad/s", _span(0.003, 3.0), (1e-6, math.inf)),
+            _P("T_s_L", _TORQUE, around("T_f_L", 0.3, 40.0)),
+            _P("omega_s", "rad/s", span(0.003, 3.0), (1e-6, math.inf)),
         ),
         "plant",
         "The friction of the load peaks near standstill and falls as it moves.",
@@ -252,44 +189,44 @@ _ALL = (
     ),
     Effect(
         "motor-coulomb-friction",
-        (_P("T_f_m", _TORQUE, _around("T_f_m", 0.0, 6.0)),),
+        (_P("T_f_m", _TORQUE, around("T_f_m", 0.0, 6.0)),),
         "plant",
         "The dry friction of the motor differs from its datasheet.",
         "worn brushes, or a preloaded motor bearing",
         "take the motor off its gear and read the current at which it just turns; times k_t",
-        on_unit=_table_1("T_f_m"),
+        on_unit=table_1("T_f_m"),
     ),
     Effect(
         "motor-viscous-friction",
-        (_P("B_m", _DAMPING, _around("B_m", 0.0, 30.0)),),
+        (_P("B_m", _DAMPING, around("B_m", 0.0, 30.0)),),
         "plant",
         "The viscous friction of the motor differs from its datasheet.",
         "stiff grease in the motor bearings, cold running",
         "take the motor off its gear and read its current at two speeds; the difference grows",
-        on_unit=_table_1("B_m"),
+        on_unit=table_1("B_m"),
     ),
     Effect(
         "load-inertia",
-        (_P("J_L", "kg.m^2", _around("J_L", 0.5, 2.0), (1e-12, math.inf)),),
+        (_P("J_L", "kg.m^2", around("J_L", 0.5, 2.0), (1e-12, math.inf)),),
         "plant",
         "The inertia of the load differs from its datasheet.",
         "another payload, or a counterweight moved or missing",
         "compare what is mounted with the drawing; add a known inertia and measure again",
-        on_unit=_table_1("J_L"),
+        on_unit=table_1("J_L"),
         added_inertia=lambda unit, v, omega: v["J_L"] - unit.load.J_L + 0j * omega,
     ),
     Effect(
         "shaft-stiffness",
-        (_P("k_s1", _STIFFNESS, _around("k_s1", 0.5, 2.0), (1e-9, math.inf)),),
+        (_P("k_s1", _STIFFNESS, around("k_s1", 0.5, 2.0), (1e-9, math.inf)),),
         "plant",
         "Shaft 1 is softer or stiffer than its datasheet.",
         "a loose clamp, a crack, or another shaft",
         "hold the motor, load the output with a known torque, read the twist with a dial gauge",
-        on_unit=_table_1("k_s1"),
+        on_unit=table_1("k_s1"),
     ),
     Effect(
         "shaft-hardening",
-        (_P("h", "1/rad^2", _span(10.0, 1e6)),),
+        (_P("h", "1/rad^2", span(10.0, 1e6)),),
         "plant",
         "Shaft 1 gets stiffer the more it twists.",
         "a spline or coupling that closes up under torque",
@@ -298,16 +235,16 @@ _ALL = (
     ),
     Effect(
         "total-backlash",
-        (_P("b_t_deg", "deg", _around("b_t_deg", 0.2, 4.0)),),
+        (_P("b_t_deg", "deg", around("b_t_deg", 0.2, 4.0)),),
         "plant",
         "The total backlash differs from the value it was given.",
         "wear, or a centre distance that was changed since it was measured",
         "hold the motor, rock the load and read its play with a dial gauge",
-        on_unit=_table_1("b_t_deg"),
+        on_unit=table_1("b_t_deg"),
     ),
     Effect(
         "cable-stiffness",
-        (_P("K_c", _STIFFNESS, _times(_shaft_at_load, 0.005, 2.0)),),
+        (_P("K_c", _STIFFNESS, times(_shaft_at_load, 0.005, 2.0)),),
         "plant",
         "A spring ties the load to ground.",
         "a stiff cable bundle or hose across the joint",
@@ -317,7 +254,7 @@ _ALL = (
     ),
     Effect(
         "load-torque-bias",
-        (_P("T_b", _TORQUE, _times(_stall_torque, 0.02, 2.0), (-math.inf, math.inf)),),
+        (_P("T_b", _TORQUE, times(_stall_torque, 0.02, 2.0), (-math.inf, math.inf)),),
         "plant",
         "A constant torque pulls on the load.",
         "an imbalance, a hanging cable or a tilted base",
@@ -327,9 +264,9 @@ _ALL = (
     Effect(
         "payload-flexibility",
         (
-            _P("J_p", "kg.m^2", _around("J_L", 0.02, 0.5), (1e-12, math.inf)),
-            _P("f_p", "Hz", _times(lambda unit: unit.limits.start_hz, 2.0, 30.0), (1e-3, 1e5)),
-            _P("zeta_p", "1", _span(0.005, 0.1)),
+            _P("J_p", "kg.m^2", around("J_L", 0.02, 0.5), (1e-12, math.inf)),
+            _P("f_p", "Hz", times(lambda unit: unit.limits.start_hz, 2.0, 30.0), (1e-3, 1e5)),
+            _P("zeta_p", "1", span(0.005, 0.1)),
         ),
         "plant",
         "Something on the load swings on a spring of its own.",
@@ -340,16 +277,16 @@ _ALL = (
     ),
     Effect(
         "amplifier-gain",
-        (_P("k_a", "1", _around("k_a", 0.5, 2.0), (1e-9, math.inf)),),
+        (_P("k_a", "1", around("k_a", 0.5, 2.0), (1e-9, math.inf)),),
         "chain",
         "The gain of the amplifier differs from its datasheet.",
         "a trimmer that was turned, or a changed supply",
         "compare the voltages at the motor and at the source with a meter",
-        on_unit=_table_1("k_a"),
+        on_unit=table_1("k_a"),
     ),
     Effect(
         "amplifier-saturation",
-        (_P("V_sat", "V", _times(_drive_voltage, 0.1, 1.0), (1e-6, math.inf)),),
+        (_P("V_sat", "V", times(drive_voltage, 0.1, 1.0), (1e-6, math.inf)),),
         "chain",
         "The amplifier clips.",
         "a low supply voltage or a current limit that is set too low",
@@ -358,7 +295,7 @@ _ALL = (
     ),
     Effect(
         "amplifier-lag",
-        (_P("tau_a", "s", _span(2e-5, 5e-3)),),
+        (_P("tau_a", "s", span(2e-5, 5e-3)),),
         "chain",
         "The amplifier answers late.",
         "a noise filter or an ageing output stage in the amplifier",
@@ -367,16 +304,16 @@ _ALL = (
     ),
     Effect(
         "motor-resistance",
-        (_P("R_m", "ohm", _around("R_m", 0.5, 2.0), (1e-9, math.inf)),),
+        (_P("R_m", "ohm", around("R_m", 0.5, 2.0), (1e-9, math.inf)),),
         "plant",
         "The resistance of the motor differs from its datasheet.",
         "a hot winding, worn brushes or a bad contact in the motor lead",
         "measure the winding with a meter, cold, and again at once after a sweep",
-        on_unit=_table_1("R_m"),
+        on_unit=table_1("R_m"),
     ),
     Effect(
         "motor-constant",
-        (_P("scale", "1", _span(0.5, 2.0), (1e-9, math.inf)),),
+        (_P("scale", "1", span(0.5, 2.0), (1e-9, math.inf)),),
         "plant",
         "Torque constant and back-EMF constant are both off by one factor.",
         "magnets that lost or differ in strength",
@@ -385,23 +322,27 @@ _ALL = (
     ),
     Effect(
         "tachometer-gain",
-        (_P("k_ts", "V.s/rad", _around("k_ts", 0.5, 2.0), (1e-9, math.inf)),),
+        (_P("k_ts", "V.s/rad", around("k_ts", 0.5, 2.0), (1e-9, math.inf)),),
         "chain",
         "The gain of the tachometer differs from its datasheet.",
         "a loaded tachometer output or a changed tachometer",
         "turn the tachometer at a known speed and read its voltage, connected as in the sweep",
-        on_unit=_table_1("k_ts"),
+        on_unit=table_1("k_ts"),
     ),
     Effect(
         "filter-corner",
-        (_P("scale", "1", _span(0.5, 2.0), (1e-6, math.inf)),),
+        (_P("scale", "1", span(0.5, 2.0), (1e-6, math.inf)),),
         "chain",
         "The corner frequency of the tachometer's filter is off.",
         "a filter part of another value, or drift of it",
         "measure the response of the filter alone, fed from the source",
         on_drivetrain=_move_corner,
     ),
+    *RARE,
 )
 
 CATALOGUE: Mapping[str, Effect] = MappingProxyType({effect.id: effect for effect in _ALL})
 """Every effect by identifier."""
+
+COMMON = tuple(effect.id for effect in _ALL if not effect.rare)
+"""Identifiers of those that are suspected first."""

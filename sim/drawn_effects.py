@@ -12,7 +12,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from sim.catalogue import CATALOGUE, EffectParameter
+from sim.catalogue import CATALOGUE, COMMON, EffectParameter
 from sim.effects import EffectSetting
 from sim.unit import Unit
 
@@ -34,7 +34,7 @@ def draw_effect(
     unit: Unit,
     band_hz: tuple[float, float],
     rng: np.random.Generator,
-    effects: Sequence[str] = tuple(CATALOGUE),
+    effects: Sequence[str] = COMMON,
 ) -> EffectSetting:
     """Draw one effect and its size.
 
@@ -48,7 +48,7 @@ def draw_effect(
     effects
         Identifiers to draw from.
     """
-    possible = [name for name in effects if unit.stages == 2 or name != "mesh2-damping"]
+    possible = [name for name in effects if unit.stages == 2 or not name.startswith("mesh2-")]
     effect = CATALOGUE[possible[int(rng.integers(len(possible)))]]
     values = {p.name: _draw_value(p, unit, band_hz, rng) for p in effect.parameters}
     return EffectSetting(effect.id, MappingProxyType(values))

@@ -51,7 +51,7 @@ class Drivetrain:
         assembly = Assembly()
         for element in self.elements.values():
             element.enter(assembly)
-        return assembly.build(output={"V_o": 1.0})
+        return assembly.build()
 
 
 def shaft_end(unit: Unit) -> str:

@@ -151,14 +151,15 @@ class ConstantTorque:
 
 @dataclass(frozen=True, slots=True)
 class Amplifier:
-    """Input voltage to motor voltage, equation (1), with optional lag and clip.
+    """Input voltage to motor voltage, equation (1), with optional lag, dead zone and clip.
 
-    The lag comes before the clip: the output stage is what saturates.
+    In that order: the output stage is what is dead about zero and saturates.
     """
 
     k_a: float
     tau_a: float = 0.0
     V_sat: float | None = None
+    V_d: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,8 +174,8 @@ class Motor:
     amplifier: Amplifier
 
     def enter(self, assembly: Assembly) -> None:
-        """Add the armature current, the torque, and the amplifier's own state and clip."""
-        amplifier = self.amplifier
+        """Add the armature current, the torque, and the amplifier's own state and laws."""
+        amplifier, linear = self.amplifier, self.amplifier.V_d == 0.0
         assembly.add_signal("i_a")
         assembly.add_coupling("i_a", "i_a", -self.R_m / self.L_a)
         assembly.add_coupling("i_a", f"{self.coordinate}'", -self.k_b / self.L_a)
@@ -183,30 +184,38 @@ class Motor:
             assembly.add_signal("V_m")
             assembly.add_coupling("V_m", "V_m", -1.0 / amplifier.tau_a)
             assembly.add_input("V_m", amplifier.k_a / amplifier.tau_a)
-            assembly.add_coupling("i_a", "V_m", 1.0 / self.L_a)
+            assembly.add_coupling("i_a", "V_m", linear / self.L_a)
             looks_at, feedthrough = {"V_m": 1.0}, 0.0
         else:
-            assembly.add_input("i_a", amplifier.k_a / self.L_a)
+            assembly.add_input("i_a", linear * amplifier.k_a / self.L_a)
             looks_at, feedthrough = {}, amplifier.k_a
+        # What exceeds the dead zone comes through, less what exceeds the clip beyond it.
+        limits = {} if linear else {"amplifier_dead_zone": (-1.0, amplifier.V_d)}
         if amplifier.V_sat is not None:
+            limits["amplifier"] = (1.0, amplifier.V_d + amplifier.V_sat)
+        for name, (sign, limit) in limits.items():
             assembly.add_law(
-                "amplifier",
+                name,
                 Law.EXCESS,
-                {"i_a": 1.0 / self.L_a},
+                {"i_a": sign / self.L_a},
                 looks_at,
                 feedthrough=feedthrough,
-                parameters=(amplifier.V_sat,),
+                parameters=(limit,),
             )
 
 
 @dataclass(frozen=True, slots=True)
 class Tachometer:
-    """Tachometer and its second-order filter, equations (3) and (4)."""
+    """Tachometer and its second-order filter, equations (3) and (4), read with a delay `T_d`.
+
+    The delay is Pade's approximation of second order: half a degree off at 1.5 rad, 2 at 2.
+    """
 
     coordinate: str
     k_ts: float
     numerator: float
     denominator: tuple[float, float, float]
+    T_d: float = 0.0
 
     def enter(self, assembly: Assembly) -> None:
         """Add the filter's output `V_o` and its rate."""
@@ -217,3 +226,12 @@ class Tachometer:
         assembly.add_coupling("V_o'", "V_o", -d0 / d2)
         assembly.add_coupling("V_o'", "V_o'", -d1 / d2)
         assembly.add_coupling("V_o'", f"{self.coordinate}'", self.numerator * self.k_ts / d2)
+        if self.T_d > 0.0:
+            # exp(-s T) = 1 - s T / (1 + s T/2 + (s T)^2/12); what is taken off is T times the rate.
+            assembly.add_signal("V_T")
+            assembly.add_signal("V_T'")
+            assembly.add_coupling("V_T", "V_T'", 1.0)
+            assembly.add_coupling("V_T'", "V_o", 12.0 / self.T_d**2)
+            assembly.add_coupling("V_T'", "V_T", -12.0 / self.T_d**2)
+            assembly.add_coupling("V_T'", "V_T'", -6.0 / self.T_d)
+            assembly.output["V_T'"] = -self.T_d

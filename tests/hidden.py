@@ -14,7 +14,7 @@ from analysis.causes import Hypothesis
 from analysis.ensemble import TOLERANCES
 from daq.frf import DB_PER_NEPER, FrequencyResponse
 from daq.plan import SweepPlan, spaced_frequencies
-from sim.catalogue import CATALOGUE
+from sim.catalogue import COMMON
 from sim.effects import EffectSetting
 from sim.response import simulate
 from sim.unit import Unit, load_unit
@@ -118,4 +118,4 @@ def _band(unit: Unit) -> tuple[float, float]:
     return BANDS_HZ[unit.name.lower()]
 
 
-EVERY_EFFECT = tuple(CATALOGUE)
+EVERY_EFFECT = COMMON

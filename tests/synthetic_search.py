@@ -61,8 +61,10 @@ def simulate_in(monkeypatch) -> Asked:
         return found
 
     def quietly(*given):
+        before = Counter(count)
         made = simulate(*given)
         count.clear()
+        count.update(before)
         return made
 
     monkeypatch.setattr(hunt, "simulate_groups", simulate)

@@ -137,15 +137,15 @@ def _derivative(m, V_i, y, dy):
     th_s1, w_s1, th_p2, w_p2, th_L, w_L = y[5], y[6], y[7], y[8], y[9], y[10]
     V_o, dV_o, u_a, th_p, w_p, z_L = y[11], y[12], y[13], y[14], y[15], y[16]
 
-    # (1), with a lag and a clip of the motor voltage; (2a), (2b)
+    # (1), with a lag, a dead zone and a clip of the motor voltage; (2a), (2b)
     V_m = m.k_a * V_i
-    V_m = max(V_m - m.V_d, 0.0) + min(V_m + m.V_d, 0.0)
-    if V_m > 0.0:
-        V_m *= 1.0 + m.u_p
     dy[13] = 0.0
     if m.tau_a > 0.0:
         dy[13] = (V_m - u_a) / m.tau_a
         V_m = u_a
+    V_m = max(V_m - m.V_d, 0.0) + min(V_m + m.V_d, 0.0)
+    if V_m > 0.0:
+        V_m *= 1.0 + m.u_p
     V_m = min(max(V_m, -m.V_sat), m.V_sat)
     dy[0] = (V_m - m.R_m * i_a - m.k_b * w_m) / m.L_a
     T_m = m.k_t * min(max(i_a, -m.i_max), m.i_max)

@@ -41,6 +41,12 @@ CASES = {
     "tachometer-gain:k_ts=0.1": {"k_ts": 0.1},
     "filter-corner:scale=0.7": {"filter_numerator": 723439.0 * 0.49,
                                 "filter_a1": 1710.0 * 0.7, "filter_a0": 723439.0 * 0.49},
+    "motor-inertia:J_m=1.2e-5": {"J_m": 1.2e-5},
+    "mesh1-stiffness:k_g1=2e3": {"k_g1": 2e3},
+    "mesh2-stiffness:k_2=8e3": {"k_2": 8e3},
+    "gear-ratio:N_1=5": {"N_1": 5.0},
+    "amplifier-dead-zone:V_d=0.5": {"V_d": 0.5},
+    "reading-delay:T_d=1e-3": {"late_s": 1e-3},
 }  # fmt: skip
 
 
@@ -49,6 +55,10 @@ def identifier(text):
 
 
 def oracle_with(extras):
+    if "late_s" in extras:
+        harmonics = np.arange(4)
+        turned = np.exp(-2j * np.pi * FREQUENCY_HZ * extras["late_s"] * harmonics)
+        return oracle_with({}) * turned
     changed = {key: value for key, value in extras.items() if key in UNIT.parameters}
     unit = UNIT.with_parameters(**{k: v for k, v in changed.items() if k != "filter_numerator"})
     added = {k: v for k, v in extras.items() if k not in changed or k == "filter_numerator"}

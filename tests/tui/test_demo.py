@@ -11,7 +11,7 @@ import pytest
 
 from daq.formats import read_response
 from daq.store import Store
-from sim.catalogue import CATALOGUE
+from sim.catalogue import CATALOGUE, COMMON
 from sim.drawn_effects import draw_effect
 from sim.unit import load_unit
 from tui.bode_text import bode_lines
@@ -210,7 +210,7 @@ def test_a_guess_is_a_number_or_a_name(answers, guess):
     person = Person(*answers)
     assert verb._guess(person) == guess
     assert person.answers == []
-    assert all(name in person.asked[0] for name in CATALOGUE)
+    assert all(name in person.asked[0] for name in COMMON)
 
 
 @pytest.mark.parametrize("unit", ["adss", "edss"])
@@ -230,7 +230,7 @@ def test_what_is_drawn_is_in_its_range_and_differs_from_the_datasheet(unit, name
 def test_every_effect_is_drawn_at_last():
     rng = np.random.default_rng(1)
     seen = {draw_effect(ADSS, (110.0, 170.0), rng).id for _ in range(500)}
-    assert seen == set(CATALOGUE)
+    assert seen == set(COMMON)
 
 
 def points(level):

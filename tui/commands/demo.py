@@ -115,16 +115,16 @@ def _features(out: Path, measurement: int, tell: Callable[[str], None]) -> Frequ
 
 def _guess(console: Console) -> str | None:
     """What the person takes it for; None if there is nobody, or nobody who would."""
-    from sim.catalogue import CATALOGUE
+    from sim.catalogue import CATALOGUE, COMMON
 
-    names = list(CATALOGUE)
+    names = list(COMMON)
     lines = [f"  {at:2}  {name:<24} {CATALOGUE[name].meaning}" for at, name in enumerate(names, 1)]
     question = "Which is it? Number or name, or Enter to pass: "
     answer = console.ask("\n".join(["", "One of these is hidden:", *lines, question]))
     while answer:
         if answer.isdecimal() and 1 <= int(answer) <= len(names):
             return names[int(answer) - 1]
-        if answer in CATALOGUE:
+        if answer in names:
             return answer
         answer = console.ask(f"{answer} is none of them; number or name, or Enter to pass: ")
     return None

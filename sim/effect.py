@@ -1,0 +1,89 @@
+"""What an effect is: something that a real drive may have and the paper model lacks.
+
+Owns the form of an entry of the catalogue, and the ways in which entries state
+their ranges and change a unit. The entries are in `sim.catalogue` and
+`sim.rare_effects`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from sim.drivetrain import Drivetrain
+from sim.unit import Unit
+
+__all__ = ["Effect", "EffectParameter", "around", "drive_voltage", "span", "table_1", "times"]
+
+
+@dataclass(frozen=True, slots=True)
+class EffectParameter:
+    """One physical parameter of an effect.
+
+    `range` gives the plausible span for a unit, in `unit_symbol`; values
+    outside `allowed` have no physical meaning and are refused.
+    """
+
+    name: str
+    unit_symbol: str
+    range: Callable[[Unit], tuple[float, float]]
+    allowed: tuple[float, float] = (0.0, math.inf)
+
+    def nominal(self, unit: Unit) -> float | None:
+        """What a unit without the effect has: its datasheet's value, or 1 of a factor on some.
+
+        None where the effect adds what the datasheet does not know.
+        """
+        return 1.0 if self.name == "scale" else unit.parameters.get(self.name)
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """One entry of the catalogue.
+
+    `site` says whether the fault sits in the mechanics ("plant") or in the
+    measuring chain ("chain"), `check` how to make sure of it by other means.
+    Exactly one of `on_unit` and `on_drivetrain` is given. `added_inertia`, of
+    what is linear and acts on the load alone: by how much the load is felt to
+    have more inertia at an angular frequency (rad/s), kg.m^2, complex where it
+    brakes or swings. `rare`: nobody would suspect it first, so that it is looked
+    for last, and alone.
+    """
+
+    id: str
+    parameters: tuple[EffectParameter, ...]
+    site: Literal["plant", "chain"]
+    meaning: str
+    bench_cause: str
+    check: str
+    on_unit: Callable[[Unit, Mapping[str, float]], Unit] | None = None
+    on_drivetrain: Callable[[Drivetrain, Unit, Mapping[str, float]], Drivetrain] | None = None
+    added_inertia: Callable[[Unit, Mapping[str, Any], Any], Any] | None = None
+    rare: bool = False
+
+
+def table_1(symbol: str) -> Callable[[Unit, Mapping[str, float]], Unit]:
+    """A change of one datasheet value."""
+    return lambda unit, values: unit.with_parameters(**{symbol: values[symbol]})
+
+
+def around(symbol: str, low: float, high: float) -> Callable[[Unit], tuple[float, float]]:
+    """A range as multiples of the datasheet's value."""
+    return lambda unit: (low * unit.parameters[symbol], high * unit.parameters[symbol])
+
+
+def span(low: float, high: float) -> Callable[[Unit], tuple[float, float]]:
+    """A range that is the same for every unit."""
+    return lambda unit: (low, high)
+
+
+def times(scale: Callable[[Unit], float], low: float, high: float) -> Callable[[Unit], Any]:
+    """A range as multiples of a natural scale of the unit."""
+    return lambda unit: (low * scale(unit), high * scale(unit))
+
+
+def drive_voltage(unit: Unit) -> float:
+    """The largest voltage that a sweep puts on the motor, V."""
+    return unit.electronics.k_a * unit.limits.source_vpk
