@@ -132,6 +132,11 @@ class Hypothesis:
                 yield self.place(place[0], list(values))
 
     @property
+    def rare(self) -> int:
+        """How many of its effects nobody would suspect first."""
+        return sum(CATALOGUE[effect].rare for effect in self.effects)
+
+    @property
     def sites(self) -> tuple[str, ...]:
         """Where its effects sit: "plant", "chain"."""
         return tuple(sorted({CATALOGUE[effect].site for effect in self.effects}))

@@ -41,6 +41,9 @@ _AT_BOUND = 10.0
 _WITHIN_TOLERANCE = 40.0
 """Cost of a datasheet value so little off that its tolerance covers it: that is no cause."""
 
+_RARE = HEAT * float(np.log(10.0))
+"""Cost of a cause that nobody would suspect first: it is taken for ten times less likely."""
+
 _FALSE_ALARM = 20.0
 """By so much must a cause beat the baseline beyond its costs."""
 
@@ -284,6 +287,7 @@ def _score(candidate: Candidate, held_out: HeldOut) -> float:
     bound = np.count_nonzero((sizes < EDGE) | (sizes > 1.0 - EDGE))
     causes = len(candidate.hypothesis.effects)
     cost = _PER_CAUSE * causes + _PER_PARAMETER * len(sizes) + _AT_BOUND * bound
+    cost += _RARE * candidate.hypothesis.rare
     if may_be_within_tolerance(candidate):
         cost += _WITHIN_TOLERANCE
     agreed = (1.0 - _HELD_OUT) * candidate.best.log_likelihood + _HELD_OUT * held_out.score
