@@ -42,7 +42,9 @@ _WITHIN_TOLERANCE = 40.0
 """Cost of a datasheet value so little off that its tolerance covers it: that is no cause."""
 
 _RARE = HEAT * float(np.log(10.0))
-"""Cost of a cause that nobody would suspect first: it is taken for ten times less likely."""
+"""Cost of a cause that nobody would suspect first: it is taken for ten times less likely. That says
+which of two that do alike is named first; no belief about benches rules the other out as a rival.
+"""
 
 _FALSE_ALARM = 20.0
 """By so much must a cause beat the baseline beyond its costs."""
@@ -165,7 +167,8 @@ class Verdict:
         if not one.effects:
             return bool(best) and one.adequate and behind < _SURE
         other = not set(one.effects) <= best and not set(one.effects) >= best
-        if not other or not one.adequate or behind >= _RIVAL:
+        rarer = one.candidate.hypothesis.rare - self.best.candidate.hypothesis.rare
+        if not other or not one.adequate or behind - _RARE * max(rarer, 0) >= _RIVAL:
             return False
         return not is_felt_alike(one.candidate, self.best.candidate)
 
@@ -187,6 +190,7 @@ def judge_candidates(
     judged = []
     for c, h, score, share in zip(chosen, held, scores, _shares(scores), strict=True):
         near = _PART if set(c.hypothesis.effects) < leader else _SURE
+        near += _RARE * c.hypothesis.rare
         asked = score > scores.max() - near or not c.hypothesis.effects
         fitted = judge_adequacy(c, rng) if asked else _UNKNOWN
         objection = _find_objection(c, h, fitted, rng) if asked else _NOT_ASKED

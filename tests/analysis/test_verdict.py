@@ -110,7 +110,7 @@ def test_two_causes_that_look_the_same_are_both_named(monkeypatch):
     assert sum(verdict.word == "ambiguous" for verdict in verdicts) >= 3
 
 
-def test_of_two_that_look_the_same_the_rare_one_is_not_believed(monkeypatch):
+def test_of_two_that_look_the_same_the_rare_one_is_a_rival_and_not_named_first(monkeypatch):
     import synthetic
 
     plain, rare = synthetic.effect_slope, ("motor-inertia",)
@@ -121,7 +121,9 @@ def test_of_two_that_look_the_same_the_rare_one_is_not_believed(monkeypatch):
     # Scores differ by chance, by about 18; 34.5 more are asked of what nobody would suspect first,
     # so that it leads in one case of 35: in two of six once in a hundred times.
     assert sum(verdict.best.effects == TRUE for verdict in verdicts) >= 5
-    assert {one.effects for one in verdicts[0].judged[:2]} == {TRUE, rare}
+    # And a rival it stays, but for one case of four.
+    assert sum(verdict.word == "ambiguous" for verdict in verdicts) >= 3
+    assert all(rare in [one.effects for one in verdict.judged[:2]] for verdict in verdicts)
 
 
 @pytest.mark.parametrize(
