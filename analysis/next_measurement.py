@@ -9,7 +9,7 @@ does nearly as well is preferred.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,7 +21,7 @@ from analysis.executor import Executor
 from analysis.likelihood import HEAT
 from analysis.observation import Observation, channels_of_readings, unread
 from analysis.placement import groups_along
-from analysis.population import Population, simulate_groups
+from analysis.population import Group, Population, simulate_groups
 from daq.plan import SweepPlan, spaced_frequencies
 from sim.unit import Unit
 
@@ -98,9 +98,12 @@ def propose_measurement(
     """The plan that best separates two candidates, or None where the limits allow none."""
     rng = np.random.default_rng(seed)
     plans = list(_feasible_plans(unit, observation))
+    groups = [tuple(groups_along(c, _GROUPS, rng)) for c in (first, second)]
     judged = []
     for number, plan in enumerate(plans):
-        judged.append(_separation(unit, first, second, plan, observation.noise_v, rng, executor))
+        # The same machines in every plan, off their datasheets alike: plans differ by themselves.
+        alike = np.random.default_rng(seed)
+        judged.append(_separation(unit, groups, plan, observation.noise_v, alike, executor))
         if progress is not None:
             progress((number + 1) / len(plans))
     if not judged:
@@ -141,19 +144,20 @@ def _feasible_plans(unit: Unit, observation: Observation) -> Iterator[SweepPlan]
 
 def _separation(
     unit: Unit,
-    first: Candidate,
-    second: Candidate,
+    groups: Sequence[Sequence[Group]],
     plan: SweepPlan,
     noise_v: float,
     rng: np.random.Generator,
     executor: Executor | None = None,
 ) -> float:
+    """How far two hypotheses' groups of runs are apart, in standard deviations of both."""
     grid = plan.frequencies_hz
     thinned = replace(plan, frequencies_hz=grid[:: max(len(grid) // _COARSE, 1)])
-    asked = [g for c in (first, second) for g in groups_along(c, _GROUPS, rng)]
+    asked = [group for of_one in groups for group in of_one]
     made = simulate_groups(unit, asked, unread(thinned, noise_v), rng, executor)
     (mean_1, var_1), (mean_2, var_2) = (
-        _moments(made[c.hypothesis.effects], plan.levels_vpk[0], noise_v) for c in (first, second)
+        _moments(made[of_one[0].hypothesis.effects], plan.levels_vpk[0], noise_v)
+        for of_one in groups
     )
     apart = mean_1 - mean_2
     apart[1] = np.angle(np.exp(1j * apart[1]))

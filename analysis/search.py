@@ -181,11 +181,7 @@ def search_causes(
             _search_triples(rough, fine, atlas, rng)
             _see_it_predict(fine)
         rare = make_atlas(unit, coarse, cache, executor, fine.report(), rare=True)
-        rare = {k: v for k, v in rare.items() if not set(k) & set(without)}
-        if kept := look_at_rare(rough, fine, rare):
-            fine.take_over([rough.found[key] for key in kept], _THIRD_GROUPS)
-            _compare(fine, rng)
-            _see_it_predict(fine)
+        _hold_rare(rough, fine, {k: v for k, v in rare.items() if not set(k) & set(without)}, rng)
     return sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
 
 
@@ -228,6 +224,24 @@ def _search_triples(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Genera
         # Two of the three may do as well where they are now, and not have been looked at.
         fine.start(places_of_parts(fine.best), _LAST_GROUPS)
         _compare(fine, rng)
+
+
+def _hold_rare(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator) -> None:
+    """See whether a rare cause does as well as the leader, with as many runs."""
+    leader = fine.best.hypothesis.effects
+    kept = look_at_rare(rough, fine, atlas)
+    if not kept:
+        return
+    fine.take_over([rough.found[key] for key in kept], _THIRD_GROUPS)
+    enough = min(len(fine.found[leader].population), _ENOUGH)
+    near = set(kept)
+    while near := near & set(fine.leading(len(fine.found), _CLOSE)):
+        near = {key for key in near if len(fine.found[key].population) < enough}
+        _settle(fine, sorted(near))
+    if leader not in fine.leading(len(fine.found), _CLOSE):
+        # Less of a lead does not make up for being rare (`analysis.verdict`).
+        _compare(fine, rng)
+    _see_it_predict(fine)
 
 
 def _narrow(rough: Hunt, starts: Starts, closer: int, groups: tuple[int, int]) -> list[Effects]:

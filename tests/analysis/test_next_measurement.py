@@ -4,6 +4,7 @@ from synthetic import ADSS, LEVELS, candidate, observation, read
 
 import analysis.next_measurement as module
 from analysis.next_measurement import NextMeasurement, propose_measurement
+from analysis.placement import groups_along
 from daq.plan import SweepPlan
 
 SEEN = observation(read(("load-inertia",), np.array([0.5, 0.5]), np.random.default_rng(0)))
@@ -13,7 +14,7 @@ FIRST, SECOND = (candidate(SEEN, (e,)) for e in ("load-inertia", "shaft-stiffnes
 def proposed(monkeypatch, judge):
     tried = []
 
-    def separation(unit, first, second, plan, noise_v, rng, executor):
+    def separation(unit, groups, plan, noise_v, rng, executor):
         tried.append(plan)
         return judge(plan)
 
@@ -60,11 +61,31 @@ def test_measure_takes_the_plan_as_it_is_printed(offset):
     assert given.get("offset", 0.0) == offset
 
 
-def test_two_models_that_differ_are_parted_by_a_real_simulation():
-    far = module._separation(
-        ADSS, FIRST, SECOND,
-        SweepPlan(tuple(np.linspace(110.0, 150.0, 4)), (2.0,), settle_cycles=3, integrate_cycles=4),
-        5e-4, np.random.default_rng(0),
-    )  # fmt: skip
-    assert np.isfinite(far)
-    assert far > 0.0
+def test_two_models_that_differ_are_parted_by_a_real_simulation_and_one_not_from_itself():
+    groups = [list(groups_along(c, 2, np.random.default_rng(0))) for c in (FIRST, SECOND)]
+    plan = SweepPlan(
+        tuple(np.linspace(110.0, 150.0, 4)), (2.0,), settle_cycles=3, integrate_cycles=4
+    )
+
+    def apart(*of):
+        return module._separation(
+            ADSS, [groups[i] for i in of], plan, 5e-4, np.random.default_rng(0)
+        )
+
+    assert apart(0, 0) == 0.0
+    assert 0.5 < apart(0, 1) < 50.0
+
+
+def test_every_plan_is_judged_by_the_same_machines(monkeypatch):
+    """Or plans would differ by the machines that were drawn for them."""
+    asked = []
+
+    def separation(unit, groups, plan, noise_v, rng, executor):
+        machines = [[(g.ratios.tolist(), g.sizes.tolist()) for g in of_one] for of_one in groups]
+        asked.append((machines, rng.uniform()))
+        return 1.0
+
+    monkeypatch.setattr(module, "_separation", separation)
+    propose_measurement(ADSS, FIRST, SECOND, SEEN)
+    assert len(asked) > 5
+    assert all(one == asked[0] for one in asked)
