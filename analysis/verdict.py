@@ -206,7 +206,10 @@ def judge_candidates(
     ):
         word: Word = "consistent" if baseline.adequate else "unexplained"
         return Verdict(word, baseline, tuple(judged), baseline)
-    judged = _put_behind(judged, best)
+    first, judged = judged[0], _put_behind(judged, best)
+    if judged[0].effects != first.effects:
+        # What led was no better than its part, and another leads now.
+        best = _simplest(judged, rng)
     (best,) = (one for one in judged if one.effects == best.effects)
     (baseline,) = (one for one in judged if not one.effects)
     verdict = Verdict("explained", best, tuple(judged), baseline)

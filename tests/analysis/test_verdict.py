@@ -208,6 +208,23 @@ def test_a_pair_that_nothing_calls_for_or_that_leads_by_chance_is_not_believed(
     assert first.score - second.score == pytest.approx(20.0 if named == TRUE else lead)
 
 
+@pytest.mark.parametrize(("lead", "named"), [(6.0, ("cable-stiffness",)), (-6.0, TRUE)])
+def test_where_a_pair_does_not_earn_its_second_cause_who_leads_its_first_is_named(
+    monkeypatch, lead, named
+):
+    other, pair = ("cable-stiffness",), tuple(sorted(TRUE + WRONG))
+    score = {(): 0.0, TRUE: 200.0, other: 200.0 + lead, pair: 210.0}
+    monkeypatch.setattr(rules, "_score", lambda c, h: score[c.hypothesis.effects])
+    monkeypatch.setattr(rules, "judge_adequacy", lambda c, rng: FITS)
+    monkeypatch.setattr(rules, "_find_objection", lambda *_: "")
+    monkeypatch.setattr(rules, "judge_chance", lambda *_: 0.0)
+    verdict = judge(seen(TRUE, 1), tuple(score), 1)
+    assert (verdict.word, verdict.best.effects) == ("ambiguous", named)
+    assert verdict.judged[0] is verdict.best
+    # The pair pays for its second cause, by what it would have had to lead its first.
+    assert {one.effects: one.score for one in verdict.judged}[pair] == 180.0
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_a_second_cause_is_not_named_where_one_does(seed):
     pair = tuple(sorted((*TRUE, *WRONG)))
