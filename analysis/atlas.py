@@ -31,7 +31,7 @@ Atlas = dict[tuple[str, ...], Population]
 """Populations by the effects of their hypothesis; no effect is the baseline."""
 
 _EDITION = 2
-"""Counted up whenever the engine, the catalogue or the layout below change what an atlas holds."""
+"""Counted up whenever the engine, an effect or the layout below change what an atlas holds."""
 
 _SEED = 1
 """Of the places in an atlas, which stay where they are from one edition to the next."""
@@ -73,7 +73,7 @@ def make_atlas(
     file = (
         None
         if cache is None
-        else cache / f"{'rare' if rare else 'atlas'}-{_fingerprint(unit, coarse)}.npz"
+        else cache / f"{'rare' if rare else 'atlas'}-{_fingerprint(unit, coarse, rare)}.npz"
     )
     if file is not None and (known := _read(file)) is not None:
         return known
@@ -126,9 +126,10 @@ def _denser(u: float, hypothesis: Hypothesis) -> float:
     return 0.5 + 0.5 * float(np.sign(x) * abs(x) ** 1.5)
 
 
-def _fingerprint(unit: Unit, coarse: Observation) -> str:
+def _fingerprint(unit: Unit, coarse: Observation, rare: bool) -> str:
     plans = [asdict(plan) for plan, _ in coarse.plans]
-    text = json.dumps([_EDITION, unit.model_dump(mode="json"), plans], sort_keys=True)
+    causes = [hypothesis.effects for hypothesis in every_single_cause(unit, rare)]
+    text = json.dumps([_EDITION, causes, unit.model_dump(mode="json"), plans], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:24]
 
 

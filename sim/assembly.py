@@ -38,7 +38,7 @@ class Law(IntEnum):
     FRICTION = 1
     """p = -(T + T_s exp(-(y/w)^2)) sign(y), set-valued at rest. Parameters T, T_s, w."""
     EXCESS = 2
-    """p = clip(y, -limit, limit) - y. Parameter limit."""
+    """p = clip(z, -limit, limit) - z with z = y - centre. Parameters limit, centre."""
     CUBIC = 3
     """p = -k y^3. Parameter k."""
 

@@ -7,7 +7,8 @@ element never steps time and never looks at another element.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -28,6 +29,9 @@ __all__ = [
 ]
 
 Along = Mapping[str, float]
+
+_FAR = 1e4
+"""Voltage that no amplifier reaches, V: a law with one limit there acts on one side alone."""
 
 
 class Element(Protocol):
@@ -153,13 +157,30 @@ class ConstantTorque:
 class Amplifier:
     """Input voltage to motor voltage, equation (1), with optional lag, dead zone and clip.
 
-    In that order: the output stage is what is dead about zero and saturates.
+    In that order: the output stage is what is dead about zero and saturates, and what may
+    give `uneven` times as much where it is positive.
     """
 
     k_a: float
     tau_a: float = 0.0
     V_sat: float | None = None
     V_d: float = 0.0
+    uneven: float = 1.0
+
+    def kinks(self) -> Iterator[tuple[str, float, float, float]]:
+        """Name, weight, limit and centre of the `Law.EXCESS` that bend its characteristic."""
+        clip = math.inf if self.V_sat is None else self.V_sat
+        if self.V_d > 0.0:
+            # What exceeds the dead zone comes through, and nothing else does.
+            yield "amplifier_dead_zone", -1.0, self.V_d, 0.0
+        if self.uneven != 1.0:
+            yield "amplifier_uneven", 1.0 - self.uneven, _FAR, self.V_d - _FAR
+            if clip < math.inf:
+                above, below = self.V_d + clip / self.uneven, self.V_d + clip
+                yield "amplifier_above", self.uneven, _FAR, above - _FAR
+                yield "amplifier_below", 1.0, _FAR, _FAR - below
+        elif clip < math.inf:
+            yield "amplifier", 1.0, self.V_d + clip, 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,18 +210,14 @@ class Motor:
         else:
             assembly.add_input("i_a", linear * amplifier.k_a / self.L_a)
             looks_at, feedthrough = {}, amplifier.k_a
-        # What exceeds the dead zone comes through, less what exceeds the clip beyond it.
-        limits = {} if linear else {"amplifier_dead_zone": (-1.0, amplifier.V_d)}
-        if amplifier.V_sat is not None:
-            limits["amplifier"] = (1.0, amplifier.V_d + amplifier.V_sat)
-        for name, (sign, limit) in limits.items():
+        for name, weight, limit, centre in amplifier.kinks():
             assembly.add_law(
                 name,
                 Law.EXCESS,
-                {"i_a": sign / self.L_a},
+                {"i_a": weight / self.L_a},
                 looks_at,
                 feedthrough=feedthrough,
-                parameters=(limit,),
+                parameters=(limit, centre),
             )
 
 

@@ -294,7 +294,8 @@ def _solve(kind, stiffness, damping, own, parameters, j, y, ahead, force, lanes)
             force[j, s] = friction_force(y[j, s], ahead[0, s], most, own)
     elif kind == _EXCESS:
         for s in range(lanes):
-            force[j, s] = excess_force(y[j, s], ahead[0, s], parameters[at, s])
+            centre = parameters[at + 1, s]
+            force[j, s] = excess_force(y[j, s] - centre, ahead[0, s] - centre, parameters[at, s])
     else:
         for s in range(lanes):
             force[j, s] = cubic_force(y[j, s], ahead[0, s], force[j, s], parameters[at, s], own)

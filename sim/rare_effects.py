@@ -33,8 +33,8 @@ def _soften_mesh2(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetra
     return d.replacing("mesh2", k=v["k_2"])
 
 
-def _deaden(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrain:
-    amplifier = replace(d.elements["motor"].amplifier, V_d=v["V_d"])  # type: ignore[attr-defined]
+def _with_amplifier(d: Drivetrain, **changed: float) -> Drivetrain:
+    amplifier = replace(d.elements["motor"].amplifier, **changed)  # type: ignore[attr-defined]
     return d.replacing("motor", amplifier=amplifier)
 
 
@@ -86,7 +86,17 @@ RARE = (
         "The amplifier gives nothing about zero.",
         "an output stage without enough bias, or a switching stage with much dead time",
         "look at the motor's voltage at a low level with an oscilloscope; it stands still at zero",
-        on_drivetrain=_deaden,
+        on_drivetrain=lambda d, unit, v: _with_amplifier(d, V_d=v["V_d"]),
+        rare=True,
+    ),
+    Effect(
+        "amplifier-unevenness",
+        (_P("scale", "1", span(0.5, 2.0), (1e-6, math.inf)),),
+        "chain",
+        "The amplifier gives another voltage one way than the other.",
+        "one half of its output stage weak, or the gains of its halves trimmed apart",
+        "put the same direct voltage on its input either way and read the motor's with a meter",
+        on_drivetrain=lambda d, unit, v: _with_amplifier(d, uneven=v["scale"]),
         rare=True,
     ),
     Effect(

@@ -46,6 +46,7 @@ CASES = {
     "mesh2-stiffness:k_2=8e3": {"k_2": 8e3},
     "gear-ratio:N_1=5": {"N_1": 5.0},
     "amplifier-dead-zone:V_d=0.5": {"V_d": 0.5},
+    "amplifier-unevenness:scale=1.3": {"u_p": 0.3},
     "reading-delay:T_d=1e-3": {"late_s": 1e-3},
 }  # fmt: skip
 

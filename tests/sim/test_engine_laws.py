@@ -4,12 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 from side_by_side import drive, law_parameters, rows_of
 
 from sim.assembly import Assembly, Law
 from sim.elements import (
+    Amplifier,
     ConstantTorque,
     Damper,
     DryFriction,
@@ -155,29 +156,63 @@ def test_stribeck_break_away_needs_the_peak():
         assert (abs(at(system, state, "q'")[0]) > 1e-9) == moves
 
 
-def test_excess_clips_the_drive_to_the_series_of_a_clipped_sine():
+def bent_drive(laws, peak=8.0, f=100.0, rate=2.0 * math.pi * 300.0):
+    """Harmonics of a sine of some peak that laws bend, before a low pass."""
     assembly = Assembly()
     assembly.add_signal("v")
-    rate, gain, limit = 2.0 * math.pi * 300.0, 4.0, 3.0
     assembly.add_coupling("v", "v", -rate)
-    assembly.add_input("v", gain * rate)
-    assembly.add_law("clip", Law.EXCESS, {"v": rate}, {}, feedthrough=gain, parameters=(limit,))
-    system = assembly.build(output={"v": 1.0})
-    f = 100.0
-    kept, _ = drive(system, [0.0], f, 1, amplitude=2.0, settle=10)
-    peak = gain * 2.0
+    assembly.add_input("v", 4.0 * rate)
+    for number, (weight, *parameters) in enumerate(laws):
+        assembly.add_law(
+            f"law {number}", Law.EXCESS, {"v": weight * rate}, {},
+            feedthrough=4.0, parameters=tuple(parameters),
+        )  # fmt: skip
+    kept, _ = drive(assembly.build(output={"v": 1.0}), [0.0], f, 1, amplitude=peak / 4.0, settle=10)
+    return kept[0, :, 0] * (1.0 + 2j * math.pi * np.arange(kept.shape[1]) * f / rate)
 
-    def series(h):
-        clipped = lambda x: min(max(peak * math.sin(x), -limit), limit) * math.sin(h * x)  # noqa: E731
-        kink = math.asin(limit / peak)
-        points = [kink, math.pi - kink]
-        return 2.0 / math.pi * quad(clipped, 0.0, math.pi, points=points)[0]
 
-    for h in (1, 3):
-        expected = series(h) / (1.0 + 2j * math.pi * h * f / rate)
-        assert kept[0, h, 0] == pytest.approx(expected, rel=1e-4)
-    assert abs(kept[0, 0, 0]) < 1e-6
-    assert abs(kept[0, 2, 0]) < 1e-6
+def series(bend, peak=8.0):
+    """Harmonics 0 to 3 of a bent sine, sine part and j times cosine part, from 2^16 samples."""
+    v = peak * np.sin(2.0 * math.pi * np.arange(2**16) / 2**16)
+    transform = np.fft.rfft([bend(one) for one in v])[:4] / 2**16
+    return np.array([transform[0].real, *(2j * transform[1:])])
+
+
+def test_excess_clips_the_drive_to_the_series_of_a_clipped_sine():
+    got = bent_drive([(1.0, 3.0)])
+    expected = series(lambda v: min(max(v, -3.0), 3.0))
+    assert got == pytest.approx(expected, abs=2e-4)
+    assert abs(got[0]) < 1e-6
+    assert abs(got[2]) < 1e-6
+
+
+AMPLIFIERS = {
+    "clip": Amplifier(1.0, V_sat=3.0),
+    "dead zone": Amplifier(1.0, V_d=1.5),
+    "dead zone and clip": Amplifier(1.0, V_sat=3.0, V_d=1.5),
+    "uneven": Amplifier(1.0, uneven=1.4),
+    "weak half": Amplifier(1.0, uneven=0.6),
+    "uneven, dead zone": Amplifier(1.0, V_d=1.5, uneven=1.4),
+    "uneven, clip": Amplifier(1.0, V_sat=3.0, uneven=1.4),
+    "uneven, dead zone, clip": Amplifier(1.0, V_sat=3.0, V_d=1.5, uneven=0.6),
+}
+
+
+@pytest.mark.parametrize("name", AMPLIFIERS)
+def test_an_amplifier_bends_a_sine_as_its_characteristic_says(name):
+    """Dead about zero, then more one way than the other, then cut off: in that order."""
+    amplifier = AMPLIFIERS[name]
+    clip = math.inf if amplifier.V_sat is None else amplifier.V_sat
+
+    def bend(v):
+        beyond = max(v - amplifier.V_d, 0.0) + min(v + amplifier.V_d, 0.0)
+        return min(max(beyond * (amplifier.uneven if beyond > 0.0 else 1.0), -clip), clip)
+
+    laws = [parts[1:] for parts in amplifier.kinks()]
+    if amplifier.V_d > 0.0:
+        # The motor takes what is linear away; a law that lets everything through does so here.
+        laws.append((1.0, 0.0, 0.0))
+    assert bent_drive(laws) == pytest.approx(series(bend), abs=5e-4)
 
 
 def test_cubic_spring_swings_with_the_period_of_duffing():
