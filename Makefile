@@ -85,6 +85,8 @@ $(READY): pyproject.toml requirements.lock
 	@$(BIN)/python -m pip install -qq --no-compile --disable-pip-version-check \
 	  --constraint requirements.lock --editable '.[dev]'
 	@echo "compiling the engine, once" >&2
-	@$(BIN)/python -c "from sim.response import SteppedServo; from sim.unit import load_unit; \
-	  SteppedServo(load_unit('adss'), 0.5).dwell(500.0, 1.0, 0.0, 1, 1)"
+	@$(BIN)/python -c "from daq.plan import SweepPlan; from sim.unit import load_unit; \
+	  from sim.response import Servo, simulate_cycles; \
+	  plan = SweepPlan((500.0,), (1.0,), settle_cycles=1, integrate_cycles=1); \
+	  [simulate_cycles([Servo.of(load_unit('adss'), 0.5)], plan, single=s) for s in (False, True)]"
 	@touch $@

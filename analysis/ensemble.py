@@ -88,7 +88,7 @@ def safe_cycles(
     """
     longest, *shorter = _STEPS_S
     return simulate_cycles(
-        servos, plan, longest_step_s=longest, shorter_steps_s=shorter, workers=workers
+        servos, plan, longest_step_s=longest, shorter_steps_s=shorter, single=True, workers=workers
     )
 
 

@@ -50,13 +50,17 @@ def fit_planes(
     `ridge` (p,) holds the slopes.
     """
     count, n, k = offset.shape
-    basis = np.concatenate([np.ones((count, 1, n)), offset.transpose(0, 2, 1)], axis=1)
-    weighed = basis * weight[:, None]
+    one = np.ones((count, 1, n), values.dtype)
+    basis = np.concatenate([one, offset.transpose(0, 2, 1)], axis=1, dtype=values.dtype)
+    weighed = basis * weight[:, None].astype(values.dtype)
     diagonal = np.column_stack([np.full(len(ridge), 1e-9), np.tile(ridge, (k, 1)).T])
     normal = weighed @ basis.transpose(0, 2, 1) + diagonal[:, :, None] * np.eye(k + 1)
-    inverse = np.linalg.inv(normal)
+    inverse = np.linalg.inv(normal).astype(values.dtype)
     coefficients = values @ weighed.transpose(0, 2, 1) @ inverse
-    return Planes(coefficients, (values - coefficients @ basis) ** 2, weighed, inverse)
+    squares = coefficients @ basis
+    np.subtract(values, squares, out=squares)
+    np.square(squares, out=squares)
+    return Planes(coefficients, squares, weighed, inverse)
 
 
 def regress(
@@ -76,19 +80,23 @@ def regress(
     weight, reach
         (p, n), (p,): how much each counts, and how far the kernel reaches, in widths.
     values
-        (p, c, n).
+        (p, c, n); the arithmetic has their precision.
     tailed
         Whether the scatter is that of Student's t, which a few runs far out do not
         blow up (slower), or a mean square.
     """
     # The ridge is for slopes in units of the kernel's reach.
     planes = fit_planes(offset, weight, _RIDGE * reach**2, values)
-    w, squares, weighed, inverse = weight[:, None], planes.squares, planes.weighed, planes.inverse
+    squares, weighed, inverse = planes.squares, planes.weighed, planes.inverse
+    w = weight[:, None].astype(values.dtype)
     total, most = w.sum(axis=2), w * squares
     variance = most.sum(axis=2) / total
+    # New arrays of this size would be asked of the system, and cost more than what fills them.
+    share = np.empty_like(most)
     for _ in range(_TAIL_ITERATIONS if tailed else 0):
         bound = TAIL * (TAIL_SCALE**2 * variance + 1e-12)
-        share = most / (squares + bound[:, :, None])
+        np.add(squares, bound[:, :, None], out=share)
+        np.divide(most, share, out=share)
         variance = (TAIL + 1.0) * variance * share.sum(axis=2) / total
     used = (inverse * (weighed @ weighed.transpose(0, 2, 1))).sum(axis=(1, 2))[:, None]
     variance *= total / np.maximum(total - used, 0.3 * total)

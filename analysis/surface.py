@@ -322,8 +322,12 @@ class Surface:
 
     @cached_property
     def _values(self) -> NDArray[np.float64]:
-        """(rows, 3, n): the differences, 0 where nothing was observed."""
-        return np.ascontiguousarray(np.nan_to_num(self.difference).transpose(2, 1, 0))
+        """(rows, 3, n): the differences, 0 where nothing was observed.
+
+        In single precision: seven digits of a difference are more than it deserves.
+        """
+        known = np.nan_to_num(self.difference).transpose(2, 1, 0)
+        return np.ascontiguousarray(known, dtype=np.float32)
 
 
 def _distance(offset: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -12,8 +12,12 @@ from typing import Any
 
 import llvmlite.binding as llvm
 import numba
+import numpy as np
 from numba import njit
+from numba.core import ir, types
 from numba.core.compiler import Compiler
+from numba.core.compiler_machinery import FunctionPass, register_pass
+from numba.core.untyped_passes import FindLiterallyCalls
 
 __all__ = ["law", "loop", "njit", "part"]
 
@@ -36,10 +40,46 @@ def _ask_for_whole_vectors() -> None:
         settings.CPU_FEATURES = f"{features.flatten()},-prefer-256-bit"
 
 
-class _Apart(Compiler):
-    """Compiles functions whose array arguments do not overlap, as a promise and unchecked."""
+@register_pass(mutates_CFG=False, analysis_only=False)
+class _SinglePrecision(FunctionPass):
+    """Makes constants single where the arrays are.
 
-    def define_pipelines(self):
+    One double constant makes a double of all that it meets, and half as many go into a vector.
+    """
+
+    _name = "single_precision"
+
+    def __init__(self) -> None:
+        super().__init__()
+
+    def run_pass(self, state: Any) -> bool:
+        dtypes = {a.dtype for a in state.args if isinstance(a, types.Array)}
+        if types.float32 not in dtypes:
+            return False
+        for block in state.func_ir.blocks.values():
+            for assign in block.find_insts(ir.Assign):
+                constant = assign.value
+                if isinstance(constant, ir.Const) and isinstance(constant.value, float):
+                    assign.value = ir.Const(np.float32(constant.value), constant.loc)
+        return True
+
+
+class _OfOnePrecision(Compiler):
+    """Compiles functions that work in the precision of their array arguments."""
+
+    def define_pipelines(self) -> list[Any]:
+        managers = super().define_pipelines()
+        for manager in managers:
+            # After this pass the laws stand where they were called.
+            manager.add_pass_after(_SinglePrecision, FindLiterallyCalls)
+            manager.finalize()
+        return managers
+
+
+class _Apart(_OfOnePrecision):
+    """The same where array arguments do not overlap, as a promise and unchecked."""
+
+    def define_pipelines(self) -> list[Any]:
         self.state.flags.noalias = True
         return super().define_pipelines()
 
@@ -52,5 +92,7 @@ law = njit(inline="always", fastmath=_FLAGS, error_model="numpy")
 part = njit(pipeline_class=_Apart, forceinline=True, fastmath=_FLAGS, error_model="numpy")
 """For a part of a loop, inlined by the machine's compiler; its arrays must not overlap."""
 
-loop = njit(cache=True, fastmath=_FLAGS, error_model="numpy", nogil=True)
+loop = njit(
+    cache=True, pipeline_class=_OfOnePrecision, fastmath=_FLAGS, error_model="numpy", nogil=True
+)
 """For a whole loop, kept on disk; other threads run beside it."""

@@ -30,7 +30,7 @@ __all__ = [
 
 Along = Mapping[str, float]
 
-_FAR = 1e4
+_FAR = 1e3
 """Voltage that no amplifier reaches, V: a law with one limit there acts on one side alone."""
 
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,6 +83,7 @@ def advance(
     state: NDArray[np.float64],
     stretches: Sequence[Stretch],
     longest_step_s: float = LONGEST_STEP_S,
+    single: bool = False,
 ) -> Iterator[Motion]:
     """Carry trajectories through stretches, one after the other.
 
@@ -97,6 +99,9 @@ def advance(
         What is driven, in order.
     longest_step_s
         Upper bound of the time step, s.
+    single
+        Step in single precision, at half of the cost; for what is judged by its distribution.
+        A system without usable modes is stepped in double all the same.
 
     Yields
     ------
@@ -104,9 +109,11 @@ def advance(
         One per stretch, as soon as it is done.
     """
     modes = find_modes(system)
+    # The states of stiff springs hardly differ: their differences need all digits.
+    precision = np.float32 if single and modes.rates.size else np.float64
     for stretch in stretches:
         propagator = build_propagator(system, modes, stretch.frequency_hz, longest_step_s)
-        motion = _dwell(system, modes, propagator, parameters, state, stretch)
+        motion = _dwell(system, modes, propagator, parameters, state, stretch, precision)
         state = motion.state
         yield motion
 
@@ -118,6 +125,7 @@ def _dwell(
     parameters: NDArray[np.float64],
     state: NDArray[np.float64],
     stretch: Stretch,
+    precision: type[np.floating],
 ) -> Motion:
     lanes = state.shape[1]
     coefficients = np.empty((stretch.integrate_cycles, HARMONICS, lanes), dtype=complex)
@@ -132,7 +140,7 @@ def _dwell(
         picked = np.resize(kept, width)
         sums, tops, ends = _run_block(
             system, modes, propagator, tables, parameters[..., picked], state[:, picked],
-            stretch, picked,
+            stretch, picked, precision,
         )  # fmt: skip
         own = slice(0, len(kept))
         coefficients[..., kept] = _coefficients(sums, propagator.steps_per_cycle)[..., own]
@@ -233,6 +241,7 @@ def _run_block(
     state: NDArray[np.float64],
     stretch: Stretch,
     picked: NDArray[np.int64],
+    precision: type[np.floating],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     offset = stretch.offset[picked]
     phasor = stretch.amplitude[picked] * np.exp(1j * stretch.phase[picked])
@@ -244,17 +253,20 @@ def _run_block(
     through[:-1] += direct * phasor
     constant = np.vstack([direct * offset, np.zeros_like(offset)])
     coordinates = _times(modes.weights, state - forced.imag)
-    sums = np.zeros((stretch.integrate_cycles, 7, len(picked)))
-    peak = np.zeros(len(picked))
+    waves = np.stack([through.real, through.imag, constant], axis=1)
+    drift = propagator.drift[:, None] + propagator.offset_drift[:, None] * offset
+    own = partial(np.ascontiguousarray, dtype=precision)
+    q, y = own(coordinates), own(seen)
+    sums = np.zeros((stretch.integrate_cycles, 7, len(picked)), precision)
+    peak = np.zeros(len(picked), precision)
     step_cycles(
-        propagator.carry, tables.push,
-        propagator.drift[:, None] + propagator.offset_drift[:, None] * offset,
-        tables.look, tables.gain, tables.kinds, tables.fixed, parameters.reshape(-1, len(picked)),
-        np.stack([through.real, through.imag, constant], axis=1).reshape(-1, len(picked)),
-        tables.waves,
-        tables.order, stretch.settle_cycles, coordinates, seen, sums, peak,
+        own(propagator.carry), own(tables.push), own(drift), own(tables.look), own(tables.gain),
+        tables.kinds, own(tables.fixed), own(parameters.reshape(-1, len(picked))),
+        own(waves.reshape(-1, len(picked))), own(tables.waves), tables.order,
+        stretch.settle_cycles, q, y, sums, peak,
     )  # fmt: skip
-    return sums, peak, _times(modes.shapes, coordinates) + forced.imag
+    end = _times(modes.shapes, q.astype(float)) + forced.imag
+    return sums.astype(float), peak.astype(float), end
 
 
 def _times(matrix: NDArray[np.float64], columns: NDArray) -> NDArray:

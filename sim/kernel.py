@@ -101,7 +101,7 @@ def friction_force(w0, ahead, most, beta):
     sign = 1.0 if start > 0.0 else -1.0
     slid = sign * ahead - beta * most
     before = abs(w0)
-    share = before / (before - min(slid, -1e-300))
+    share = before / (before - min(slid, -1e-30))
     turned = most * sign * (1.0 - 2.0 * share)
     stopped = -ahead / beta
     crossing = stopped if abs(ahead - w0) <= beta * most else turned
@@ -369,16 +369,16 @@ def step_cycles(carry, push, drift_in, look, gain, kinds, fixed, parameters, wav
             others[j, j + 1] = 0.0
             others[j + 1, j] = 0.0
     ticks = table.shape[0]
-    q = np.zeros((look.shape[1], MOST_LANES))
-    spare = np.zeros((look.shape[1], MOST_LANES))
-    drift = np.zeros((p, MOST_LANES))
-    force = np.zeros((push.shape[1], MOST_LANES))
-    free = np.zeros((m + 1, MOST_LANES))
-    y = np.zeros((m + 1, MOST_LANES))
-    ahead = np.zeros((2, MOST_LANES))
-    wave = np.zeros((3 * (m + 1), MOST_LANES))
-    constant = np.zeros((3 * m, MOST_LANES))
-    total = np.zeros((8, MOST_LANES))
+    q = np.zeros((look.shape[1], MOST_LANES), start.dtype)
+    spare = np.zeros((look.shape[1], MOST_LANES), start.dtype)
+    drift = np.zeros((p, MOST_LANES), start.dtype)
+    force = np.zeros((push.shape[1], MOST_LANES), start.dtype)
+    free = np.zeros((m + 1, MOST_LANES), start.dtype)
+    y = np.zeros((m + 1, MOST_LANES), start.dtype)
+    ahead = np.zeros((2, MOST_LANES), start.dtype)
+    wave = np.zeros((3 * (m + 1), MOST_LANES), start.dtype)
+    constant = np.zeros((3 * m, MOST_LANES), start.dtype)
+    total = np.zeros((8, MOST_LANES), start.dtype)
     for s in range(lanes):
         for i in range(p):
             q[i, s] = start[i, s]

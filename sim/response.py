@@ -142,6 +142,7 @@ def simulate_cycles(
     *,
     longest_step_s: float = LONGEST_STEP_S,
     shorter_steps_s: Sequence[float] = (),
+    single: bool = False,
     workers: int | None = None,
     point_done: Callable[[], None] = lambda: None,
 ) -> list[NDArray[np.complex128]]:
@@ -152,6 +153,8 @@ def simulate_cycles(
     shorter_steps_s
         Longest steps that are tried in turn where a motion grows without bound; servos that
         share their linear part with it go along, all others keep theirs.
+    single
+        Step in single precision, at half of the cost (`sim.engine.advance`).
     point_done
         Called after each frequency of each group, from the thread that simulated it.
 
@@ -180,8 +183,8 @@ def simulate_cycles(
         *steps, last = longest_step_s, *shorter_steps_s
         for step in steps:
             with suppress(AnalysisError):
-                return _sweep(group, part, step, point_done)
-        return _sweep(group, part, last, point_done)
+                return _sweep(group, part, step, single, point_done)
+        return _sweep(group, part, last, single, point_done)
 
     tasks = [(group, share) for group in groups for share in shares]
     with ThreadPoolExecutor(workers) as pool:
@@ -268,6 +271,7 @@ def _sweep(
     servos: Sequence[Servo],
     plan: SweepPlan,
     longest_step_s: float,
+    single: bool,
     point_done: Callable[[], None],
 ) -> NDArray[np.complex128]:
     """(servos, levels, points, cycles, 4) of servos that share their linear part."""
@@ -286,9 +290,11 @@ def _sweep(
     kept = np.empty(shape, dtype=complex)
     motions: Iterator[Motion]
     if plan.from_rest:
-        motions = (next(advance(system, parameters, start, [s], longest_step_s)) for s in stretches)
+        motions = (
+            next(advance(system, parameters, start, [s], longest_step_s, single)) for s in stretches
+        )
     else:
-        motions = advance(system, parameters, start, stretches, longest_step_s)
+        motions = advance(system, parameters, start, stretches, longest_step_s, single)
     for i, motion in enumerate(motions):
         _require_finite(motion.coefficients, visited[i])
         kept[i] = motion.coefficients / amplitude

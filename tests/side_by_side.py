@@ -57,7 +57,7 @@ def law_parameters(system, lanes=1):
 
 
 def drive(system, state, frequency_hz, cycles, amplitude=0.0, offset=0.0, step_s=5e-6, settle=0,
-          parameters=None):  # fmt: skip
+          parameters=None, single=False):  # fmt: skip
     """Coefficients (cycles, 4, lanes) in V, and the state at the end (n, lanes)."""
     state = np.array(state, dtype=float).reshape(len(system.states), -1)
     lanes = state.shape[1]
@@ -65,7 +65,7 @@ def drive(system, state, frequency_hz, cycles, amplitude=0.0, offset=0.0, step_s
     stretch = Stretch(frequency_hz, amplitude * one, 0.0 * one, offset * one, settle, cycles)
     if parameters is None:
         parameters = law_parameters(system, lanes)
-    (motion,) = advance(system, parameters, state, [stretch], step_s)
+    (motion,) = advance(system, parameters, state, [stretch], step_s, single)
     return motion.coefficients, motion.state
 
 
@@ -78,11 +78,13 @@ def rows_of(system, **coordinates):
 
 
 def engine_gain(unit, ratio, frequency_hz, level, settle, cycles, effects=(), offset=0.0,
-                step_s=5e-6):  # fmt: skip
+                step_s=5e-6, single=False):  # fmt: skip
     """Per-cycle V_o over the level (cycles, 4) from zeros, as the oracle gives it."""
     system = drivetrain_with(unit, ratio, effects).system()
     start = np.zeros(len(system.states))
-    kept, _ = drive(system, start, frequency_hz, cycles, level, offset, step_s, settle)
+    kept, _ = drive(
+        system, start, frequency_hz, cycles, level, offset, step_s, settle, single=single
+    )
     return kept[..., 0] / level
 
 

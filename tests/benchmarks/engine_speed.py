@@ -44,6 +44,7 @@ def main() -> None:
     parser.add_argument("--lanes", type=int, nargs="+", default=[1, 8, 16, 32, 64, 256])
     parser.add_argument("--repeats", type=int, default=15)
     parser.add_argument("--step-us", type=float, default=1e6 * LONGEST_STEP_S)
+    parser.add_argument("--single", action="store_true", help="step in single precision")
     options = parser.parse_args()
     step_s = 1e-6 * options.step_us
 
@@ -66,7 +67,9 @@ def main() -> None:
             _, state = drive(system, state, frequency, 10, amplitude=2.5, step_s=step_s)
             spent = least(
                 options.repeats,
-                lambda s=system, x=state, f=frequency: drive(s, x, f, CYCLES, 2.5, step_s=step_s),
+                lambda s=system, x=state, f=frequency: drive(
+                    s, x, f, CYCLES, 2.5, step_s=step_s, single=options.single
+                ),
             )
             simulated = lanes * CYCLES / frequency
             print(f"{name:6}{lanes:7d}{1e9 * spent / steps / lanes:14.1f}{simulated / spent:15.0f}")

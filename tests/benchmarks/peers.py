@@ -67,7 +67,7 @@ def case(unit, ratio: float, c_s1: float, frequency: float, settle: int) -> Case
     return Case(unit, ratio, c_s1, frequency, state[:13], kept[4:, 1].mean())
 
 
-def engine(lanes: int, step_s: float) -> Method:
+def engine(lanes: int, step_s: float, single: bool = False) -> Method:
     """This project's engine."""
 
     def run(one: Case, cycles: int):
@@ -82,7 +82,9 @@ def engine(lanes: int, step_s: float) -> Method:
         spread = np.random.default_rng(0).standard_normal(lanes - 1)
         start[system.states.index("th_L"), 1:] += 1e-6 * spread
         began = time.process_time()
-        kept, _ = drive(system, start, one.frequency_hz, cycles, LEVEL, step_s=step_s)
+        kept, _ = drive(
+            system, start, one.frequency_hz, cycles, LEVEL, step_s=step_s, single=single
+        )
         return kept[:, 1, 0] / LEVEL, (time.process_time() - began) / lanes
 
     return run
@@ -148,6 +150,7 @@ def speed(method: Method, one: Case, cycles: int, repeats: int) -> float:
 def fixed_steps(repeats: int) -> list[tuple[str, Method, int, int]]:
     """Name, method, cycles, repeats."""
     return [
+        ("lashbench, 64 lanes, 10 us, single", engine(64, 1e-5, single=True), 20, repeats),
         ("lashbench, 64 lanes, 10 us", engine(64, 1e-5), 20, repeats),
         ("lashbench, 64 lanes, 5 us", engine(64, 5e-6), 20, repeats),
         ("lashbench, 1 lane, 5 us", engine(1, 5e-6), 20, repeats),

@@ -35,7 +35,8 @@ from side_by_side import ADSS, drive
 from sim.drivetrain import paper_drivetrain
 system = paper_drivetrain(ADSS, 0.25).system()
 began, used = time.perf_counter(), time.process_time()
-drive(system, np.zeros(len(system.states)), 1000.0, 1, amplitude=1.0)
+for single in (False, True):
+    drive(system, np.zeros(len(system.states)), 1000.0, 1, amplitude=1.0, single=single)
 print(time.perf_counter() - began, time.process_time() - used)
 """
 TABLE2 = """
@@ -122,7 +123,12 @@ def measure(folder: Path, only: list[str]) -> list[tuple[str, str, Cost]]:
     code = COMPILE.format(tests=tests)
     compiled = {"NUMBA_CACHE_DIR": str(folder / "numba")}
     add("help", "lashbench --help", "0.25 s", lambda: run([COMMAND, "--help"]), 7)
-    add("compile", "compiling the engine, once", "10 s", lambda: inside(code, **compiled))
+    add(
+        "compile",
+        "compiling the engine in both precisions, once",
+        "10 s",
+        lambda: inside(code, **compiled),
+    )
     add("compile", "loading what was compiled", "", lambda: inside(code, **compiled), 3)
     add("table2", "Table 2, exact engine, 100 cycles, one draw", "3 s", lambda: inside(TABLE2), 2)
     if only and not {"estimate", "diagnose"} & set(only):

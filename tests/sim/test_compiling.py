@@ -61,3 +61,33 @@ def test_a_part_is_compiled_in_whole_vectors():
     assert WISH in numba.config.CPU_FEATURES
     (assembly,) = _scaled_twice.inspect_asm().values()
     assert "zmm" in assembly
+
+
+@compiling.law
+def _third(x):
+    return 0.1 * x + 1.0 / 3.0
+
+
+@compiling.part
+def _take_thirds(source, target):
+    for i in range(source.shape[0]):
+        target[i] = _third(source[i])
+
+
+@numba.njit(pipeline_class=compiling._OfOnePrecision)
+def _thirds(source, target):
+    _take_thirds(source, target)
+    for i in range(source.shape[0]):
+        target[i] *= 0.7
+
+
+@pytest.mark.parametrize("precision", [np.float32, np.float64])
+def test_constants_have_the_precision_of_the_arrays(precision):
+    source = np.linspace(0.0, 1.0, 1000).astype(precision)
+    target = np.zeros_like(source)
+    _thirds(source, target)
+    tenth, third, last = (precision(c) for c in (0.1, 1.0 / 3.0, 0.7))
+    assert np.allclose(target, (tenth * source + third) * last, rtol=4.0 * np.finfo(precision).eps)
+    (signature,) = (s for s in _thirds.signatures if s[0].dtype.name == np.dtype(precision).name)
+    # A single double constant would widen the vectors, and narrow what comes out.
+    assert ("double" in _thirds.inspect_llvm(signature)) == (precision is np.float64)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from oracle import rk4
+from permutation import permutation_p
 from side_by_side import (
     ADSS,
     EDSS,
@@ -44,8 +45,6 @@ def test_agrees_with_the_oracle_where_motion_is_periodic(case, frequency_hz):
 
 SETTLE, KEPT = 8, 16
 ENGINE_RUNS, ORACLE_RUNS = 32, 8
-FLOOR = 0.01
-"""Differences well below this share of the gain do not count: both sides have a step."""
 
 
 def starts(unit, ratio, runs, rng):
@@ -74,49 +73,6 @@ def oracle_runs(unit, ratio, f, rng, step_s):
         )
         runs.append(kept[SETTLE:, 1])
     return np.array(runs)
-
-
-def mean_and_scatter(cycles):
-    """Of each run (runs, cycles): real and imaginary mean over the pooled gain, log of scatter."""
-    scale = np.abs(cycles.mean())
-    mean = cycles.mean(axis=1)
-    scatter = np.sqrt((np.abs(cycles - mean[:, None]) ** 2).mean(axis=1))
-    return (
-        np.stack([mean.real, mean.imag], axis=1) / scale,
-        np.log(scatter / scale + FLOOR)[:, None],
-    )
-
-
-def apart(values, first):
-    """Squared distance of two group means in units of the pooled spread; `first` picks one group.
-
-    `values` (runs, k), `first` (permutations, runs) of zeros and ones.
-    """
-    spread = np.sqrt(values.var(axis=0) + FLOOR**2)
-    whole = values / spread
-    one = first @ whole / first.sum(axis=1, keepdims=True)
-    other = (1.0 - first) @ whole / (1.0 - first).sum(axis=1, keepdims=True)
-    return np.sum((one - other) ** 2, axis=1)
-
-
-PERMUTATIONS = 4999
-
-
-def permutation_p(groups, rng):
-    """P-values that engine and oracle differ in mean and in scatter, over all frequencies.
-
-    `groups` holds (engine cycles, oracle cycles) per frequency. If both come
-    from one distribution the labels are exchangeable within a frequency, so
-    p <= a happens with probability a at most, whatever the distribution is.
-    """
-    totals = np.zeros((2, PERMUTATIONS + 1))
-    for ours, theirs in groups:
-        labels = np.repeat([1.0, 0.0], [len(ours), len(theirs)])
-        first = np.tile(labels, (PERMUTATIONS + 1, 1))
-        first[1:] = rng.permuted(first[1:], axis=1)
-        for row, values in enumerate(mean_and_scatter(np.concatenate([ours, theirs]))):
-            totals[row] += apart(values, first)
-    return (totals >= totals[:, :1]).mean(axis=1)
 
 
 BANDS = {
