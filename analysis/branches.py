@@ -72,12 +72,20 @@ class Motions:
         Of those in the observed state one row before: what is observed of a
         level begins on one branch and then stays there or changes.
         """
+        before, both, prior = self._course
+        return np.asarray(np.log((weight @ both + prior) / (weight @ before + _PRIOR)))
+
+    @cached_property
+    def _course(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Whether runs (n, rows) did as observed one row before, and there too; the prior (rows,).
+
+        The prior is that of the latter, as a number of runs.
+        """
         before = np.where(self.starts, 1.0, np.roll(self.alike, 1, axis=1))
         changed = (self.seen != np.roll(self.seen, 1)) & ~self.starts
         prior = np.where(self.starts, 0.5, np.where(changed, 1.0 - _STAY, _STAY))
         prior[self.seen < 0] = 1.0
-        both = weight @ (before * self.alike)
-        return np.asarray(np.log((both + _PRIOR * prior) / (weight @ before + _PRIOR)))
+        return before, before * self.alike, _PRIOR * prior
 
 
 def find_motions(observation: Observation, population: Population) -> Motions:

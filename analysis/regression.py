@@ -43,7 +43,7 @@ def fit_planes(
     offset: NDArray[np.float64],
     weight: NDArray[np.float64],
     ridge: NDArray[np.float64],
-    values: NDArray[np.float64],
+    values: NDArray,
 ) -> Planes:
     """Planes through values (p, c, n) at offsets (1 or p, n, k), with weights (p, n).
 
@@ -52,7 +52,7 @@ def fit_planes(
     count, n, k = offset.shape
     one = np.ones((count, 1, n), values.dtype)
     basis = np.concatenate([one, offset.transpose(0, 2, 1)], axis=1, dtype=values.dtype)
-    weighed = basis * weight[:, None].astype(values.dtype)
+    weighed = basis * weight[:, None].astype(values.dtype, copy=False)
     diagonal = np.column_stack([np.full(len(ridge), 1e-9), np.tile(ridge, (k, 1)).T])
     normal = weighed @ basis.transpose(0, 2, 1) + diagonal[:, :, None] * np.eye(k + 1)
     inverse = np.linalg.inv(normal).astype(values.dtype)
@@ -67,7 +67,7 @@ def regress(
     offset: NDArray[np.float64],
     weight: NDArray[np.float64],
     reach: NDArray[np.float64],
-    values: NDArray[np.float64],
+    values: NDArray,
     *,
     tailed: bool,
 ) -> tuple[NDArray, NDArray]:
@@ -88,7 +88,7 @@ def regress(
     # The ridge is for slopes in units of the kernel's reach.
     planes = fit_planes(offset, weight, _RIDGE * reach**2, values)
     squares, weighed, inverse = planes.squares, planes.weighed, planes.inverse
-    w = weight[:, None].astype(values.dtype)
+    w = weight[:, None].astype(values.dtype, copy=False)
     total, most = w.sum(axis=2), w * squares
     variance = most.sum(axis=2) / total
     # New arrays of this size would be asked of the system, and cost more than what fills them.

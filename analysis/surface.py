@@ -140,24 +140,25 @@ class Surface:
         mixed = self.motions.mixed
         if not mixed.all():
             pick = self._reach(weights.sum(axis=1))
-            near = weights[pick] > 0.0
-            # Weighted alike, all rows are one problem.
-            values = self._values[~mixed][:, :, near].reshape(1, -1, np.count_nonzero(near))
-            reach = _WIDENINGS[[pick]]
+            (near,) = np.nonzero(weights[pick])
             one, other = regress(
-                offset[:, near], weights[pick, near][None], reach, values, tailed=self.tailed
+                offset[:, near],
+                weights[pick, near][None],
+                _WIDENINGS[[pick]],
+                self._parted[0].take(near, axis=2),
+                tailed=self.tailed,
             )
             mean[:, ~mixed], variance[:, ~mixed] = one.reshape(-1, 3).T, other.reshape(-1, 3).T
         if mixed.any():
             alike = self.alike[:, mixed]
             picks = self._reach(weights @ alike)
             weight = weights[picks] * alike.T
-            near = weight.max(axis=0) > 0.0
+            (near,) = np.nonzero(weight.max(axis=0))
             one, other = regress(
                 offset[:, near],
-                weight[:, near],
+                weight.take(near, axis=1),
                 _WIDENINGS[picks],
-                self._values[mixed][:, :, near],
+                self._parted[1].take(near, axis=2),
                 tailed=self.tailed,
             )
             mean[:, mixed] = one.T
@@ -187,20 +188,16 @@ class Surface:
         """Agreement at a place, deviations fitted to some rows (all where None)."""
         offset = self._offset(place)
         mean, std = self._expected(offset)
-        gain = np.zeros((1, *mean.shape))
-        gain[0, 0] = 1.0
-        slopes = np.concatenate([self.slopes, gain])
-        sigmas = np.append(self.sigmas, GAIN_TOLERANCE)
+        slopes, sigmas = self._leanings
         seen = np.isfinite(mean)
         if rows is not None:
             seen &= rows
-        y, s, slope = -mean[seen], TAIL_SCALE * std[seen], slopes[:, seen]
-        best = np.zeros(len(sigmas))
+        y, slope, least = -mean[seen], slopes[:, seen], np.diag(1.0 / sigmas**2)
+        s2, best = (TAIL_SCALE * std[seen]) ** 2, np.zeros(len(sigmas))
         for _ in range(_ITERATIONS):
-            z2 = ((y - best @ slope) / s) ** 2
-            trust = (TAIL + 1.0) / (TAIL + z2) / s**2
-            normal = (slope * trust) @ slope.T + np.diag(1.0 / sigmas**2)
-            best = np.linalg.solve(normal, (slope * trust) @ y)
+            trusted = slope * ((TAIL + 1.0) / (TAIL * s2 + (y - best @ slope) ** 2))
+            normal = trusted @ slope.T + least
+            best = np.linalg.solve(normal, trusted @ y)
         residual = -mean - np.tensordot(best, slopes, axes=1)
         density = self.log_density(-residual, std)
         # Of runs near the place so many do as was observed.
@@ -321,7 +318,23 @@ class Surface:
         return np.stack([noise**2, noise**2, 0.0 * noise]) + _FLOOR[:, None] ** 2
 
     @cached_property
-    def _values(self) -> NDArray[np.float64]:
+    def _parted(self) -> tuple[NDArray, NDArray]:
+        """The values (1, columns, n) of rows where all runs do as was observed; (rows, 3, n) else.
+
+        Weighted alike, the former are one problem.
+        """
+        mixed = self.motions.mixed
+        return self._values[~mixed].reshape(1, -1, len(self.places)), self._values[mixed]
+
+    @cached_property
+    def _leanings(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The slopes (k + 1, 3, rows) and sigmas (k + 1,), those of the tachometer's gain last."""
+        gain = np.zeros((1, *self.difference.shape[1:]))
+        gain[0, 0] = 1.0
+        return np.concatenate([self.slopes, gain]), np.append(self.sigmas, GAIN_TOLERANCE)
+
+    @cached_property
+    def _values(self) -> NDArray:
         """(rows, 3, n): the differences, 0 where nothing was observed.
 
         In single precision: seven digits of a difference are more than it deserves.
