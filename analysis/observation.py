@@ -37,6 +37,9 @@ _QUIET_SHARE = 0.02
 USUAL_NOISE_V = 5e-4
 """What a bench adds to each component of a reading, where nothing else is known, V."""
 
+LEAST_NOISE_V = 1e-4
+"""What any bench adds: digits below it, which only a simulated file has, tell no machines apart."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observation:
@@ -120,6 +123,8 @@ def observe(response: FrequencyResponse) -> Observation:
     frequency = np.concatenate([part.frequency_hz for part in parts])
     scatter = np.concatenate([part.gain_std_db for part in parts]) / DB_PER_NEPER
     scatter = scatter * np.sqrt(2.0 / _components(response))
+    least = np.sqrt(2.0) * LEAST_NOISE_V / (np.abs(gain) * level)
+    scatter = np.where(scatter > 0, np.maximum(scatter, least), scatter)
     noise_v = _reading_noise(scatter * np.abs(gain) * level)
     log_gain = np.log(gain)
     with np.errstate(divide="ignore"):

@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from analysis.observation import channels_of_readings, observe, readings_of_cycles
+from analysis.observation import (
+    LEAST_NOISE_V,
+    channels_of_readings,
+    observe,
+    readings_of_cycles,
+)
 from daq.errors import AnalysisError
 from daq.frf import DB_PER_NEPER, FrequencyResponse, PointFlag
 
@@ -91,6 +96,17 @@ def test_noise_is_that_of_the_quietest_points():
         f, 2.5, gain, unit="ADSS", gain_std_db=DB_PER_NEPER * scatter
     )
     assert observe(one).noise_v == pytest.approx(5e-4, rel=0.1)
+
+
+def test_a_file_without_noise_is_read_as_by_the_best_of_benches():
+    quiet, loud, unknown = 1e-12, 1.0, 0.0
+    one = response((2.0,), gain=np.full(3, 0.1 + 0j), gain_std_db=np.array([quiet, loud, unknown]))
+    seen = observe(one)
+    least = np.sqrt(2.0) * LEAST_NOISE_V / (2.0 * 0.1)
+    np.testing.assert_allclose(np.exp(seen.values[2, :2]), [least, loud / DB_PER_NEPER])
+    assert np.isnan(seen.values[2, 2])
+    silent = observe(response(gain_std_db=np.full(6, quiet)))
+    assert silent.noise_v == pytest.approx(LEAST_NOISE_V)
 
 
 def test_simulated_channels_show_mean_scatter_and_noise():
