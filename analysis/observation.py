@@ -37,8 +37,9 @@ _QUIET_SHARE = 0.02
 USUAL_NOISE_V = 5e-4
 """What a bench adds to each component of a reading, where nothing else is known, V."""
 
-LEAST_NOISE_V = 1e-4
-"""What any bench adds: digits below it, which only a simulated file has, tell no machines apart."""
+LEAST_NOISE = 3e-5
+"""What any analyser adds, as a share of the largest voltage that it reads: 90 dB below its range.
+Digits beyond, which a simulated file has, tell no machines apart that a bench could."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,9 +124,10 @@ def observe(response: FrequencyResponse) -> Observation:
     frequency = np.concatenate([part.frequency_hz for part in parts])
     scatter = np.concatenate([part.gain_std_db for part in parts]) / DB_PER_NEPER
     scatter = scatter * np.sqrt(2.0 / _components(response))
-    least = np.sqrt(2.0) * LEAST_NOISE_V / (np.abs(gain) * level)
+    volts = np.abs(gain) * level
+    least = np.sqrt(2.0) * LEAST_NOISE * np.max(volts) / volts
     scatter = np.where(scatter > 0, np.maximum(scatter, least), scatter)
-    noise_v = _reading_noise(scatter * np.abs(gain) * level)
+    noise_v = _reading_noise(scatter * volts)
     log_gain = np.log(gain)
     with np.errstate(divide="ignore"):
         log_scatter = np.where(scatter > 0, np.log(scatter), np.nan)
@@ -134,7 +136,7 @@ def observe(response: FrequencyResponse) -> Observation:
         source_vpk=level,
         frequency_hz=frequency,
         noise_v=noise_v,
-        noise=noise_v / (level * np.abs(gain)),
+        noise=noise_v / volts,
         loudest_v=noise_v,
         plans=_plans(response, level, frequency),
     )

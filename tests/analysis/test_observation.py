@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.observation import (
-    LEAST_NOISE_V,
+    LEAST_NOISE,
     channels_of_readings,
     observe,
     readings_of_cycles,
@@ -98,15 +98,17 @@ def test_noise_is_that_of_the_quietest_points():
     assert observe(one).noise_v == pytest.approx(5e-4, rel=0.1)
 
 
-def test_a_file_without_noise_is_read_as_by_the_best_of_benches():
+def test_a_file_without_noise_is_read_as_by_the_best_of_analysers():
     quiet, loud, unknown = 1e-12, 1.0, 0.0
-    one = response((2.0,), gain=np.full(3, 0.1 + 0j), gain_std_db=np.array([quiet, loud, unknown]))
+    gain = np.array([0.2, 0.1, 0.1], dtype=complex)
+    one = response((2.0,), gain=gain, gain_std_db=np.array([loud, quiet, unknown]))
     seen = observe(one)
-    least = np.sqrt(2.0) * LEAST_NOISE_V / (2.0 * 0.1)
-    np.testing.assert_allclose(np.exp(seen.values[2, :2]), [least, loud / DB_PER_NEPER])
+    # The loudest reading sets the range; half as loud a one shows twice the share of noise.
+    least = np.sqrt(2.0) * LEAST_NOISE * 0.2 / 0.1
+    np.testing.assert_allclose(np.exp(seen.values[2, :2]), [loud / DB_PER_NEPER, least])
     assert np.isnan(seen.values[2, 2])
-    silent = observe(response(gain_std_db=np.full(6, quiet)))
-    assert silent.noise_v == pytest.approx(LEAST_NOISE_V)
+    silent = observe(response((1.0, 4.0), gain_std_db=np.full(6, quiet)))
+    assert silent.noise_v == pytest.approx(LEAST_NOISE * 0.1 * 4.0)
 
 
 def test_simulated_channels_show_mean_scatter_and_noise():
