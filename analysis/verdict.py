@@ -150,27 +150,31 @@ class Verdict:
         """Sets near the best one that say something else, and might be the explanation.
 
         Among them that nothing is hidden, which has a wider margin. A set that would be no
-        explanation if it led is none as a rival, nor is one that says the same with more sizes.
+        explanation if it led is none as a rival, nor is one that says the same with more sizes:
+        what is believed of that counts for the best.
         """
-        return tuple(one for one in self.judged if self._is_rival(one))
+        said = [self.best.score, *(one.score for one in self.judged if self._says_the_same(one))]
+        believed = HEAT * float(np.logaddexp.reduce(np.array(said) / HEAT))
+        return tuple(one for one in self.judged if self._is_rival(one, believed))
 
     def remark(self, one: Judged) -> str:
         """What speaks against a set, or makes it no rival; empty where nothing does."""
         if one.refused:
             return one.objection
-        if one.adequate and is_felt_alike(one.candidate, self.best.candidate):
-            return "says the same with more sizes"
-        return ""
+        return "says the same with more sizes" if self._says_the_same(one) else ""
 
-    def _is_rival(self, one: Judged) -> bool:
-        behind, best = self.best.score - one.score, set(self.best.effects)
+    def _says_the_same(self, one: Judged) -> bool:
+        return one.adequate and is_felt_alike(one.candidate, self.best.candidate)
+
+    def _is_rival(self, one: Judged, believed: float) -> bool:
+        behind, best = believed - one.score, set(self.best.effects)
         if not one.effects:
-            return bool(best) and one.adequate and behind < _SURE
+            return bool(best) and one.adequate and self.best.score - one.score < _SURE
         other = not set(one.effects) <= best and not set(one.effects) >= best
         rarer = one.candidate.hypothesis.rare - self.best.candidate.hypothesis.rare
         if not other or not one.adequate or behind - _RARE * max(rarer, 0) >= _RIVAL:
             return False
-        return not is_felt_alike(one.candidate, self.best.candidate)
+        return not self._says_the_same(one)
 
 
 def judge_candidates(

@@ -150,6 +150,22 @@ def test_another_set_is_a_rival_while_it_has_a_seventh_and_explains(behind, adeq
     assert [one.effects for one in verdict.rivals] == rivals
 
 
+@pytest.mark.parametrize(("alike", "rivals"), [(True, []), (False, ["same", "other"])])
+def test_what_says_the_same_counts_for_the_best(alike, rivals, monkeypatch):
+    found = judge(seen(TRUE, 1), ((), TRUE, WRONG), 1)
+    (wrong,) = (one for one in found.judged if one.effects == WRONG)
+    wrong = replace(wrong, objection="")
+    same, other = (
+        replace(wrong, candidate=replace(wrong.candidate), score=found.best.score - behind)
+        for behind in (10.0, 26.0)
+    )
+    monkeypatch.setattr(rules, "is_felt_alike", lambda one, _: alike and one is same.candidate)
+    # Half as likely again, the best is 32 ahead of the other, of which 30 are asked.
+    verdict = replace(found, judged=(found.best, same, other, found.baseline))
+    names = {id(same): "same", id(other): "other"}
+    assert [names[id(one)] for one in verdict.rivals] == rivals
+
+
 @pytest.mark.parametrize(
     ("size", "steep", "pressed"),
     [(1.0, 400.0, True), (1.0, 200.0, False), (0.97, 400.0, False), (0.0, -400.0, True),
