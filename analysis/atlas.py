@@ -2,7 +2,8 @@
 
 Owns the coarse look that a search starts from. It depends on the unit and the
 plan of the sweep alone, not on what was measured, so that it can be kept in a
-folder and read again. It judges nothing.
+folder and read again; those of the paper's units in their usual sweeps come with
+lashbench. It judges nothing.
 """
 
 from __future__ import annotations
@@ -23,9 +24,10 @@ from analysis.causes import Hypothesis, every_single_cause
 from analysis.executor import Executor
 from analysis.observation import Observation
 from analysis.population import Group, Population, simulate_groups
+from daq.configs import atlas_folder
 from sim.unit import Unit
 
-__all__ = ["Atlas", "coarse_stride", "make_atlas"]
+__all__ = ["Atlas", "atlas_name", "coarse_stride", "make_atlas", "simulate_atlas", "write_atlas"]
 
 Atlas = dict[tuple[str, ...], Population]
 """Populations by the effects of their hypothesis; no effect is the baseline."""
@@ -61,27 +63,43 @@ def make_atlas(
     *,
     rare: bool = False,
 ) -> Atlas:
-    """Simulate the atlas of a unit for the plan of a thinned observation, or read it from `cache`.
+    """The atlas of a unit for the plan of a thinned observation.
 
-    Of the baseline and every usual cause, or of every rare one.
+    Read where it was kept, in `cache` or among those that come with lashbench; else simulated,
+    and kept in `cache`.
 
     Raises
     ------
     AnalysisError
         If a motion grew without bound.
     """
-    file = (
-        None
-        if cache is None
-        else cache / f"{'rare' if rare else 'atlas'}-{_fingerprint(unit, coarse, rare)}.npz"
-    )
-    if file is not None and (known := _read(file)) is not None:
-        return known
-    rng = np.random.default_rng(_SEED)
-    atlas = simulate_groups(unit, list(_groups(unit, rng, rare)), coarse, rng, executor, progress)
-    if file is not None:
-        _write(file, atlas)
+    name = atlas_name(unit, coarse, rare)
+    for folder in (cache, atlas_folder()):
+        if folder is not None and (known := _read(folder / name)) is not None:
+            return known
+    atlas = simulate_atlas(unit, coarse, executor, progress, rare=rare)
+    if cache is not None:
+        write_atlas(cache / name, atlas)
     return atlas
+
+
+def simulate_atlas(
+    unit: Unit,
+    coarse: Observation,
+    executor: Executor | None = None,
+    progress: Callable[[float], None] | None = None,
+    *,
+    rare: bool = False,
+) -> Atlas:
+    """Simulate the baseline and every usual cause, or every rare one.
+
+    Raises
+    ------
+    AnalysisError
+        If a motion grew without bound.
+    """
+    rng = np.random.default_rng(_SEED)
+    return simulate_groups(unit, list(_groups(unit, rng, rare)), coarse, rng, executor, progress)
 
 
 def _groups(unit: Unit, rng: np.random.Generator, rare: bool) -> Iterator[Group]:
@@ -126,14 +144,16 @@ def _denser(u: float, hypothesis: Hypothesis) -> float:
     return 0.5 + 0.5 * float(np.sign(x) * abs(x) ** 1.5)
 
 
-def _fingerprint(unit: Unit, coarse: Observation, rare: bool) -> str:
+def atlas_name(unit: Unit, coarse: Observation, rare: bool = False) -> str:
+    """File name of an atlas, another for everything that it depends on."""
     plans = [asdict(plan) for plan, _ in coarse.plans]
     causes = [hypothesis.effects for hypothesis in every_single_cause(unit, rare)]
     text = json.dumps([_EDITION, causes, unit.model_dump(mode="json"), plans], sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:24]
+    mark = hashlib.sha256(text.encode()).hexdigest()[:24]
+    return f"{'rare' if rare else 'atlas'}-{mark}.npz"
 
 
-def _write(file: Path, atlas: Atlas) -> None:
+def write_atlas(file: Path, atlas: Atlas) -> None:
     """Keep an atlas; a cache that cannot be written costs time later and nothing else."""
     names = {f"{'+'.join(key)}|{field}": getattr(one, field)
              for key, one in atlas.items() for field in Population.__slots__}  # fmt: skip

@@ -1,4 +1,4 @@
-"""Where the files that come with lashbench are found: units, benches, recipes, sample data.
+"""Where the files that come with lashbench are found: units, benches, recipes, samples, atlases.
 
 Installed as a wheel they lie inside the package, in a checkout (an editable
 install) in `configs/` beside it. This module finds and lists files; it never
@@ -13,7 +13,7 @@ from typing import Literal
 
 from daq.errors import ConfigurationError
 
-__all__ = ["config_names", "config_path", "sample_names", "sample_path"]
+__all__ = ["atlas_folder", "config_names", "config_path", "sample_names", "sample_path"]
 
 Kind = Literal["units", "benches", "recipes", "paper", "templates"]
 
@@ -70,3 +70,8 @@ def sample_path(name: str) -> Path:
             f"sample {name!r} was not found; use one of: {', '.join(sample_names())}"
         )
     return _root() / "samples" / f"{name}.csv"
+
+
+def atlas_folder() -> Path:
+    """The folder of the simulations that come with lashbench, see `analysis.atlas`."""
+    return _root() / "atlases"
