@@ -21,6 +21,7 @@ from analysis.chart import Chart
 from analysis.executor import Executor
 from analysis.holdout import AT_NOISE, hold_out
 from analysis.hunt import Hunt, Starts
+from analysis.likeness import is_felt_alike
 from analysis.observation import Observation
 from analysis.pairs import look_at_felt, search_pairs
 from analysis.parts import earns, parts_of, places_of_parts
@@ -359,12 +360,21 @@ def _is_nothing_missing(fine: Hunt, rng: np.random.Generator) -> bool:
 
 
 def _third(rough: Hunt) -> list[Effects]:
-    """Who is looked at on all rows: the leaders, the parts of the first, and the baseline."""
+    """Who is looked at on all rows: the leaders, the parts of the first, and the baseline.
+
+    Who says the same as a leader with fewer sizes, too.
+    """
     leading = [k for k in rough.leading(len(rough.found), _TOO_FAR) if earns(k, rough.found)]
     leading = leading[:_THIRD]
+    hopeful = rough.leading(len(rough.found), _HOPELESS)
     others = [*parts_of(leading[0], rough.found), rough.best_single]
-    hopeful = set(rough.leading(len(rough.found), _HOPELESS))
+    others += [key for key in hopeful if _is_plainer(rough.found[key], leading, rough)]
     return _with_baseline([*leading, *(key for key in others if key in hopeful)])
+
+
+def _is_plainer(candidate: Candidate, leading: Sequence[Effects], rough: Hunt) -> bool:
+    """Whether it says with fewer sizes what a leader says: it is to be there when one is named."""
+    return any(is_felt_alike(rough.found[key], candidate) for key in leading)
 
 
 def _with_baseline(keys: Sequence[Effects]) -> list[Effects]:

@@ -143,6 +143,32 @@ def test_a_payload_is_held_against_two_causes_at_the_load_that_it_may_stand_for(
     assert taken == ([found[pair]] if taken_over else [])
 
 
+@pytest.mark.parametrize(
+    ("f_p", "behind", "taken"), [(5.0, 299.0, True), (5.0, 301.0, False), (0.9, 299.0, False)]
+)
+def test_who_says_the_same_as_a_leader_with_fewer_sizes_is_looked_at_with_it(f_p, behind, taken):
+    """A payload far above all that was measured is a heavier load; one amid it is a payload."""
+    payload, load = ("payload-flexibility",), ("load-inertia",)
+    behind_by = {payload: 0.0, ("motor-constant",): 5.0, load: behind, (): 100.0}
+    hypothesis = Hypothesis(ADSS, payload)
+    place = hypothesis.place(0.4, [0.2 * ADSS.load.J_L, f_p * synthetic.FREQUENCIES[-1], 0.02])
+    seen = SimpleNamespace(frequency_hz=synthetic.FREQUENCIES)
+
+    def standing(effects):
+        one = Hypothesis(ADSS, effects)
+        best = SimpleNamespace(place=place if effects == payload else np.full(one.d, 0.5))
+        return SimpleNamespace(hypothesis=one, best=best, surface=SimpleNamespace(observation=seen))
+
+    def leading(most, within):
+        ranked = sorted(behind_by, key=behind_by.get)
+        return [key for key in ranked if behind_by[key] <= within][:most]
+
+    found = {key: standing(key) for key in behind_by}
+    rough = SimpleNamespace(found=found, leading=leading, best_single=payload)
+    expected = [payload, ("motor-constant",), (), *([load] if taken else [])]
+    assert sorted(search._third(rough)) == sorted(expected)
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_part_that_was_looked_at_elsewhere_is_weighed_where_the_pair_has_it(runs, seed):
     pair, part = ("amplifier-lag", "load-inertia"), ("load-inertia",)
