@@ -99,11 +99,14 @@ def least(repeats: int, work) -> Cost:
 
 
 def sweep(folder: Path) -> Path:
-    """A simulated sweep of ADSS at 3 levels and 61 points, as a bench reads it."""
+    """A simulated sweep of ADSS at 3 levels and 61 points, as a bench reads it.
+
+    At levels of its own: for the usual ones an atlas comes with lashbench.
+    """
     file = folder / "sweep.csv"
     words = ["simulate", "--unit", "adss", "--ratio", "0.4", "--start", "100", "--stop", "180",
              "--points", "61", "--out", str(file)]  # fmt: skip
-    run([COMMAND, *words, "--level", "1.5", "--level", "2.5", "--level", "4"])
+    run([COMMAND, *words, "--level", "1.4", "--level", "2.4", "--level", "3.8"])
     return file
 
 
@@ -148,7 +151,7 @@ def measure(folder: Path, only: list[str]) -> list[tuple[str, str, Cost]]:
 
 
 def table(rows: list[tuple[str, str, Cost]]) -> list[str]:
-    """The rows for the page; a goal is judged by the clock, and by what two idle cores allow."""
+    """The rows for the page; a goal is judged by the clock."""
     lines = [
         "| what | goal | clock, as measured | processor | memory | reached |",
         "| --- | --- | --- | --- | --- | --- |",
@@ -169,9 +172,7 @@ def judged(goal: str, cost: Cost) -> str:
     bound = float(goal.split()[0])
     if cost.wall_s <= bound:
         return "yes"
-    over = f"missed {cost.wall_s / bound:.1f}-fold by the clock"
-    # What is parallel at best: half the processor time on two cores.
-    return over + (", not by half the processor time" if 0.5 * cost.cpu_s <= bound else "")
+    return f"missed {cost.wall_s / bound:.1f}-fold by the clock"
 
 
 def main() -> None:
