@@ -209,7 +209,8 @@ def _look_beside(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator
     kept = kept[: _BESIDE_CLOSER[0]]
     if kept:
         fine.take_over([rough.found[key] for key in kept], _THIRD_GROUPS)
-        if set(kept) & set(fine.leading(len(fine.found), _CLOSE)):
+        _catch_up(fine, kept, leader)
+        if fine.best.hypothesis.effects != leader:
             _compare(fine, rng)
 
 
@@ -234,15 +235,23 @@ def _hold_rare(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator) 
     if not kept:
         return
     fine.take_over([rough.found[key] for key in kept], _THIRD_GROUPS)
-    enough = min(len(fine.found[leader].population), _ENOUGH)
-    near = set(kept)
-    while near := near & set(fine.leading(len(fine.found), _CLOSE)):
-        near = {key for key in near if len(fine.found[key].population) < enough}
-        _settle(fine, sorted(near))
+    _catch_up(fine, kept, leader)
     if leader not in fine.leading(len(fine.found), _CLOSE):
         # Less of a lead does not make up for being rare (`analysis.verdict`).
         _compare(fine, rng)
     _see_it_predict(fine)
+
+
+def _catch_up(fine: Hunt, newcomers: Collection[Effects], leader: Effects) -> None:
+    """Give those that come close to a leader as many runs as it has, while they stay close.
+
+    All others were compared with it before.
+    """
+    enough = min(len(fine.found[leader].population), _ENOUGH)
+    near = set(newcomers)
+    while near := near & set(fine.leading(len(fine.found), _CLOSE)):
+        near = {key for key in near if len(fine.found[key].population) < enough}
+        _settle(fine, sorted(near))
 
 
 def _narrow(rough: Hunt, starts: Starts, closer: int, groups: tuple[int, int]) -> list[Effects]:

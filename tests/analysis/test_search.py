@@ -112,7 +112,9 @@ def test_a_payload_is_held_against_two_causes_at_the_load_that_it_may_stand_for(
 
     def standing(effects, likelihood):
         best = SimpleNamespace(place=None, log_likelihood=likelihood)
-        return SimpleNamespace(best=best, hypothesis=Hypothesis(ADSS, effects))
+        return SimpleNamespace(
+            best=best, hypothesis=Hypothesis(ADSS, effects), population=range(40)
+        )
 
     found = {key: standing(key, 110.0), part: standing(part, 90.0)}
     looked, taken = [], []
@@ -126,7 +128,7 @@ def test_a_payload_is_held_against_two_causes_at_the_load_that_it_may_stand_for(
     )
     fine = SimpleNamespace(
         best=found[key],
-        found={},
+        found={key: found[key]},
         observation=None,
         take_over=lambda candidates, groups: taken.extend(candidates),
         leading=lambda most, behind: [],
@@ -334,6 +336,68 @@ def test_who_wants_a_size_that_no_bench_has_is_left_aside_after_two_rounds(
     monkeypatch.setattr(search, "_settle", lambda _, chosen: settled.append(chosen))
     assert search._compare(fine, None)
     assert settled == [[leader, near]] * rounds
+
+
+@pytest.mark.parametrize(
+    ("of_leader", "behind", "rounds", "left"),
+    [
+        # The leader's runs, or enough, and no more; none where they show that it is not close.
+        (120, [20.0, 20.0, 20.0], 2, 120), (121, [20.0] * 4, 3, 160), (400, [0.0] * 9, 7, 320),
+        (120, [20.0, 31.0], 1, 80), (120, [31.0], 0, 40), (40, [20.0, 20.0], 0, 40),
+    ],
+)  # fmt: skip
+def test_a_newcomer_that_is_close_gets_as_many_runs_as_the_leader(of_leader, behind, rounds, left):
+    leader, pair, other = ("load-inertia",), ("amplifier-lag", "load-inertia"), ("motor-constant",)
+    runs, settled = {leader: of_leader, pair: 40, other: 40}, []
+
+    class Fine:
+        """One whose newcomer stands elsewhere after each round of runs."""
+
+        found = property(
+            lambda _: {key: SimpleNamespace(population=range(n)) for key, n in runs.items()}
+        )
+
+        def leading(self, most, within):
+            here = behind[min(len(settled), len(behind) - 1)] <= within
+            return [leader, other, *([pair] if here else [])]
+
+        def settle(self, chosen, groups):
+            settled.append(chosen)
+            for key in chosen:
+                runs[key] += 40
+
+    search._catch_up(Fine(), [pair], leader)
+    assert settled == [[pair]] * rounds
+    assert runs == {leader: of_leader, pair: left, other: 40}
+
+
+@pytest.mark.parametrize("ahead", [True, False])
+def test_all_are_compared_anew_where_a_pair_takes_the_lead_behind_a_cause(monkeypatch, ahead):
+    pair, leader, compared = ("amplifier-lag", "load-inertia"), ("load-inertia",), []
+    found = {
+        key: SimpleNamespace(hypothesis=Hypothesis(ADSS, key), population=range(40))
+        for key in (leader, pair)
+    }
+    fine = SimpleNamespace(best=found[leader], observation=None, found={leader: found[leader]})
+    fine.leading = lambda most, behind: [leader]
+
+    def take_over(candidates, groups):
+        fine.best = found[pair] if ahead else found[leader]
+
+    fine.take_over = take_over
+    rough = SimpleNamespace(
+        unit=ADSS, observation=SimpleNamespace(frequency_hz=None), found=found,
+        among=list,
+    )  # fmt: skip
+    alone = {leader: Place(None, 100.0)}
+    monkeypatch.setattr(search, "screen_singles", lambda *_: alone)
+    monkeypatch.setattr(search, "add_causes", lambda *_: SimpleNamespace(felt=[]))
+    monkeypatch.setattr(search, "screen_pairs", lambda *_: {pair: Place(None, 100.0)})
+    monkeypatch.setattr(search, "_narrow", lambda *_: [pair])
+    monkeypatch.setattr(search, "hold_out", lambda *_: SimpleNamespace(rms_sigma=1.0))
+    monkeypatch.setattr(search, "_compare", lambda *_: compared.append(fine.best))
+    search._look_beside(rough, fine, {leader: None}, None)
+    assert compared == ([found[pair]] if ahead else [])
 
 
 def test_who_has_runs_enough_gets_no_more_to_be_compared_by():
