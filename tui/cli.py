@@ -54,17 +54,22 @@ _INTERRUPTED = 130
 
 
 def build_app() -> App:
-    """Build the parser with all verbs, none of them imported."""
+    """Build the parser with all verbs, none of them imported.
+
+    The list of verbs is plain text, for importing a reader of markdown takes a third of
+    `--help`; the verbs' own help is written in it.
+    """
     app = App(
         name="lashbench",
         help=_SUMMARY,
         help_epilogue=_EPILOGUE,
         version=lambda: version("lashbench"),
         default_parameter=Parameter(negative=()),
+        help_format="plaintext",
         result_action="return_value",
     )
     for name, (target, summary) in VERBS.items():
-        app.command(target, name=name, help=summary)
+        app.command(target, name=name, help=summary, help_format="markdown")
     return app
 
 
