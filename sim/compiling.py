@@ -86,13 +86,29 @@ class _Apart(_OfOnePrecision):
 
 _ask_for_whole_vectors()
 
+# Numba's own types do not know these two; its compiler does.
+_NOT_FROM_PYTHON: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_NOT_FROM_C: dict[str, Any] = {"no_cfunc_wrapper": True}
+
 law = njit(inline="always", fastmath=_FLAGS, error_model="numpy")
 """For a scalar law, inlined by numba."""
 
-part = njit(pipeline_class=_Apart, forceinline=True, fastmath=_FLAGS, error_model="numpy")
-"""For a part of a loop, inlined by the machine's compiler; its arrays must not overlap."""
+part = njit(
+    pipeline_class=_Apart,
+    forceinline=True,
+    fastmath=_FLAGS,
+    error_model="numpy",
+    **_NOT_FROM_PYTHON,
+)
+"""For a part of a loop, inlined by the machine's compiler; its arrays must not overlap. It cannot
+be called from Python: what that takes is a tenth of the time to compile."""
 
 loop = njit(
-    cache=True, pipeline_class=_OfOnePrecision, fastmath=_FLAGS, error_model="numpy", nogil=True
+    cache=True,
+    pipeline_class=_OfOnePrecision,
+    fastmath=_FLAGS,
+    error_model="numpy",
+    nogil=True,
+    **_NOT_FROM_C,
 )
 """For a whole loop, kept on disk; other threads run beside it."""
