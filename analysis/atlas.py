@@ -14,7 +14,6 @@ import os
 import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -146,9 +145,10 @@ def _denser(u: float, hypothesis: Hypothesis) -> float:
 
 def atlas_name(unit: Unit, coarse: Observation, rare: bool = False) -> str:
     """File name of an atlas, another for everything that it depends on."""
-    plans = [asdict(plan) for plan, _ in coarse.plans]
     causes = [hypothesis.effects for hypothesis in every_single_cause(unit, rare)]
-    text = json.dumps([_EDITION, causes, unit.model_dump(mode="json"), plans], sort_keys=True)
+    text = json.dumps(
+        [_EDITION, causes, unit.model_dump(mode="json"), coarse.sweeps()], sort_keys=True
+    )
     mark = hashlib.sha256(text.encode()).hexdigest()[:24]
     return f"{'rare' if rare else 'atlas'}-{mark}.npz"
 

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from analysis.ensemble import Machine
 from analysis.executor import Executor
-from analysis.fit import RATIO, Axis, Posterior, fit_posterior
+from analysis.fit import Posterior, fit_posterior
+from analysis.lattice import RATIO, Axis
 from analysis.observation import observe
 from analysis.paper_estimate import IndexCurve, index_curve_of_response
 from analysis.progress import Progress

@@ -59,8 +59,8 @@ def read_families(
     families: Sequence[Family],
     executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
-) -> Readings:
-    """Readings of the machines of families, one or more, in their order.
+) -> list[Readings]:
+    """Readings of the machines of each family, in their order.
 
     Parameters
     ----------
@@ -74,5 +74,4 @@ def read_families(
     AnalysisError
         If a motion grew without bound even at the shortest step.
     """
-    parts = (executor or LocalExecutor()).each(read_family, families, progress)
-    return np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
+    return (executor or LocalExecutor()).each(read_family, families, progress) if families else []

@@ -1,8 +1,9 @@
 """Runs of many machines through the plan of an observation, kept for the next measurement.
 
 Owns what is simulated once for a unit and a plan and read again whenever a
-measurement takes the same sweep: means and scatters, free of any bench's noise.
-It chooses no machines and judges none.
+measurement takes the same sweep: means and scatters, free of any bench's noise,
+a file for each family. Those of the paper's units in their usual sweeps come
+with lashbench. It chooses no machines and judges none.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 
@@ -22,12 +24,15 @@ from analysis.ensemble import Draws, Machine
 from analysis.executor import Executor
 from analysis.family import Family, Readings, read_families
 from analysis.observation import Observation
+from daq.configs import kept_runs
 from sim.unit import Unit
 
-__all__ = ["run_families"]
+__all__ = ["run_families", "run_name", "write_runs"]
 
-_EDITION = 1
+_EDITION = 2
 """Counted up whenever the engine or the layout below change what is kept."""
+
+Folder = Path | zipfile.Path
 
 
 def run_families(
@@ -44,7 +49,8 @@ def run_families(
     Parameters
     ----------
     cache
-        Folder that keeps the runs; what is found there costs no simulation.
+        Folder that keeps the runs; what is found there or comes with lashbench costs no
+        simulation.
     executor
         Where they are simulated; this machine's cores if not given.
 
@@ -53,39 +59,61 @@ def run_families(
     AnalysisError
         If a motion grew without bound even at the shortest step.
     """
-    machines = tuple(machine for family in families for machine in family)
-    file = None if cache is None else cache / f"runs-{_mark(unit, machines, observation)}.npz"
-    known = None if file is None else _read(file, (len(machines), len(observation)))
-    if known is None:
-        tasks = [Family(unit, tuple(family), observation.plans) for family in families]
-        known = read_families(tasks, executor, progress)
-        if file is not None:
-            _write(file, known)
-    return Draws(machines, *known)
+    names = [run_name(unit, family, observation) for family in families]
+    shapes = [(len(family), len(observation)) for family in families]
+    kept = [folder for folder in (cache, _shipped()) if folder is not None]
+    known = [_find(kept, *asked) for asked in zip(names, shapes, strict=True)]
+    missing = [i for i, one in enumerate(known) if one is None]
+    tasks = [Family(unit, tuple(families[i]), observation.plans) for i in missing]
+    for i, made in zip(missing, read_families(tasks, executor, progress), strict=True):
+        known[i] = made
+        if cache is not None:
+            _keep(cache / names[i], made)
+    parts = [one for one in known if one is not None]
+    return Draws(
+        tuple(machine for family in families for machine in family),
+        np.concatenate([mean for mean, _ in parts]),
+        np.concatenate([variance for _, variance in parts]),
+    )
 
 
-def _mark(unit: Unit, machines: Sequence[Machine], observation: Observation) -> str:
-    plans = [[asdict(plan), rows.tolist()] for plan, rows in observation.plans]
-    known = [_EDITION, unit.model_dump(mode="json"), plans, [asdict(m) for m in machines]]
-    return hashlib.sha256(json.dumps(known, sort_keys=True).encode()).hexdigest()[:24]
+def run_name(unit: Unit, family: Sequence[Machine], observation: Observation) -> str:
+    """File name of a family's runs, another for everything that they depend on."""
+    machines = [asdict(machine) for machine in family]
+    known = [_EDITION, unit.model_dump(mode="json"), observation.sweeps(), machines]
+    mark = hashlib.sha256(json.dumps(known, sort_keys=True).encode()).hexdigest()[:24]
+    return f"runs-{mark}.npz"
 
 
-def _write(file: Path, readings: Readings) -> None:
+def write_runs(stream: IO[bytes], readings: Readings) -> None:
+    """Write the runs of a family as they are read again."""
+    np.savez_compressed(stream, mean=readings[0], variance=readings[1])
+
+
+def _shipped() -> Folder | None:
+    """The runs that come with lashbench, one file for them all."""
+    with suppress(OSError, zipfile.BadZipFile):
+        return zipfile.Path(kept_runs())
+    return None
+
+
+def _keep(file: Path, readings: Readings) -> None:
     """Keep runs; a cache that cannot be written costs time later and nothing else."""
     part = file.with_suffix(f".{os.getpid()}.part")
     with suppress(OSError):
         file.parent.mkdir(parents=True, exist_ok=True)
         with part.open("wb") as stream:
-            np.savez(stream, mean=readings[0], variance=readings[1])
+            write_runs(stream, readings)
         part.replace(file)
 
 
-def _read(file: Path, shape: tuple[int, int]) -> Readings | None:
+def _find(folders: Sequence[Folder], name: str, shape: tuple[int, int]) -> Readings | None:
     """Kept runs, or None where there are none that can be read whole."""
-    try:
-        with file.open("rb") as stream, np.load(stream, allow_pickle=False) as kept:
-            mean, variance = kept["mean"], kept["variance"]
-    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile):
-        return None
-    whole = mean.shape == variance.shape == shape and mean.dtype == complex
-    return (mean, variance) if whole and np.all(np.isfinite(variance)) else None
+    for folder in folders:
+        with suppress(OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile):
+            with (folder / name).open("rb") as stream, np.load(stream, allow_pickle=False) as kept:
+                mean, variance = kept["mean"], kept["variance"]
+            whole = mean.shape == variance.shape == shape and mean.dtype == complex
+            if whole and np.all(np.isfinite(variance)):
+                return mean, variance
+    return None

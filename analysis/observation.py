@@ -7,7 +7,8 @@ little damping silences them. It simulates nothing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,6 +70,17 @@ class Observation:
         starts = np.flatnonzero(np.diff(self.source_vpk, prepend=np.nan) != 0)
         ends = [*starts[1:], len(self)]
         return tuple(slice(int(a), int(b)) for a, b in zip(starts, ends, strict=True))
+
+    def sweeps(self) -> list[tuple[dict[str, Any], list[int]]]:
+        """Plans and their rows as JSON, by which a sweep is known again.
+
+        Frequencies to six digits: files round them, and a millionth changes no motion.
+        """
+        known = []
+        for plan, rows in self.plans:
+            grid = tuple(float(f"{hz:.6g}") for hz in plan.frequencies_hz)
+            known.append((asdict(replace(plan, frequencies_hz=grid)), rows.tolist()))
+        return known
 
     def thinned(self, stride: int) -> Observation:
         """Every `stride`-th frequency of each level only."""

@@ -107,13 +107,10 @@ def simulate_groups(
         )
         families.append(Family(unit, machines, observation.plans))
         deviations.append(np.tile(off, (len(group.ratios), 1)))
-    mean, variance = read_families(families, executor, progress)
+    readings = read_families(families, executor, progress)
     found: dict[tuple[str, ...], Population] = {}
-    start = 0
-    for group, off in zip(groups, deviations, strict=True):
-        rows = slice(start, start + len(off))
-        start = rows.stop
-        made = Population(group.places, off, mean[rows], variance[rows])
+    for group, off, (mean, variance) in zip(groups, deviations, readings, strict=True):
+        made = Population(group.places, off, mean, variance)
         key = group.hypothesis.effects
         found[key] = found[key].joined(made) if key in found else made
     return found

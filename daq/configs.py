@@ -13,7 +13,14 @@ from typing import Literal
 
 from daq.errors import ConfigurationError
 
-__all__ = ["atlas_folder", "config_names", "config_path", "sample_names", "sample_path"]
+__all__ = [
+    "atlas_folder",
+    "config_names",
+    "config_path",
+    "kept_runs",
+    "sample_names",
+    "sample_path",
+]
 
 Kind = Literal["units", "benches", "recipes", "paper", "templates"]
 
@@ -73,5 +80,10 @@ def sample_path(name: str) -> Path:
 
 
 def atlas_folder() -> Path:
-    """The folder of the simulations that come with lashbench, see `analysis.atlas`."""
+    """The folder of the atlases that come with lashbench, see `analysis.atlas`."""
     return _root() / "atlases"
+
+
+def kept_runs() -> Path:
+    """The archive of the runs that come with lashbench, see `analysis.library`."""
+    return _root() / "runs.zip"

@@ -1,24 +1,34 @@
-"""The atlases that come with lashbench, of the paper's units in their usual sweeps.
+"""The simulations that come with lashbench, of the paper's units in their usual sweeps.
 
-``python tests/atlases.py`` simulates them anew into configs/atlases, which is due when the
-engine, an effect or the edition of an atlas has changed; tests say when.
+``python tests/atlases.py`` makes them anew, the atlases of a diagnosis in configs/atlases and the
+runs of an estimate in configs/runs.zip, which is due when the engine, an effect or an edition
+has changed; tests say when.
 """
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 from hidden import BANDS_HZ, LEVELS_VPK
 from numpy.typing import NDArray
 
 from analysis.atlas import Atlas, atlas_name, coarse_stride, simulate_atlas, write_atlas
+from analysis.ensemble import Draws
+from analysis.family import Family, read_families
+from analysis.lattice import RATIO, Families, every_family
+from analysis.library import run_name, write_runs
 from analysis.observation import Observation, unread
+from analysis.population import Population
 from daq.plan import SweepPlan, spaced_frequencies
 from sim.unit import load_unit
 
 FOLDER = Path(__file__).parents[1] / "configs" / "atlases"
+RUNS = FOLDER.parent / "runs.zip"
 POINTS = 61
 
 BITS = 11
@@ -26,22 +36,30 @@ BITS = 11
 
 VARIANCE_BITS = 7
 
+FLIPS = 19_999
+"""Of signs, by which kept runs are compared with new ones."""
+
 
 def usual_sweep(unit: str, levels_vpk: tuple[float, ...] = LEVELS_VPK) -> Observation:
-    """What an atlas of a unit by name is made for: the coarse look at its usual sweep."""
-    whole = unread(SweepPlan(spaced_frequencies(*BANDS_HZ[unit], POINTS), levels_vpk), 1e-3)
+    """The usual sweep of a unit by name, before anything is read."""
+    return unread(SweepPlan(spaced_frequencies(*BANDS_HZ[unit], POINTS), levels_vpk), 1e-3)
+
+
+def coarse_sweep(unit: str, levels_vpk: tuple[float, ...] = LEVELS_VPK) -> Observation:
+    """The coarse look at it that an atlas is made for."""
+    whole = usual_sweep(unit, levels_vpk)
     return whole.thinned(coarse_stride(whole))
 
 
 def rounded(atlas: Atlas) -> Atlas:
     """The same readings with as many digits as they deserve, which a file keeps in a third."""
+    return {key: replace(one, **_fewer_digits(one)) for key, one in atlas.items()}
+
+
+def _fewer_digits(one: Population | Draws) -> dict[str, NDArray]:
     return {
-        key: replace(
-            one,
-            mean=_rounded(one.mean.real, BITS) + 1j * _rounded(one.mean.imag, BITS),
-            variance=_rounded(one.variance, VARIANCE_BITS),
-        )
-        for key, one in atlas.items()
+        "mean": _rounded(one.mean.real, BITS) + 1j * _rounded(one.mean.imag, BITS),
+        "variance": _rounded(one.variance, VARIANCE_BITS),
     }
 
 
@@ -50,16 +68,43 @@ def _rounded(values: NDArray[np.float64], bits: int) -> NDArray[np.float64]:
     return np.ldexp(np.round(np.ldexp(share, bits)), exponent - bits)
 
 
+def usual_families(name: str) -> Families:
+    """All machines that an estimate of the usual sweep of a unit may ask for."""
+    return every_family((RATIO,), usual_sweep(name), seed=0)
+
+
+def agreement(apart: NDArray[np.complex128], rng: np.random.Generator) -> float:
+    """How likely kept runs are to differ from new ones at the same places by so much.
+
+    `apart` (machines, rows): log of their ratio. Both come from one distribution if the engine is
+    the same, so that every difference is as likely with the other sign, in all rows at once.
+    """
+    values = np.concatenate([apart.real, apart.imag], axis=1)
+    values = values / np.sqrt(np.mean(values**2, axis=0))
+    signs = rng.choice([-1.0, 1.0], (FLIPS + 1, len(values)))
+    signs[0] = 1.0
+    total = np.sum((signs @ values) ** 2, axis=1)
+    return float(np.mean(total >= total[0]))
+
+
 def main() -> None:
     """Write them all, and nothing else stays."""
-    FOLDER.mkdir(exist_ok=True)
-    for file in FOLDER.glob("*.npz"):
-        file.unlink()
+    shutil.rmtree(FOLDER, ignore_errors=True)
     for name in BANDS_HZ:
-        unit, coarse = load_unit(name), usual_sweep(name)
+        unit, coarse = load_unit(name), coarse_sweep(name)
         for rare in (False, True):
             atlas = rounded(simulate_atlas(unit, coarse, rare=rare))
             write_atlas(FOLDER / atlas_name(unit, coarse, rare), atlas)
+    with ZipFile(RUNS, "w") as archive:
+        for name in BANDS_HZ:
+            unit, sweep = load_unit(name), usual_sweep(name)
+            families = usual_families(name)
+            tasks = [Family(unit, family, sweep.plans) for family in families]
+            for family, (mean, variance) in zip(families, read_families(tasks), strict=True):
+                fewer = _fewer_digits(Draws(family, mean, variance))
+                content = BytesIO()
+                write_runs(content, (fewer["mean"], fewer["variance"]))
+                archive.writestr(run_name(unit, family, sweep), content.getvalue())
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from atlases import BITS, FOLDER, rounded, usual_sweep
+from atlases import BITS, FOLDER, agreement, coarse_sweep, rounded
 from hidden import BANDS_HZ, LEVELS_VPK
 
 import analysis.atlas as module
@@ -13,7 +13,6 @@ from analysis.population import DEVIATING
 from sim.unit import load_unit
 
 MACHINES = 10
-FLIPS = 19_999
 
 
 @pytest.fixture(params=BANDS_HZ)
@@ -28,9 +27,9 @@ def nothing_is_simulated(monkeypatch):
 
 @pytest.mark.usefixtures("nothing_is_simulated")
 @pytest.mark.parametrize("rare", [False, True])
-def test_the_usual_sweep_of_a_unit_waits_for_no_atlas(name, rare, tmp_path):
+def test_the_coarse_sweep_of_a_unit_waits_for_no_atlas(name, rare, tmp_path):
     unit = load_unit(name)
-    atlas = make_atlas(unit, usual_sweep(name), tmp_path, rare=rare)
+    atlas = make_atlas(unit, coarse_sweep(name), tmp_path, rare=rare)
     wanted = {group.hypothesis.effects for group in module._groups(unit, draw(), rare)}
     assert set(atlas) == wanted
     assert not list(tmp_path.iterdir())  # what comes with lashbench is not kept twice
@@ -38,10 +37,10 @@ def test_the_usual_sweep_of_a_unit_waits_for_no_atlas(name, rare, tmp_path):
 
 @pytest.mark.usefixtures("nothing_is_simulated")
 def test_no_other_sweep_or_unit_is_taken_for_it(name):
-    unit, sweep = load_unit(name), usual_sweep(name)
+    unit, sweep = load_unit(name), coarse_sweep(name)
     heavier = unit.with_parameters(J_L=1.1 * unit.parameters["J_L"])
     for other, coarse in (
-        (heavier, sweep), (unit, usual_sweep(name, LEVELS_VPK[:2])), (unit, sweep.thinned(2)),
+        (heavier, sweep), (unit, coarse_sweep(name, LEVELS_VPK[:2])), (unit, sweep.thinned(2)),
     ):  # fmt: skip
         with pytest.raises(TypeError):
             make_atlas(other, coarse)
@@ -49,7 +48,7 @@ def test_no_other_sweep_or_unit_is_taken_for_it(name):
 
 def test_none_comes_along_that_no_sweep_asks_for():
     named = {
-        atlas_name(load_unit(name), usual_sweep(name), rare)
+        atlas_name(load_unit(name), coarse_sweep(name), rare)
         for name in BANDS_HZ
         for rare in (False, True)
     }
@@ -57,7 +56,7 @@ def test_none_comes_along_that_no_sweep_asks_for():
 
 
 def test_rounding_takes_less_than_a_regression_is_trusted_to(name):
-    atlas = make_atlas(load_unit(name), usual_sweep(name))
+    atlas = make_atlas(load_unit(name), coarse_sweep(name))
     for key, one in rounded(atlas).items():
         np.testing.assert_array_equal(one.mean, atlas[key].mean)  # rounded once is rounded
     rng = np.random.default_rng(1)
@@ -80,26 +79,17 @@ def test_that_would_be_seen_if_the_engine_made_another_machine_of_the_unit(name)
 
 
 def again(name, **factors):
-    """The seed, and how likely runs of some groups are to differ from the kept ones by so much.
-
-    Both come from one distribution if the engine is the same, so that every difference of two
-    runs (machines x rows) is as likely with the other sign: a run changes it in all rows at once.
-    """
+    """The seed, and how likely runs of some groups are to differ from the kept ones by so much."""
     rng = draw()
     seed = rng.bit_generator.seed_seq.entropy
-    unit, coarse = load_unit(name), usual_sweep(name)
+    unit, coarse = load_unit(name), coarse_sweep(name)
     kept = make_atlas(unit, coarse)
     causes = [key for key in kept if key]
     chosen = [(), *(causes[i] for i in rng.choice(len(causes), 3, replace=False))]
     known = unit.parameters
     changed = unit.with_parameters(**{s: known[s] * factor for s, factor in factors.items()})
     apart = np.concatenate([differences(changed, coarse, kept, key, rng) for key in chosen])
-    values = np.concatenate([apart.real, apart.imag], axis=1)
-    values = values / np.sqrt(np.mean(values**2, axis=0))
-    signs = rng.choice([-1.0, 1.0], (FLIPS + 1, len(values)))
-    signs[0] = 1.0
-    total = np.sum((signs @ values) ** 2, axis=1)
-    return seed, float(np.mean(total >= total[0]))
+    return seed, agreement(apart, rng)
 
 
 def differences(unit, coarse, atlas, key, rng):

@@ -21,10 +21,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from yardsticks.page import DOCS, machine, replace_block  # noqa: E402
 
-from analysis.calibration import Calibrated  # noqa: E402
 from analysis.estimate import estimate_response  # noqa: E402
 from analysis.family import Family, read_family  # noqa: E402
-from analysis.fit import RATIO, _near_families, _wide_families  # noqa: E402
+from analysis.lattice import RATIO, every_family, near_families, wide_families  # noqa: E402
 from analysis.library import run_families  # noqa: E402
 from analysis.observation import observe  # noqa: E402
 from daq.plan import SweepPlan, spaced_frequencies  # noqa: E402
@@ -35,8 +34,6 @@ UNITS = 1e6
 DAY_S = 86400.0
 BUSY = 0.7
 """Share of a day that a core is worth: the rest goes to starts, stragglers and repairs."""
-
-KIN = 21
 
 
 class Instant:
@@ -69,19 +66,19 @@ def processor_s(work: Callable[[], object], repeats: int) -> float:
 def main() -> None:
     """Measure, print, and write the page."""
     unit = load_unit("adss")
-    plan = SweepPlan(spaced_frequencies(100.0, 180.0, 61), (1.5, 2.5, 4.0))
+    plan = SweepPlan(spaced_frequencies(100.0, 180.0, 61), (1.4, 2.4, 3.8))
     response = simulate(unit, 0.4, plan)
     seen = observe(response)
-    found = Calibrated(np.array([0.4]), np.array([[0.04**2]]))
-    wide, near = _wide_families([RATIO], KIN, 0), _near_families([RATIO], found, KIN, 0)
-    family = Family(unit, tuple(near[0]), seen.plans)
+    every = every_family([RATIO], seen, 0)
+    near = near_families([RATIO], np.array([0.4]), np.array([0.04]), seen, 0)
+    each, shared = len(wide_families([RATIO], seen, 0)) + len(near), len(every)
+    family = Family(unit, near[0], seen.plans)
     readings = read_family(family)
     family_s = processor_s(lambda: read_family(family), 2)
     sent, returned = len(pickle.dumps(family)), len(pickle.dumps(readings))
     with tempfile.TemporaryDirectory() as folder:
         cache = Path(folder)
-        for one in (wide, near):
-            run_families(unit, one, seen, cache=cache, executor=Instant())
+        run_families(unit, every, seen, cache=cache, executor=Instant())
 
         def estimate() -> None:
             estimate_response(response, unit, cache=cache, executor=Instant())
@@ -90,21 +87,19 @@ def main() -> None:
         regression_s = processor_s(estimate, 3)
         kept = sum(file.stat().st_size for file in cache.iterdir())
     simulated = len(family.machines) * plan.duration_s
-    lattice = 11
-    shared = len(wide) + lattice * len(near)
-    each = len(wide) + len(near)
     day = DAY_S * BUSY
     lines = [
         f"Measured on {machine()}; processor times of one core.",
         "",
         "| one of each | |",
         "| --- | --- |",
-        f"| a family of {KIN} machines | {simulated:.0f} s of motion in {family_s:.2f} s |",
+        f"| a family of {len(near[0])} machines "
+        f"| {simulated:.0f} s of motion in {family_s:.2f} s |",
         f"| its task and its result | {sent / 1e3:.1f} kB out, {returned / 1e3:.0f} kB back |",
         f"| an estimate whose machines are kept | {regression_s:.2f} s |",
-        f"| families of a plan, all {lattice} places of the lattice | {shared}, once |",
+        f"| families of a plan, at every place of the lattice | {shared}, once |",
         f"| families of an estimate that shares nothing | {each} |",
-        f"| kept for an estimate | {kept / 1e6:.1f} MB |",
+        f"| kept of a plan | {kept / 1e6:.1f} MB |",
         "",
         "With cost = families x family + estimates x regression, and a core worth "
         f"{100 * BUSY:.0f} % of a day:",

@@ -98,15 +98,16 @@ def least(repeats: int, work) -> Cost:
     return Cost(*np.min([work() for _ in range(repeats)], axis=0).tolist())
 
 
-def sweep(folder: Path) -> Path:
-    """A simulated sweep of ADSS at 3 levels and 61 points, as a bench reads it.
+USUAL, OWN = ("1.5", "2.5", "4"), ("1.4", "2.4", "3.8")
+"""Levels: for the usual ones what a search starts from comes with lashbench."""
 
-    At levels of its own: for the usual ones an atlas comes with lashbench.
-    """
-    file = folder / "sweep.csv"
+
+def sweep(folder: Path, levels: tuple[str, ...]) -> Path:
+    """A simulated sweep of ADSS at 3 levels and 61 points, as a bench reads it."""
+    file = folder / f"sweep-{levels[0]}.csv"
     words = ["simulate", "--unit", "adss", "--ratio", "0.4", "--start", "100", "--stop", "180",
              "--points", "61", "--out", str(file)]  # fmt: skip
-    run([COMMAND, *words, "--level", "1.4", "--level", "2.4", "--level", "3.8"])
+    run([COMMAND, *words, *(word for level in levels for word in ("--level", level))])
     return file
 
 
@@ -136,17 +137,16 @@ def measure(folder: Path, only: list[str]) -> list[tuple[str, str, Cost]]:
     add("table2", "Table 2, exact engine, 100 cycles, one draw", "3 s", lambda: inside(TABLE2), 2)
     if only and not {"estimate", "diagnose"} & set(only):
         return rows
-    file = str(sweep(folder))
     kept = {"XDG_CACHE_HOME": str(folder / "cache")}
-    estimate = [COMMAND, "estimate", file, "--unit", "adss", "--json"]
-    add("estimate", "estimate, 3 levels x 61 points, first of its plan", "3 s",
-        lambda: run(estimate, **kept))  # fmt: skip
-    add("estimate", "estimate, another measurement of that plan", "3 s",
-        lambda: run(estimate, **kept), 2)  # fmt: skip
-    diagnose = [COMMAND, "diagnose", file, "--unit", "adss", "--json"]
-    add("diagnose", "diagnose, first of its plan", "30 s", lambda: run(diagnose, **kept))
-    add("diagnose", "diagnose, another measurement of that plan", "30 s",
-        lambda: run(diagnose, **kept))  # fmt: skip
+    files = {levels: str(sweep(folder, levels)) for levels in (USUAL, OWN)}
+    for verb, goal in (("estimate", "3 s"), ("diagnose", "30 s")):
+        for levels, name in (
+            (USUAL, "3 levels x 61 points, the usual sweep"),
+            (OWN, "3 levels x 61 points, first of another plan"),
+            (OWN, "another measurement of that plan"),
+        ):
+            words = [COMMAND, verb, files[levels], "--unit", "adss", "--json"]
+            add(verb, f"{verb}, {name}", goal, lambda words=words: run(words, **kept))
     return rows
 
 

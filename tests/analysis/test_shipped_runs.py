@@ -1,0 +1,111 @@
+"""The runs that come with lashbench: found, whole, and what this engine would make of them."""
+
+from dataclasses import replace
+from pathlib import Path
+from zipfile import ZipFile
+
+import numpy as np
+import pytest
+from atlases import RUNS, agreement, usual_families, usual_sweep
+from hidden import BANDS_HZ
+
+import analysis.library as module
+from analysis.estimate import estimate_response
+from analysis.family import Family, read_family
+from analysis.library import run_families, run_name
+from daq.formats import read_response
+from sim.unit import load_unit
+
+PRACTICE = Path(__file__).parents[1] / "data" / "practice"
+
+
+@pytest.fixture(params=BANDS_HZ)
+def name(request):
+    return request.param
+
+
+@pytest.mark.parametrize(
+    ("set_name", "unit", "truth"), [("09", "adss", 0.933), ("10", "edss", 0.548)]
+)
+def test_an_estimate_of_the_usual_sweep_simulates_nothing(set_name, unit, truth, tmp_path):
+    response = read_response(PRACTICE / f"practice-{set_name}.csv")
+    found = estimate_response(response, load_unit(unit), cache=tmp_path)
+    assert found.simulated_s == 0.0
+    assert not list(tmp_path.iterdir())  # what comes with lashbench is not kept twice
+    low, high = found.contribution_ratio.interval95
+    assert low < truth < high
+
+
+def test_another_unit_or_sweep_is_simulated(name, monkeypatch):
+    asked = []
+
+    def none(tasks, *_):
+        asked.extend(tasks)
+        raise InterruptedError
+
+    monkeypatch.setattr(module, "read_families", none)
+    unit, sweep, families = load_unit(name), usual_sweep(name), usual_families(name)
+    heavier = unit.with_parameters(J_L=1.1 * unit.parameters["J_L"])
+    late = [tuple(replace(machine, seed=machine.seed + 1) for machine in families[-1])]
+    for other, seen, some in (
+        (heavier, sweep, families), (unit, sweep.thinned(2), families), (unit, sweep, late),
+    ):  # fmt: skip
+        asked.clear()
+        with pytest.raises(InterruptedError):
+            run_families(other, some, seen)
+        assert len(asked) == len(some)
+
+
+def test_exactly_those_come_along_that_an_estimate_may_ask_for():
+    wanted = {
+        run_name(load_unit(name), family, usual_sweep(name))
+        for name in BANDS_HZ
+        for family in usual_families(name)
+    }
+    with ZipFile(RUNS) as archive:
+        assert archive.testzip() is None
+        assert sorted(archive.namelist()) == sorted(wanted)
+
+
+@pytest.mark.parametrize("damage", ["gone", "cut", "text"])
+def test_without_them_an_estimate_simulates(damage, name, tmp_path, monkeypatch):
+    file = tmp_path / "runs.zip"
+    if damage == "cut":
+        file.write_bytes(RUNS.read_bytes()[:100_000])
+    elif damage == "text":
+        file.write_text("no archive at all")
+    monkeypatch.setattr(module, "kept_runs", lambda: file)
+    made = [(np.ones((21, 183), complex), np.ones((21, 183)))]
+    monkeypatch.setattr(module, "read_families", lambda tasks, *_: made * len(tasks))
+    draws = run_families(load_unit(name), usual_families(name)[:2], usual_sweep(name))
+    assert np.all(draws.mean == 1.0)
+
+
+def test_this_engine_would_make_the_same_of_them(name):
+    """False once in 10,000: runs from other starts at the same places."""
+    seed, p = again(name)
+    assert p > 1e-4, f"seed {seed}: simulate them anew, python tests/atlases.py"
+
+
+def test_that_would_be_seen_if_the_engine_made_another_machine_of_the_unit(name):
+    seed, p = again(name, J_L=1.05)
+    assert p <= 1e-3, f"seed {seed}"
+
+
+def again(name, **factors):
+    """The seed, and how likely new runs of two families are to differ from the kept by so much."""
+    rng = np.random.default_rng()
+    seed = rng.bit_generator.seed_seq.entropy
+    unit, sweep, families = load_unit(name), usual_sweep(name), usual_families(name)
+    known = unit.parameters
+    changed = unit.with_parameters(**{s: known[s] * factor for s, factor in factors.items()})
+    apart = []
+    for i in rng.choice(len(families), 2, replace=False):
+        kept = run_families(unit, families[i : i + 1], sweep)
+        machines = tuple(
+            replace(machine, seed=2 * int(rng.integers(2**29)) + machine.seed % 2)
+            for machine in families[i]
+        )
+        mean, _ = read_family(Family(changed, machines, sweep.plans))
+        apart.append(np.log(kept.mean / mean))
+    return seed, agreement(np.concatenate(apart), rng)
