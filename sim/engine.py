@@ -9,7 +9,7 @@ How one step goes. Between switchings the system is linear, so its modes are
 carried exactly (`sim.propagator`). Each law's force is held over the step at
 the mean that the law has along it: with y0 and y1 what the law sees at both
 ends, y1 = ahead + beta p(y0, y1) is one scalar equation, solved in closed form
-(`sim.kernel`). The scheme is second order, the same forwards and
+(`sim.laws`). The scheme is second order, the same forwards and
 backwards in time, and conserves the energy of springs and play; friction
 stops the motion at the end of a step or turns where the velocity passes zero.
 """
@@ -18,14 +18,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.assembly import Law, PiecewiseLinearSystem
-from sim.kernel import FORCES_AT_ONCE, MOST_LANES, PAIR, ROWS_AT_ONCE, STRIBECK, step_cycles
+from sim.assembly import PiecewiseLinearSystem
+from sim.kernel import MOST_VECTORS, SUMS, Layout, Structure, step_cycles
 from sim.propagator import Modes, Propagator, build_propagator, find_modes
+from sim.solving import kinds_of, law_coefficients, order_of
 
 __all__ = ["HARMONICS", "LONGEST_STEP_S", "Motion", "Stretch", "advance"]
 
@@ -34,17 +35,6 @@ HARMONICS = 4
 
 LONGEST_STEP_S = 5e-6
 """Default bound of the step: a twentieth of the fastest mesh mode of the paper's units."""
-
-_LANE_MULTIPLE = 8
-
-_HARDENING_SWEEPS = 3
-"""Passes where a hardening shaft and a play push one tiny inertia; the shaft goes once more."""
-
-_COUPLED_SWEEPS = 4
-"""Passes where one play pushes another within a step, as through a heavily damped shaft."""
-
-_LOOSE = 1e-4
-"""Share of its motion that a play may take over from another before that counts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,165 +98,158 @@ def advance(
     Motion
         One per stretch, as soon as it is done.
     """
-    modes = find_modes(system)
-    # The states of stiff springs hardly differ: their differences need all digits.
-    precision = np.float32 if single and modes.rates.size else np.float64
+    moving = _Moving(system, find_modes(system), single)
     for stretch in stretches:
-        propagator = build_propagator(system, modes, stretch.frequency_hz, longest_step_s)
-        motion = _dwell(system, modes, propagator, parameters, state, stretch, precision)
+        motion = _dwell(moving, parameters, state, stretch, longest_step_s)
         state = motion.state
         yield motion
 
 
+@dataclass(frozen=True, eq=False)
+class _Moving:
+    """A system and its modes, and what does not change with the drive."""
+
+    system: PiecewiseLinearSystem
+    modes: Modes
+    single: bool
+
+    @cached_property
+    def kinds(self) -> tuple[int, ...]:
+        """(m,): kinds of its laws."""
+        return kinds_of(self.system.nonlinearities)
+
+    @cached_property
+    def rows(self) -> NDArray[np.float64]:
+        """(m + 1, n): what each law and, last, the output see of the state."""
+        outlets = [law.outlet for law in self.system.nonlinearities]
+        return np.array([*outlets, self.system.o])
+
+    @cached_property
+    def through(self) -> NDArray[np.float64]:
+        """(m + 1, 1): the same of the input."""
+        feedthrough = [law.feedthrough for law in self.system.nonlinearities]
+        return np.array([*feedthrough, 0.0])[:, None]
+
+    @cached_property
+    def look(self) -> NDArray[np.float64]:
+        """(m + 1, p): the same of the coordinates."""
+        return self.rows @ self.modes.shapes
+
+    @cached_property
+    def heard(self) -> tuple[bool, ...]:
+        """(p,): which coordinates the laws see, or else the output alone."""
+        return tuple(np.any(self.look[:-1] != 0.0, axis=0).tolist())
+
+
 def _dwell(
-    system: PiecewiseLinearSystem,
-    modes: Modes,
-    propagator: Propagator,
+    moving: _Moving,
     parameters: NDArray[np.float64],
     state: NDArray[np.float64],
     stretch: Stretch,
-    precision: type[np.floating],
+    longest_step_s: float,
 ) -> Motion:
-    lanes = state.shape[1]
-    coefficients = np.empty((stretch.integrate_cycles, HARMONICS, lanes), dtype=complex)
-    peak = np.empty(lanes)
-    final = np.empty_like(state)
-    tables = _tables(system, modes, propagator)
-    for start in range(0, lanes, MOST_LANES):
-        kept = np.arange(start, min(start + MOST_LANES, lanes))
-        # Whole vectors cost less than three lanes one by one. Padding repeats a lane: an idle
-        # lane of zeros would run into denormals.
-        width = -(-len(kept) // _LANE_MULTIPLE) * _LANE_MULTIPLE if len(kept) > 2 else len(kept)
-        picked = np.resize(kept, width)
-        sums, tops, ends = _run_block(
-            system, modes, propagator, tables, parameters[..., picked], state[:, picked],
-            stretch, picked, precision,
-        )  # fmt: skip
-        own = slice(0, len(kept))
-        coefficients[..., kept] = _coefficients(sums, propagator.steps_per_cycle)[..., own]
-        peak[kept], final[:, kept] = tops[own], ends[:, own]
+    system, modes = moving.system, moving.modes
+    propagator = build_propagator(system, modes, stretch.frequency_hz, longest_step_s)
+    drift = propagator.drift[:, None] + propagator.offset_drift[:, None] * stretch.offset
+    phasor = stretch.amplitude * np.exp(1j * stretch.phase)
+    forced = propagator.drive[:, None] * phasor
+    # Im(Y exp(i theta)) = Re(Y) sin(theta) + Im(Y) cos(theta), plus a constant.
+    through = _times(moving.rows, forced) + moving.through * phasor
+    waves = np.stack([through.real, through.imag, moving.through * stretch.offset], axis=1)
+    values = {
+        "q": _times(modes.weights, state - forced.imag),
+        "seen": _times(moving.rows, state) + moving.through * (phasor.imag + stretch.offset),
+        "force": np.zeros((len(moving.kinds), state.shape[1])),
+        "drift": drift,
+        "waves": waves.reshape(-1, state.shape[1]),
+        "parameters": parameters.reshape(-1, state.shape[1]),
+    }
+    layout, coefficients = _program(moving, propagator, bool(drift.any() or stretch.offset.any()))
+    sums, peak = _step(layout, coefficients, values, propagator.steps_per_cycle, stretch)
     turn = np.exp(-1j * np.outer(np.arange(HARMONICS), stretch.phase))
     turn[0] = 1.0
+    # The last forces push the coordinates in the step that is not made any more.
+    end = values["q"] + _times(propagator.push, values["force"])
     # The kernel counts the phase from the start of the stretch; results count
     # it from the drive.
-    return Motion(coefficients * turn, peak, final)
-
-
-@dataclass(frozen=True, slots=True)
-class _Tables:
-    """What the kernel needs of the laws, fixed for one system and step.
-
-    `rows` (m, n), `feedthrough` (m,): what each law sees of state and input.
-    `look`, `gain`, `push`, `kinds`, `fixed`, `waves`, `order`: see `sim.kernel`.
-    """
-
-    rows: NDArray[np.float64]
-    feedthrough: NDArray[np.float64]
-    look: NDArray[np.float64]
-    gain: NDArray[np.float64]
-    push: NDArray[np.float64]
-    kinds: NDArray[np.int64]
-    fixed: NDArray[np.float64]
-    waves: NDArray[np.float64]
-    order: NDArray[np.int64]
-
-
-def _tables(system: PiecewiseLinearSystem, modes: Modes, propagator: Propagator) -> _Tables:
-    laws = system.nonlinearities
-    n, m, p = len(system.b), len(laws), modes.shapes.shape[1]
-    rows = np.array([law.outlet for law in laws]).reshape(m, n)
-    push = np.pad(propagator.push, ((0, 0), (0, max(FORCES_AT_ONCE - m, m % 2))))
-    look = np.vstack([rows, system.o]) @ modes.shapes
-    gain = look @ push
-    kinds = _in_pairs(
-        [
-            STRIBECK if law.law is Law.FRICTION and law.parameters[1] != 0.0 else int(law.law)
-            for law in laws
-        ]
+    return Motion(
+        _coefficients(sums, propagator.steps_per_cycle) * turn,
+        peak,
+        _times(modes.shapes, end) + forced.imag,
     )
+
+
+def _program(
+    moving: _Moving, propagator: Propagator, steady: bool
+) -> tuple[Layout, NDArray[np.float64]]:
+    """What steps a system at one drive frequency, and with which numbers."""
+    laws, gain = moving.system.nonlinearities, moving.look @ propagator.push
     fixed = [(law.stiffness, law.damping / propagator.step_s) for law in laws]
-    angle = 2.0 * np.pi * np.arange(propagator.steps_per_cycle) / propagator.steps_per_cycle
-    waves = np.stack([wave(k * angle) for k in (1, 2, 3) for wave in (np.cos, np.sin)], axis=1)
-    return _Tables(
-        rows=rows,
-        feedthrough=np.array([law.feedthrough for law in laws]),
-        look=np.pad(look, ((0, 0), (0, max(ROWS_AT_ONCE - p, 0)))),
-        gain=gain,
-        push=push,
-        kinds=np.array(kinds, dtype=np.int64),
-        fixed=np.array(fixed).reshape(m, 2),
-        waves=waves,
-        order=np.array(_order(kinds, gain, fixed), dtype=np.int64),
+    structure = Structure(
+        kinds=moving.kinds,
+        order=order_of(moving.kinds, gain, fixed),
+        turning=tuple(moving.modes.turning.tolist()),
+        heard=moving.heard,
+        steady=steady,
+        # The states of stiff springs hardly differ: their differences need all digits.
+        single=moving.single and not propagator.whole,
     )
+    parts = [
+        propagator.carry,
+        # The forces of a step push the coordinates before these are carried on.
+        propagator.carried(propagator.push),
+        moving.look,
+        gain,
+        law_coefficients(moving.kinds, gain, fixed),
+    ]
+    return Layout(structure), np.concatenate([part.ravel() for part in parts])
 
 
-def _in_pairs(kinds: list[int]) -> list[int]:
-    """Mark the first of two hardening springs in a row, so that they are solved together."""
-    kinds = kinds.copy()
-    for j in range(len(kinds) - 1):
-        led = j > 0 and kinds[j - 1] == PAIR
-        if kinds[j] == kinds[j + 1] == Law.CUBIC and not led:
-            kinds[j] = PAIR
-    return kinds
-
-
-def _order(
-    kinds: list[int], gain: NDArray[np.float64], fixed: list[tuple[float, float]]
-) -> list[int]:
-    """Laws in an order that settles what they do to each other within one step.
-
-    Where springs harden, they and the plays are gone through until they agree; what acts on
-    the heavy inertias alone follows once.
-    """
-    followers = [j + 1 for j, kind in enumerate(kinds) if kind == PAIR]
-    once = [j for j in range(len(kinds)) if j not in followers]
-    springs = [j for j in once if kinds[j] in (Law.CUBIC, PAIR)]
-    plays = [j for j in once if kinds[j] == Law.PLAY]
-    slope = np.array([fixed[j][0] + 2.0 * fixed[j][1] for j in plays])
-    taken_over = np.abs(gain[np.ix_(plays, plays)]) * slope
-    np.fill_diagonal(taken_over, 0.0)
-    sweeps = _COUPLED_SWEEPS if taken_over.max(initial=0.0) > _LOOSE else 1
-    if not springs:
-        return once * sweeps
-    rest = [j for j in once if j not in springs and j not in plays]
-    return (springs + plays) * max(sweeps, _HARDENING_SWEEPS) + springs + rest
-
-
-def _run_block(
-    system: PiecewiseLinearSystem,
-    modes: Modes,
-    propagator: Propagator,
-    tables: _Tables,
-    parameters: NDArray[np.float64],
-    state: NDArray[np.float64],
+def _step(
+    layout: Layout,
+    coefficients: NDArray[np.float64],
+    values: dict[str, NDArray[np.float64]],
+    steps: int,
     stretch: Stretch,
-    picked: NDArray[np.int64],
-    precision: type[np.floating],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    offset = stretch.offset[picked]
-    phasor = stretch.amplitude[picked] * np.exp(1j * stretch.phase[picked])
-    forced = propagator.drive[:, None] * phasor
-    direct = tables.feedthrough[:, None]
-    seen = _times(tables.rows, state) + direct * (phasor.imag + offset)
-    # Im(Y exp(i theta)) = Re(Y) sin(theta) + Im(Y) cos(theta), plus a constant.
-    through = _times(np.vstack([tables.rows, system.o]), forced)
-    through[:-1] += direct * phasor
-    constant = np.vstack([direct * offset, np.zeros_like(offset)])
-    coordinates = _times(modes.weights, state - forced.imag)
-    waves = np.stack([through.real, through.imag, constant], axis=1)
-    drift = propagator.drift[:, None] + propagator.offset_drift[:, None] * offset
-    own = partial(np.ascontiguousarray, dtype=precision)
-    q, y = own(coordinates), own(seen)
-    sums = np.zeros((stretch.integrate_cycles, 7, len(picked)), precision)
-    peak = np.zeros(len(picked), precision)
-    step_cycles(
-        own(propagator.carry), own(tables.push), own(drift), own(tables.look), own(tables.gain),
-        tables.kinds, own(tables.fixed), own(parameters.reshape(-1, len(picked))),
-        own(waves.reshape(-1, len(picked))), own(tables.waves), tables.order,
-        stretch.settle_cycles, q, y, sums, peak,
-    )  # fmt: skip
-    end = _times(modes.shapes, q.astype(float)) + forced.imag
-    return sums.astype(float), peak.astype(float), end
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Sums (cycles, 7, lanes) and largest magnitude (lanes,) of the output over a stretch.
+
+    `values`: the rows of the lanes by name; they are overwritten by how they end.
+    """
+    count, rows = stretch.amplitude.size, layout.lanes
+    sums, peak = np.empty((stretch.integrate_cycles, SUMS, count)), np.empty(count)
+    for of in _calls(count, layout.width):
+        lanes = layout.blank(rows["peak"].stop, of.size)
+        for name, known in values.items():
+            lanes[rows[name]] = known[:, of]
+        sums[..., of] = step_cycles(
+            layout, coefficients, lanes, _waves(steps), stretch.settle_cycles,
+            stretch.integrate_cycles,
+        )  # fmt: skip
+        # Lanes that are repeated end alike, and are written twice.
+        peak[of] = lanes[rows["peak"][0]]
+        for name in ("q", "force"):
+            values[name][:, of] = lanes[rows[name]]
+    return sums, peak
+
+
+def _calls(count: int, width: int) -> Iterator[NDArray[np.intp]]:
+    """Lanes of each call: four vectors of them, and what is left in two and one.
+
+    A vector that is not full repeats a lane: idle lanes of zeros would run into denormals.
+    """
+    at, vectors = 0, -(-count // width)
+    while vectors:
+        taken = min(MOST_VECTORS, 1 << (vectors.bit_length() - 1))
+        yield np.resize(np.arange(at, min(at + taken * width, count)), taken * width)
+        at, vectors = at + taken * width, vectors - taken
+
+
+@lru_cache(maxsize=256)
+def _waves(steps: int) -> NDArray[np.float64]:
+    """(steps, 6): cosine and sine of harmonics 1 to 3 over a cycle."""
+    angle = 2.0 * np.pi * np.arange(steps) / steps
+    return np.stack([wave(k * angle) for k in (1, 2, 3) for wave in (np.cos, np.sin)], axis=1)
 
 
 def _times(matrix: NDArray[np.float64], columns: NDArray) -> NDArray:

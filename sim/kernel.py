@@ -1,43 +1,45 @@
-"""The compiled inner loop of the engine: many steps of many lanes.
+"""The inner loop of the engine: many steps of many lanes, written for one kind of system.
 
-Owns the scalar laws, the order of work in a step and the layout in memory; the
-numbers it is given are the propagator's. It knows no physics beyond the laws.
-(Laws and loop share a file because numba's cache on disk looks at this file
-alone to tell whether it is stale.)
+Owns the order of work in a step and the layout in memory; the numbers it is
+given are the propagator's, the laws those of `sim.laws`. For every structure
+that occurs (which laws, how many coordinates, in which order they are solved)
+it writes a program without branches in which every coefficient has its place.
 
-A law sees y at the start of the step (`y0`) and would see `ahead` at its end if
-it did not act; with its own force p, held over the step, it sees
-y1 = ahead + beta p. A force that comes from a potential W (play, a hardening
-spring) takes its mean along the step, p = (W(y1) - W(y0)) / (y1 - y0). Held
-over the step it does the work W(y1) - W(y0) whatever the motion inside the
-step was: no energy appears or vanishes, at any step.
-
-Lanes lie along the last axis everywhere, so that each loop over them is one
-run of vector operations. Three things keep these loops fast: the compiler need
-not test at run time whether rows overlap, because those of an array lie a fixed
-distance apart (`MOST_LANES`), their numbers cannot be negative (`& _ROW`), and
-it is told that the arrays of a part are different ones (`sim.compiling`); a loop over
-lanes holds no branch and no call that is left after inlining; and the parts are
-inlined by the machine's compiler, not by numba, which would rename arrays
-inside the step loop and count references in every step.
+What takes time in a step is that laws wait for each other: several vectors of
+lanes at once, and laws that hardly feel each other side by side, fill these waits.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any
+
 import numpy as np
+from llvmlite import ir
+from numpy.typing import NDArray
 
-from sim.compiling import law, loop, part
+from sim import laws
+from sim.assembly import Law
+from sim.lanes import VECTOR_BYTES, Code, Lanes, greatest
+from sim.machine_code import compiled, multiplies_and_adds
 
-__all__ = ["FORCES_AT_ONCE", "MOST_LANES", "PAIR", "ROWS_AT_ONCE", "STRIBECK", "step_cycles"]
+__all__ = [
+    "MOST_VECTORS",
+    "PAIR",
+    "STRIBECK",
+    "SUMS",
+    "Layout",
+    "Program",
+    "Structure",
+    "step_cycles",
+]
 
-MOST_LANES = 64
-"""Lanes that one call can step; a full call costs little more than one of eight."""
-
-ROWS_AT_ONCE = 14
-"""Coordinates that are looked at in one go: 13 states as modes; further ones come in pairs."""
-
-FORCES_AT_ONCE = 4
-"""Forces that act in one go, two meshes and two frictions; further ones come in pairs."""
+MOST_VECTORS = 4
+"""Vectors that one call steps at most: registers suffice for no more."""
 
 STRIBECK = 4
 """Kind of a friction that peaks at rest; the other kinds are those of `sim.assembly.Law`."""
@@ -45,383 +47,386 @@ STRIBECK = 4
 PAIR = 5
 """Kind of a hardening spring that is solved together with the law after it, another such spring."""
 
-_PLAY, _FRICTION, _EXCESS = 0, 1, 2
-
-_CORRECTIONS = 2
-"""How often a play's share of the step is corrected; each leaves about 3 % of the error."""
-
 _FIRST_SWEEPS = 8
+"""How often laws are gone through in the first step, which knows no last forces to start from."""
 
-_ROW = 1023
-"""All bits that the number of a row can have."""
+SUMS = 7
+"""Sums kept of every cycle; the largest magnitude of the output is kept over all."""
+
+_WAVES = 8
+"""Numbers in a row of the table of waves: six, and room."""
+
+_INT = ir.IntType(64)
 
 
-@law
-def play_force(y0, ahead, d, k, c, beta):
-    """Mean of k clip(y, -d, d) over the step, and the damper c taken out while inside the play.
+@dataclass(frozen=True, slots=True)
+class Structure:
+    """What systems have in common that one program steps.
 
-    `c` is the damping over the step, c/h. With e = y - clip(y) the mean of
-    clip is (clip0 + clip1)/2 + q (e0 + e1)/2, where q is the share of the step
-    spent inside; q depends on y1, weakly.
+    `kinds` (m,) of the laws; `order`: laws in the order in which each step solves
+    them, those of one group side by side, with the newest forces of all others. `turning`: which
+    pairs of coordinates turn into each other, the others decay alone; empty where each feels
+    every other. `heard` (p,): which coordinates the laws see, or else the output alone.
+    `steady`: whether anything constant acts. `single`: precision.
     """
-    half, damp = 0.5 * k * beta, c * beta
-    inverse = 1.0 / (1.0 - half - damp)
-    c0 = min(max(y0, -d), d)
-    e0 = y0 - c0
-    known = ahead + (half - damp) * c0
-    guess = known * inverse if e0 == 0.0 else known + (half + damp) * c0
-    moved = guess - y0
-    per_moved = 1.0 / (moved if abs(moved) > 1e-30 else 1.0)
-    q = (min(max(guess, -d), d) - c0) * per_moved
-    c1, e1 = c0, e0
-    for _ in range(_CORRECTIONS):
-        share = half * q
-        pulled = known + share * e0
-        inside = pulled * inverse
-        c1 = min(max(inside, -d), d)
-        # (1 - share) e1 = pulled + ..., by the series of 1/(1 - share): share is 0.1 at most.
-        series = 1.0 + share * (1.0 + share * (1.0 + share))
-        e1 = (pulled + (half + damp - 1.0) * c1) * series if abs(inside) > d else 0.0
-        # One Newton step carries the reciprocal over to the corrected motion.
-        moved = c1 + e1 - y0
-        per_moved *= 2.0 - moved * per_moved
-        q = min(max((c1 - c0) * per_moved, 0.0), 1.0)
-    return 0.5 * k * (c0 + c1 + q * (e0 + e1)) + c * (c1 - c0)
+
+    kinds: tuple[int, ...]
+    order: tuple[tuple[int, ...], ...]
+    turning: tuple[bool, ...]
+    heard: tuple[bool, ...]
+    steady: bool
+    single: bool
 
 
-@law
-def friction_force(w0, ahead, most, beta):
-    """Force that opposes the motion w with `most`, stops it dead, or turns with it.
+@dataclass(frozen=True)
+class Layout:
+    """Where what stands, m laws and p coordinates; every entry is a range of rows.
 
-    Where w passes zero inside the step, either what drives it is below
-    break-away and it stops there, or friction turns at the crossing and the
-    force is its mean.
+    Of lanes: `q` coordinates, `seen` what laws and output see at the start of a step,
+    `force`, `drift` what is added to the coordinates in every step, `waves` sine,
+    cosine and constant part of what the drive alone makes laws and output see,
+    `parameters` three of each law, `sums` and `peak` of the output so far.
+
+    Of coefficients, which all lanes share: `carry` (p, 2 or p), `push` (p, m), `look`
+    (m + 1, p), `gain` (m + 1, m): see `sim.propagator.Propagator`; look and gain are what
+    each law and, last, the output see of the coordinates and of the forces. `law` (m, 5): of a
+    play k, c/h and what `sim.laws.PlayOverStep` holds of beta, of others beta and its inverse.
     """
-    start = w0 if w0 != 0.0 else ahead
-    sign = 1.0 if start > 0.0 else -1.0
-    slid = sign * ahead - beta * most
-    before = abs(w0)
-    share = before / (before - min(slid, -1e-30))
-    turned = most * sign * (1.0 - 2.0 * share)
-    stopped = -ahead / beta
-    crossing = stopped if abs(ahead - w0) <= beta * most else turned
-    return -most * sign if slid >= 0.0 else crossing
+
+    structure: Structure
+
+    @property
+    def m(self) -> int:
+        """Number of laws."""
+        return len(self.structure.kinds)
+
+    @property
+    def p(self) -> int:
+        """Number of coordinates."""
+        return len(self.structure.heard)
+
+    @cached_property
+    def lanes(self) -> dict[str, range]:
+        """Rows of what every lane has."""
+        m, p = self.m, self.p
+        return _rows(q=p, seen=m + 1, force=m, drift=p, waves=3 * m + 3, parameters=3 * m,
+                     sums=SUMS, peak=1)  # fmt: skip
+
+    @cached_property
+    def coefficients(self) -> dict[str, range]:
+        """Places of what all share."""
+        m, p = self.m, self.p
+        across = 2 if self.structure.turning else p
+        return _rows(carry=p * across, push=p * m, look=(m + 1) * p, gain=(m + 1) * m, law=5 * m)
+
+    @property
+    def dtype(self) -> type[np.floating]:
+        """Of all arrays."""
+        return np.float32 if self.structure.single else np.float64
+
+    @property
+    def width(self) -> int:
+        """Lanes in a vector."""
+        return VECTOR_BYTES // np.dtype(self.dtype).itemsize
+
+    def blank(self, *shape: int) -> NDArray:
+        """Zeros that begin where a vector may, and no vector lies across two lines of a cache."""
+        size = np.dtype(self.dtype).itemsize
+        store = np.zeros(int(np.prod(shape)) * size + VECTOR_BYTES, dtype=np.uint8)
+        skip = -store.ctypes.data % VECTOR_BYTES
+        whole = store[skip : skip + int(np.prod(shape)) * size].view(self.dtype)
+        return whole.reshape(shape)
 
 
-@law
-def peaked_friction(w, T, T_s, w_s):
-    """Stribeck's curve T + T_s exp(-(w/w_s)^2), to 1e-5 of its peak."""
-    u = w / w_s
-    x = min(u * u, 40.0) / 64.0
-    # exp(-64 x) as the 64th power of a Taylor series: a call to exp would break the vectors.
-    power = 1.0 - x * (1.0 - x * (0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x / 120.0))))
-    power *= power
-    power *= power
-    power *= power
-    power *= power
-    power *= power
-    power *= power
-    return T + T_s * power
+def _rows(**counts: int) -> dict[str, range]:
+    found, at = {}, 0
+    for name, count in counts.items():
+        found[name] = range(at, at + count)
+        at += count
+    return found
 
 
-@law
-def excess_force(y0, y1, limit):
-    """Mean of clip(y, -limit, limit) - y over the step; y itself does not feel it."""
-    c0, c1 = min(max(y0, -limit), limit), min(max(y1, -limit), limit)
-    moved = y1 - y0
-    q = (c1 - c0) / (moved if abs(moved) > 1e-30 else 1.0)
-    return -0.5 * (1.0 - q) * (y0 - c0 + y1 - c1)
-
-
-@law
-def cubic_mean(y0, y1, quarter):
-    """Mean of -k y^3 over the step; `quarter` is k/4."""
-    return -quarter * (y0 * y0 + y1 * y1) * (y0 + y1)
-
-
-@law
-def cubic_slope(y0, y1, quarter):
-    """How fast that mean falls with y1."""
-    return quarter * (y0 * y0 + 2.0 * y0 * y1 + 3.0 * y1 * y1)
-
-
-@law
-def cubic_force(y0, ahead, last, k, beta):
-    """Mean of -k y^3 over the step, by two Newton steps from the last force."""
-    quarter = 0.25 * k
-    y1 = ahead + beta * last
-    for _ in range(2):
-        miss = y1 - ahead - beta * cubic_mean(y0, y1, quarter)
-        y1 -= miss / (1.0 + beta * cubic_slope(y0, y1, quarter))
-    return cubic_mean(y0, y1, quarter)
-
-
-@law
-def cubic_pair(y0, z0, y_ahead, z_ahead, p, r, k_y, k_z, yy, yz, zy, zz):
-    """Forces of two hardening springs, by one Newton step for both from the last, p and r.
-
-    y sees yy p + yz r of them, z sees zy p + zz r. In turn they would settle slowly: two halves
-    of a shaft push the tiny inertia between them, and each nearly undoes what the other did.
-    """
-    k, n = 0.25 * k_y, 0.25 * k_z
-    y, z = y_ahead + yy * p + yz * r, z_ahead + zy * p + zz * r
-    p, r = cubic_mean(y0, y, k), cubic_mean(z0, z, n)
-    s, t = cubic_slope(y0, y, k), cubic_slope(z0, z, n)
-    y_miss, z_miss = y - y_ahead - yy * p - yz * r, z - z_ahead - zy * p - zz * r
-    inverse = 1.0 / ((1.0 + yy * s) * (1.0 + zz * t) - yz * t * zy * s)
-    y -= ((1.0 + zz * t) * y_miss - yz * t * z_miss) * inverse
-    z -= ((1.0 + yy * s) * z_miss - zy * s * y_miss) * inverse
-    return cubic_mean(y0, y, k), cubic_mean(z0, z, n)
-
-
-@part
-def _turn(carry, push, drift, q, force, lanes):
-    """Coordinates in pairs of rows: the forces of the last step push them, then they turn."""
-    for row in range(0, carry.shape[0], 2):
-        i = row & _ROW
-        _push_further(push, i, q, force, lanes)
-        a0, a1, a2, a3 = push[i, 0], push[i, 1], push[i, 2], push[i, 3]
-        b0, b1, b2, b3 = push[i + 1, 0], push[i + 1, 1], push[i + 1, 2], push[i + 1, 3]
-        c00, c01, c10, c11 = carry[i, 0], carry[i, 1], carry[i + 1, 0], carry[i + 1, 1]
-        for s in range(lanes):
-            p0, p1, p2, p3 = force[0, s], force[1, s], force[2, s], force[3, s]
-            one = q[i, s] + a0 * p0 + a1 * p1 + a2 * p2 + a3 * p3
-            other = q[i + 1, s] + b0 * p0 + b1 * p1 + b2 * p2 + b3 * p3
-            q[i, s] = drift[i, s] + c00 * one + c01 * other
-            q[i + 1, s] = drift[i + 1, s] + c10 * one + c11 * other
-
-
-@part
-def _push_further(push, i, q, force, lanes):
-    for column in range(FORCES_AT_ONCE, push.shape[1], 2):
-        k = column & _ROW
-        a0, a1, b0, b1 = push[i, k], push[i, k + 1], push[i + 1, k], push[i + 1, k + 1]
-        for s in range(lanes):
-            q[i, s] += a0 * force[k, s] + a1 * force[k + 1, s]
-            q[i + 1, s] += b0 * force[k, s] + b1 * force[k + 1, s]
-
-
-@part
-def _push(push, q, force, lanes):
-    for row in range(0, push.shape[0], 2):
-        i = row & _ROW
-        a0, a1, a2, a3 = push[i, 0], push[i, 1], push[i, 2], push[i, 3]
-        b0, b1, b2, b3 = push[i + 1, 0], push[i + 1, 1], push[i + 1, 2], push[i + 1, 3]
-        for s in range(lanes):
-            p0, p1, p2, p3 = force[0, s], force[1, s], force[2, s], force[3, s]
-            q[i, s] += a0 * p0 + a1 * p1 + a2 * p2 + a3 * p3
-            q[i + 1, s] += b0 * p0 + b1 * p1 + b2 * p2 + b3 * p3
-        _push_further(push, i, q, force, lanes)
-
-
-@part
-def _multiply(carry, push, drift, q, force, spare, lanes):
-    """The same where every coordinate feels every other; slower, and rarely needed."""
-    p = carry.shape[0]
-    _push(push, q, force, lanes)
-    for i in range(p):
-        for s in range(lanes):
-            spare[i, s] = drift[i, s]
-        for k in range(0, p, 2):
-            c0, c1 = carry[i, k], carry[i, k + 1]
-            for s in range(lanes):
-                spare[i, s] += c0 * q[k, s] + c1 * q[k + 1, s]
-    for i in range(p):
-        for s in range(lanes):
-            q[i, s] = spare[i, s]
-
-
-@part
-def _look(look, rows, waves, cosine, sine, q, free, lanes):
-    """What the laws, and the output in the last row, would see at the end without any force."""
-    for row in range(rows):
-        j = row & _ROW
-        l0, l1, l2, l3 = look[j, 0], look[j, 1], look[j, 2], look[j, 3]
-        l4, l5, l6, l7 = look[j, 4], look[j, 5], look[j, 6], look[j, 7]
-        l8, l9, l10, l11 = look[j, 8], look[j, 9], look[j, 10], look[j, 11]
-        l12, l13 = look[j, 12], look[j, 13]
-        at = 3 * j
-        for s in range(lanes):
-            free[j, s] = (
-                waves[at, s] * sine + waves[at + 1, s] * cosine + waves[at + 2, s]
-                + l0 * q[0, s] + l1 * q[1, s] + l2 * q[2, s] + l3 * q[3, s]
-                + l4 * q[4, s] + l5 * q[5, s] + l6 * q[6, s] + l7 * q[7, s]
-                + l8 * q[8, s] + l9 * q[9, s] + l10 * q[10, s] + l11 * q[11, s]
-                + l12 * q[12, s] + l13 * q[13, s]
-            )  # fmt: skip
-        for column in range(ROWS_AT_ONCE, look.shape[1], 2):
-            k = column & _ROW
-            l0, l1 = look[j, k], look[j, k + 1]
-            for s in range(lanes):
-                free[j, s] += l0 * q[k, s] + l1 * q[k + 1, s]
-
-
-@part
-def _feel(gain, j, force, free, y, to, lanes):
-    """Row `to` of y: what row j sees with the forces as they stand."""
-    j, to = j & _ROW, to & _ROW
-    g0, g1, g2, g3 = gain[j, 0], gain[j, 1], gain[j, 2], gain[j, 3]
-    for s in range(lanes):
-        y[to, s] = (
-            free[j, s] + g0 * force[0, s] + g1 * force[1, s] + g2 * force[2, s] + g3 * force[3, s]
-        )
-    for column in range(FORCES_AT_ONCE, gain.shape[1], 2):
-        k = column & _ROW
-        g0, g1 = gain[j, k], gain[j, k + 1]
-        for s in range(lanes):
-            y[to, s] += g0 * force[k, s] + g1 * force[k + 1, s]
-
-
-@part
-def _solve(kind, stiffness, damping, own, parameters, j, y, ahead, force, lanes):
-    """The force of law j, from what it saw at the start and would see ahead."""
-    j &= _ROW
-    at = 3 * j
-    if kind == _PLAY:
-        for s in range(lanes):
-            force[j, s] = play_force(
-                y[j, s], ahead[0, s], parameters[at, s], stiffness, damping, own
-            )
-    elif kind == _FRICTION:
-        for s in range(lanes):
-            force[j, s] = friction_force(y[j, s], ahead[0, s], parameters[at, s], own)
-    elif kind == STRIBECK:
-        for s in range(lanes):
-            w = 0.5 * (y[j, s] + ahead[0, s] + own * force[j, s])
-            most = peaked_friction(
-                w, parameters[at, s], parameters[at + 1, s], parameters[at + 2, s]
-            )
-            force[j, s] = friction_force(y[j, s], ahead[0, s], most, own)
-    elif kind == _EXCESS:
-        for s in range(lanes):
-            centre = parameters[at + 1, s]
-            force[j, s] = excess_force(y[j, s] - centre, ahead[0, s] - centre, parameters[at, s])
-    else:
-        for s in range(lanes):
-            force[j, s] = cubic_force(y[j, s], ahead[0, s], force[j, s], parameters[at, s], own)
-
-
-@part
-def _solve_pair(gain, parameters, j, y, ahead, force, lanes):
-    """The forces of laws j and j + 1, two hardening springs."""
-    j &= _ROW
-    at, yy, yz, zy, zz = 3 * j, gain[j, j], gain[j, j + 1], gain[j + 1, j], gain[j + 1, j + 1]
-    for s in range(lanes):
-        force[j, s], force[j + 1, s] = cubic_pair(
-            y[j, s], y[j + 1, s], ahead[0, s], ahead[1, s], force[j, s], force[j + 1, s],
-            parameters[at, s], parameters[at + 3, s], yy, yz, zy, zz,
-        )  # fmt: skip
-
-
-@part
-def _accumulate(table, tick, y, m, total, lanes):
-    """Add the output, row m of y, to the Fourier sums and keep its largest magnitude."""
-    m &= _ROW
-    c1, s1, c2 = table[tick, 0], table[tick, 1], table[tick, 2]
-    s2, c3, s3 = table[tick, 3], table[tick, 4], table[tick, 5]
-    for s in range(lanes):
-        output = y[m, s]
-        total[0, s] += output
-        total[1, s] += c1 * output
-        total[2, s] += s1 * output
-        total[3, s] += c2 * output
-        total[4, s] += s2 * output
-        total[5, s] += c3 * output
-        total[6, s] += s3 * output
-        total[7, s] = max(total[7, s], abs(output))
-
-
-@loop
-def step_cycles(carry, push, drift_in, look, gain, kinds, fixed, parameters, waves, table,
-                order, settle_cycles, start, seen, sums, peak):  # fmt: skip
-    """Step coordinates through settle and kept cycles.
+def step_cycles(
+    layout: Layout,
+    coefficients: NDArray,
+    lanes: NDArray,
+    waves: NDArray,
+    settle_cycles: int,
+    kept_cycles: int,
+) -> NDArray:
+    """Step some vectors of lanes through settle and kept cycles.
 
     Parameters
     ----------
-    carry, push, drift_in
-        (p, 2) or (p, p); (p, f); (p, lanes): one step of coordinates q, p of
-        them, see `sim.propagator.Propagator`. f is the number of laws, padded.
-    look, gain
-        (m + 1, rows), (m + 1, f): what each law and, last, the output see of
-        the coordinates and of the forces.
-    kinds, fixed, parameters
-        (m,); (m, 2) stiffness and damping over the step; (3 m, lanes).
+    layout
+        Where what stands; every array has its precision.
+    coefficients
+        (places,).
+    lanes
+        (rows, lanes), 1, 2 or 4 vectors of them, made by `Layout.blank`; overwritten by how
+        they end.
     waves
-        (3 (m + 1), lanes): sine, cosine and constant part of what the drive
-        alone makes each of them see.
-    table
         (steps, 6): cosine and sine of harmonics 1 to 3 over a cycle.
-    order
-        Laws in the order in which each step solves them, with the newest forces of the others.
-    start, seen
-        (p, lanes), (m, lanes): coordinates and what the laws see at the start;
-        overwritten by those at the end.
-    sums, peak
-        (cycles, 7, lanes), (lanes,): the sum, then the products of the output with each
-        column of `table` summed over each kept cycle; the largest magnitude.
+
+    Returns
+    -------
+    ndarray
+        (cycles, 7, lanes): the sum, then the products of the output with each
+        column of `waves` summed over each kept cycle.
     """
-    p, lanes = start.shape
-    m = kinds.shape[0]
-    others = gain.copy()
-    for j in range(m):
-        others[j, j] = 0.0
-        if kinds[j] == PAIR:
-            others[j, j + 1] = 0.0
-            others[j + 1, j] = 0.0
-    ticks = table.shape[0]
-    q = np.zeros((look.shape[1], MOST_LANES), start.dtype)
-    spare = np.zeros((look.shape[1], MOST_LANES), start.dtype)
-    drift = np.zeros((p, MOST_LANES), start.dtype)
-    force = np.zeros((push.shape[1], MOST_LANES), start.dtype)
-    free = np.zeros((m + 1, MOST_LANES), start.dtype)
-    y = np.zeros((m + 1, MOST_LANES), start.dtype)
-    ahead = np.zeros((2, MOST_LANES), start.dtype)
-    wave = np.zeros((3 * (m + 1), MOST_LANES), start.dtype)
-    constant = np.zeros((3 * m, MOST_LANES), start.dtype)
-    total = np.zeros((8, MOST_LANES), start.dtype)
-    for s in range(lanes):
-        for i in range(p):
-            q[i, s] = start[i, s]
-            drift[i, s] = drift_in[i, s]
-        for j in range(m):
-            y[j, s] = seen[j, s]
-        for j in range(3 * m):
-            constant[j, s] = parameters[j, s]
-        for j in range(3 * m + 3):
-            wave[j, s] = waves[j, s]
-    for cycle in range(settle_cycles + sums.shape[0]):
-        rows = m + 1 if cycle >= settle_cycles else m
-        for step in range(ticks):
-            tick = step + 1 if step + 1 < ticks else 0
-            if carry.shape[1] == 2:
-                _turn(carry, push, drift, q, force, lanes)
-            else:
-                _multiply(carry, push, drift, q, force, spare, lanes)
-            _look(look, rows, wave, table[tick, 0], table[tick, 1], q, free, lanes)
-            # The first step knows no last forces to start from.
-            turns = len(order) if cycle + step > 0 else _FIRST_SWEEPS * len(order)
-            for turn in range(turns):
-                j = order[turn % len(order)]
-                _feel(others, j, force, free, ahead, 0, lanes)
-                if kinds[j] == PAIR:
-                    _feel(others, j + 1, force, free, ahead, 1, lanes)
-                    _solve_pair(gain, constant, j, y, ahead, force, lanes)
-                else:
-                    _solve(kinds[j], fixed[j, 0], fixed[j, 1], gain[j, j], constant, j, y, ahead,
-                           force, lanes)  # fmt: skip
+    steps, count = len(waves), lanes.shape[1]
+    table = layout.blank(steps, _WAVES)
+    table[:, : waves.shape[1]] = waves
+    sums = layout.blank(kept_cycles, SUMS, count)
+    own = np.ascontiguousarray(coefficients, dtype=layout.dtype)
+    _program(layout.structure, count // layout.width)(
+        own.ctypes.data, lanes.ctypes.data, table.ctypes.data, steps, settle_cycles, kept_cycles,
+        sums.ctypes.data,
+    )  # fmt: skip
+    return sums
+
+
+@cache
+def _program(structure: Structure, vectors: int) -> Any:
+    fused = multiplies_and_adds()
+    return compiled(
+        f"{structure} {vectors} {fused}",
+        [Path(__file__).with_name(file) for file in ("kernel.py", "laws.py", "lanes.py")],
+        lambda: Program(Layout(structure), vectors, fused).text(),
+    )
+
+
+class Program:
+    """Writes the program of one structure."""
+
+    def __init__(self, layout: Layout, vectors: int, fused: bool) -> None:
+        self._layout, self._structure = layout, layout.structure
+        self._all = range(vectors)
+        self._module = ir.Module()
+        scalar = ir.FloatType() if layout.structure.single else ir.DoubleType()
+        pointer = scalar.as_pointer()
+        kind = ir.FunctionType(ir.VoidType(), [*[pointer] * 3, *[_INT] * 3, pointer])
+        self._function = ir.Function(self._module, kind, "step")
+        # What may lie where is not promised: the compiler would keep coefficients in whole
+        # vectors and wait for these, where a number of its own for each use costs nothing.
+        (self._coefficients, self._lanes, self._table, self._steps, settle, kept, self._sums) = (
+            self._function.args
+        )
+        self._emit = ir.IRBuilder(self._function.append_basic_block())
+        self._code = Code(self._module, self._emit, layout.structure.single, fused)
+        self._sweeps = self._emit.alloca(_INT)
+        # Aligns the stack with it: a vector that lies across two lines of the cache costs twice.
+        self._sweeps.align = VECTOR_BYTES
+        self._emit.store(_INT(_FIRST_SWEEPS), self._sweeps)
+        with self._times(settle):
+            self._cycle(kept=False)
+        with self._times(kept) as cycle:
+            self._cycle(kept=True)
+            self._hand_over(cycle)
+        self._emit.ret_void()
+
+    def text(self) -> str:
+        """The program in the compiler's own language."""
+        return str(self._module)
+
+    def _cycle(self, *, kept: bool) -> None:
+        with self._times(self._steps) as step:
+            following = self._emit.add(step, _INT(1))
+            wraps = self._emit.icmp_signed("<", following, self._steps)
+            at = self._emit.mul(self._emit.select(wraps, following, _INT(0)), _INT(_WAVES))
+            rows = self._layout.m + kept
+            free = self._turn(at, rows)
+            with self._times(self._emit.load(self._sweeps)):
+                self._solve(free)
+            self._emit.store(_INT(1), self._sweeps)
+            seen = self._see(free)
+            if kept:
+                self._accumulate(at, seen[-1])
+
+    def _turn(self, at: Any, rows: int) -> list[Lanes]:
+        """Coordinates go one step on; what laws and output would see at its end without any force.
+
+        Vector by vector, as there is enough to do side by side within each.
+        """
+        p, m, heard = self._layout.p, self._layout.m, self._structure.heard
+        cosine, sine = (self._wave(at, k, 1) for k in (0, 1))
+        free: list[list[Any]] = [[] for _ in range(rows)]
+        for v in self._all:
+            force = [self._load("force", j, [v]) for j in range(m)]
+            seen: list[Lanes] = []
             for j in range(rows):
-                _feel(gain, j, force, free, y, j, lanes)
-            if cycle >= settle_cycles:
-                _accumulate(table, tick, y, m, total, lanes)
-        if cycle >= settle_cycles:
-            for k in range(7):
-                for s in range(lanes):
-                    sums[cycle - settle_cycles, k, s] = total[k, s]
-                    total[k, s] = 0.0
-    _push(push, q, force, lanes)
-    for s in range(lanes):
-        peak[s] = total[7, s]
+                turning = self._load("waves", 3 * j, [v]) * sine
+                there = self._load("waves", 3 * j + 1, [v]) * cosine + turning.lanes()
+                seen.append(there + self._load("waves", 3 * j + 2, [v]) if self._steady else there)
+            # Each feels where others were: what is new is written once all of these are read.
+            before = {i: self._load("q", i, [v]) for i in range(p)} if self._whole else {}
+            for first in range(0, p, 2):
+                pair = range(first, min(first + 2, p))
+                there_now = before or {i: self._load("q", i, [v]) for i in pair}
+                for i in pair:
+                    now = self._carried(i, pair, there_now, v)
+                    if self._steady:
+                        now = now + self._load("drift", i, [v])
+                    for j in range(m):
+                        now = self._take("push", i * m + j, [v]) * force[j] + now.lanes()
+                    new = now.lanes()
+                    self._store("q", i, new, [v])
+                    for j in range(rows):
+                        if heard[i] or j == m:
+                            seen[j] = self._take("look", j * p + i, [v]) * new + seen[j]
+            for j in range(rows):
+                free[j] += seen[j].vectors
+        return [Lanes(self._code, of) for of in free]
+
+    def _carried(self, i: int, pair: range, before: dict[int, Lanes], v: int) -> Any:
+        """Coordinate i a step later, by those that it feels and no force."""
+        if self._whole:
+            felt, row = range(self._layout.p), i * self._layout.p
+        else:
+            turns = self._structure.turning[i // 2] and len(pair) == 2
+            felt, row = (pair if turns else range(i, i + 1)), 2 * i - pair[0]
+        now: Any = None
+        for k in felt:
+            share = self._take("carry", row + k, [v]) * before[k]
+            now = share if now is None else share + now.lanes()
+        return now
+
+    def _solve(self, free: list[Lanes]) -> None:
+        """Forces of all laws, each with the newest ones of the others."""
+        m, kinds = self._layout.m, self._structure.kinds
+        force = [self._load("force", j, self._all) for j in range(m)]
+        for group in self._structure.order:
+            newest = list(force)
+            for j in group:
+                together = [j, j + 1] if kinds[j] == PAIR else [j]
+                ahead = []
+                for k in together:
+                    others = [i for i in range(m) if i not in together]
+                    ahead.append(self._felt(k, free[k], force, others))
+                for k, solved in zip(together, self._force(j, ahead, force), strict=True):
+                    newest[k] = solved
+            force = newest
         for j in range(m):
-            seen[j, s] = y[j, s]
-        for i in range(p):
-            start[i, s] = q[i, s]
+            self._store("force", j, force[j], self._all)
+
+    def _force(self, j: int, ahead: Sequence[Lanes], last: Sequence[Lanes]) -> Sequence[Lanes]:
+        """The force of law j, or of a pair of them."""
+        kind, m = self._structure.kinds[j], self._layout.m
+        y0 = self._load("seen", j, self._all)
+        a, b, c = (lambda i=i: self._load("parameters", 3 * j + i, self._all) for i in range(3))
+        fixed = [self._all_of("law", 5 * j + i) for i in range(5)]
+        if kind == Law.PLAY:
+            return [laws.play_force(y0, ahead[0], a(), laws.PlayOverStep(*fixed)).lanes()]
+        beta, per_beta = fixed[:2]
+        if kind == Law.FRICTION:
+            return [laws.friction_force(y0, ahead[0], a(), beta, per_beta)]
+        if kind == STRIBECK:
+            w = ((beta * last[j] + ahead[0] + y0) * 0.5).lanes()
+            most = laws.peaked_friction(w, a(), b(), c())
+            return [laws.friction_force(y0, ahead[0], most, beta, per_beta)]
+        if kind == Law.EXCESS:
+            centre = b()
+            return [laws.excess_force(y0 - centre, ahead[0] - centre, a())]
+        if kind == Law.CUBIC:
+            return [laws.cubic_force(y0, ahead[0], last[j], a(), beta)]
+        pair = [self._all_of("gain", k * m + i) for k in (j, j + 1) for i in (j, j + 1)]
+        return laws.cubic_pair(
+            (y0, self._load("seen", j + 1, self._all)),
+            (ahead[0], ahead[1]),
+            (last[j], last[j + 1]),
+            (a(), self._load("parameters", 3 * (j + 1), self._all)),
+            laws.Coupling(*pair),
+        )
+
+    def _see(self, free: list[Lanes]) -> list[Lanes]:
+        """What laws, and the output if asked for, see at the end of the step."""
+        m = self._layout.m
+        force = [self._load("force", j, self._all) for j in range(m)]
+        seen = [self._felt(j, there, force, range(m)) for j, there in enumerate(free)]
+        for j, there in enumerate(seen):
+            self._store("seen", j, there, self._all)
+        return seen
+
+    def _felt(self, j: int, free: Lanes, force: Sequence[Lanes], of: Sequence[int]) -> Lanes:
+        """What law j, or the output, sees with some of the forces."""
+        for k in of:
+            free = self._all_of("gain", j * self._layout.m + k) * force[k] + free
+        return free
+
+    def _accumulate(self, at: Any, output: Lanes) -> None:
+        """Add the output to the sums of its cycle, and keep its largest magnitude."""
+        self._store("sums", 0, self._load("sums", 0, self._all) + output, self._all)
+        for k in range(SUMS - 1):
+            share = self._wave(at, k, len(self._all)) * output
+            more = share + self._load("sums", k + 1, self._all)
+            self._store("sums", k + 1, more, self._all)
+        largest = self._load("peak", 0, self._all)
+        self._store("peak", 0, greatest(abs(output), largest), self._all)
+
+    def _hand_over(self, cycle: Any) -> None:
+        """Write the sums of a cycle where they are kept, and begin anew."""
+        for k in range(SUMS):
+            done = self._load("sums", k, self._all)
+            row = self._emit.add(self._emit.mul(cycle, _INT(SUMS)), _INT(k))
+            for v, vector in zip(self._all, done.vectors, strict=True):
+                first = self._emit.add(self._emit.mul(row, _INT(len(self._all))), _INT(v))
+                place = self._emit.mul(first, _INT(self._code.width))
+                self._emit.store(vector, self._vector_at(self._sums, place), align=VECTOR_BYTES)
+            self._store("sums", k, self._code.constant(0.0, len(self._all)), self._all)
+
+    @property
+    def _whole(self) -> bool:
+        return not self._structure.turning
+
+    @property
+    def _steady(self) -> bool:
+        return self._structure.steady
+
+    @contextmanager
+    def _times(self, count: Any) -> Iterator[Any]:
+        """A loop around what is emitted inside; yields its counter."""
+        head = self._function.append_basic_block()
+        body, done = (self._function.append_basic_block() for _ in range(2))
+        before = self._emit.block
+        self._emit.branch(head)
+        self._emit.position_at_end(head)
+        counter = self._emit.phi(_INT)
+        counter.add_incoming(_INT(0), before)
+        self._emit.cbranch(self._emit.icmp_signed("<", counter, count), body, done)
+        self._emit.position_at_end(body)
+        yield counter
+        counter.add_incoming(self._emit.add(counter, _INT(1)), self._emit.block)
+        self._emit.branch(head)
+        self._emit.position_at_end(done)
+
+    def _vector_at(self, base: Any, place: Any) -> Any:
+        return self._emit.bitcast(self._emit.gep(base, [place]), self._code.vector.as_pointer())
+
+    def _lane_row(self, name: str, i: int, v: int) -> Any:
+        row = self._layout.lanes[name][i]
+        place = (row * len(self._all) + v) * self._code.width
+        return self._vector_at(self._lanes, _INT(place))
+
+    def _load(self, name: str, i: int, vectors: Sequence[int]) -> Lanes:
+        load = self._emit.load
+        found = [load(self._lane_row(name, i, v), align=VECTOR_BYTES) for v in vectors]
+        return Lanes(self._code, found)
+
+    def _store(self, name: str, i: int, value: Lanes, vectors: Sequence[int]) -> None:
+        for v, vector in zip(vectors, value.vectors, strict=True):
+            self._emit.store(vector, self._lane_row(name, i, v), align=VECTOR_BYTES)
+
+    def _take(self, name: str, i: int, vectors: Sequence[int]) -> Lanes:
+        """A coefficient in all lanes of some vectors."""
+        place = _INT(self._layout.coefficients[name][i])
+        # Asked for anew by every vector: it costs nothing, where a register to keep it does.
+        loads = [self._emit.load(self._emit.gep(self._coefficients, [place])) for _ in vectors]
+        return Lanes(self._code, [self._code.everywhere(one) for one in loads])
+
+    def _all_of(self, name: str, i: int) -> Lanes:
+        return self._take(name, i, self._all)
+
+    def _wave(self, at: Any, k: int, count: int) -> Lanes:
+        """One wave of the table, the same in so many vectors."""
+        place = self._emit.gep(self._table, [self._emit.add(at, _INT(k))])
+        return Lanes(self._code, [self._code.everywhere(self._emit.load(place))] * count)

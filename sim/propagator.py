@@ -36,8 +36,8 @@ class Modes:
 
     `rates` (p,) are the eigenvalues where q are modes: two rows belong
     together, a complex pair (in its real form, marked in `turning` (p/2,)) or
-    two real modes. `rates` is empty where q are scaled states; `whole` (p, p)
-    is then the system's matrix in them.
+    two real modes; the last may stand alone. `rates` is empty where q are scaled
+    states; `whole` (p, p) is then the system's matrix in them.
     """
 
     shapes: NDArray[np.float64]
@@ -58,17 +58,22 @@ class Propagator:
         q_next = carry q + sum_j push_j p_j + drift + offset_drift V_offset
 
     `carry` is (p, 2), the two columns that row i shares with its partner, or
-    (p, p); `push` (p, m); `drift` and `offset_drift` (p,).
+    (p, p) if `whole`; `push` (p, m); `drift` and `offset_drift` (p,).
     """
 
     frequency_hz: float
     step_s: float
     steps_per_cycle: int
+    whole: bool
     carry: NDArray[np.float64]
     push: NDArray[np.float64]
     drift: NDArray[np.float64]
     offset_drift: NDArray[np.float64]
     drive: NDArray[np.complex128]
+
+    def carried(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What a step makes of coordinates (p, k) on which nothing acts."""
+        return self.carry @ columns if self.whole else _by_blocks(self.carry, columns)
 
 
 def find_modes(system: PiecewiseLinearSystem) -> Modes:
@@ -83,24 +88,22 @@ def find_modes(system: PiecewiseLinearSystem) -> Modes:
     basis[:, 1 : 2 * len(upper) : 2] = vectors[:, upper].imag
     if not np.linalg.cond(basis) < _WORST_CONDITION:
         return _unmoded(balanced, scale)
-    odd = len(order) % 2
     return Modes(
-        shapes=np.pad(scale[:, None] * basis, ((0, 0), (0, odd))),
-        weights=np.pad(np.linalg.inv(basis) / scale, ((0, odd), (0, 0))),
-        rates=np.pad(rates[order], (0, odd)),
-        turning=np.arange((len(order) + odd) // 2) < len(upper),
+        shapes=scale[:, None] * basis,
+        weights=np.linalg.inv(basis) / scale,
+        rates=rates[order],
+        turning=np.arange((len(order) + 1) // 2) < len(upper),
         whole=np.empty((0, 0)),
     )
 
 
 def _unmoded(balanced: NDArray[np.float64], scale: NDArray[np.float64]) -> Modes:
-    odd = len(scale) % 2
     return Modes(
-        shapes=np.pad(np.diag(scale), ((0, 0), (0, odd))),
-        weights=np.pad(np.diag(1.0 / scale), ((0, odd), (0, 0))),
+        shapes=np.diag(scale),
+        weights=np.diag(1.0 / scale),
         rates=np.empty(0, dtype=complex),
         turning=np.empty(0, dtype=bool),
-        whole=np.pad(balanced, (0, odd)),
+        whole=balanced,
     )
 
 
@@ -122,6 +125,7 @@ def build_propagator(
         frequency_hz=frequency_hz,
         step_s=h,
         steps_per_cycle=steps,
+        whole=not modes.rates.size,
         carry=carry,
         push=pushes[:, :-2],
         drift=pushes[:, -2],
@@ -138,17 +142,24 @@ def _turn(
     still = np.where(angle == 0.0, 1.0, angle)
     carry = _in_pairs(np.exp(angle), modes.turning)
     held = _in_pairs(h * np.where(angle == 0.0, 1.0, np.expm1(angle) / still), modes.turning)
-    partners = forcings.reshape(-1, 2, forcings.shape[1])
-    pushes = np.einsum("irc,ick->irk", held.reshape(-1, 2, 2), partners)
-    return carry, pushes.reshape(forcings.shape)
+    return carry, _by_blocks(held, forcings)
 
 
 def _in_pairs(values: NDArray, turning: NDArray[np.bool_]) -> NDArray[np.float64]:
     """A function of the rates (p,) as the two columns of its blocks of two rows, (p, 2)."""
-    first, second = values[0::2], values[1::2]
+    paired = np.append(values, np.zeros(len(values) % 2))
+    first, second = paired[0::2], paired[1::2]
     top = np.stack([first.real, np.where(turning, first.imag, 0.0)], axis=1)
     bottom = np.stack([np.where(turning, -first.imag, 0.0), second.real], axis=1)
-    return np.stack([top, bottom], axis=1).reshape(-1, 2)
+    return np.stack([top, bottom], axis=1).reshape(-1, 2)[: len(values)]
+
+
+def _by_blocks(blocks: NDArray[np.float64], columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Product (p, k) of a matrix that is blocks of two rows on its diagonal, its columns (p, 2)."""
+    p = len(columns)
+    paired = np.vstack([columns, np.zeros((p % 2, columns.shape[1]))])
+    first = np.arange(p) & ~1
+    return blocks[:, :1] * paired[first] + blocks[:, 1:] * paired[first + 1]
 
 
 def _exponential(

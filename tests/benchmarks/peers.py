@@ -208,7 +208,7 @@ def print_table(rows: list[tuple[str, Method, int, int]], periodic: list[Case], 
 
 def share() -> str:
     """What part of the arithmetic limit the kernel reaches."""
-    tally = operations.count_step([0, 0, 1, 1], 14)
+    tally = operations.count_step(operations.SERVO)
     total = sum(tally.values())
     limit = operations.peak_flops()
     one = case(ADSS, 0.25, 0.0, 125.0, 20)

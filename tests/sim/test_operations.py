@@ -1,18 +1,22 @@
 """The count of a step's operations, which the benchmark divides by the machine's limit."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
-from yardsticks.operations import count_step
+import numpy as np
+import pytest
+from side_by_side import ADSS, EDSS, drive
+from yardsticks.operations import SERVO, count_step
 
-from sim.assembly import Law
+from sim import engine
+from sim.drivetrain import paper_drivetrain
 
 PAGE = Path(__file__).parents[2] / "docs" / "performance.md"
-SERVO = [Law.PLAY, Law.PLAY, Law.FRICTION, Law.FRICTION]
 
 
 def test_a_step_takes_as_many_operations_as_the_page_says():
-    tally = count_step(SERVO, 14)
+    tally = count_step(SERVO)
     said = re.search(
         r"(\d+) operations \((\d+) add or multiply, (\d+) compare, (\d+) divide\)",
         PAGE.read_text(),
@@ -21,9 +25,21 @@ def test_a_step_takes_as_many_operations_as_the_page_says():
     assert counted == [int(number) for number in said.groups()]
 
 
-def test_two_more_coordinates_cost_what_one_pair_of_rows_does():
-    less, more = (count_step(SERVO, coordinates) for coordinates in (12, 14))
-    grown = more - less
+@pytest.mark.parametrize("unit", [ADSS, EDSS], ids=["adss", "edss"])
+def test_what_is_counted_is_what_the_units_of_the_paper_take(unit, monkeypatch):
+    asked, step = [], engine.step_cycles
+    monkeypatch.setattr(
+        engine, "step_cycles", lambda layout, *more: asked.append(layout) or step(layout, *more)
+    )
+    system = paper_drivetrain(unit, 0.4).system()
+    drive(system, np.zeros((len(system.states), 1)), 120.0, 1, 2.5)
+    assert {layout.structure for layout in asked} == {SERVO}
+
+
+def test_two_more_coordinates_cost_what_a_pair_of_rows_does():
+    more = replace(SERVO, turning=(True, *SERVO.turning), heard=(True, True, *SERVO.heard))
+    grown = count_step(more) - count_step(SERVO)
     assert set(grown) == {"add or multiply"}
-    # Each row takes four forces (2 each) and turns (2 multiplications, 2 additions).
-    assert grown.total() == 2 * (4 * 2 + 4)
+    # Each row turns (a product, and one that is added), takes four forces, and is looked at by
+    # four laws and the output.
+    assert grown.total() == 2 * (1 + 2 + 4 * 2 + 5 * 2)

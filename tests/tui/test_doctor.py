@@ -137,20 +137,24 @@ def test_versions_are_numbers_not_text(version, specifiers, good):
 def test_an_engine_that_is_not_compiled_not_kept_or_not_there(monkeypatch, tmp_path):
     from numba import config
 
-    import sim.kernel
+    from sim import machine_code
 
     with monkeypatch.context() as patch:
         patch.setattr(config, "DISABLE_JIT", 1)
         assert only(software.check_engine()).remedy == "unset NUMBA_DISABLE_JIT"
     with monkeypatch.context() as patch:
         (tmp_path / "file").write_text("")
-        shut = SimpleNamespace(stats=SimpleNamespace(cache_path=str(tmp_path / "file" / "cache")))
-        patch.setattr(sim.kernel, "step_cycles", shut)
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
         finding = only(software.check_engine())
         assert finding.state == "note"
-        assert "NUMBA_CACHE_DIR" in finding.remedy
+        assert "XDG_CACHE_HOME" in finding.remedy
     with monkeypatch.context() as patch:
-        patch.setitem(sys.modules, "sim.kernel", None)
+        patch.setattr(machine_code, "multiplies_and_adds", lambda: False)
+        finding = only(software.check_engine())
+        assert finding.state == "note"
+        assert "slow" in finding.found
+    with monkeypatch.context() as patch:
+        patch.setitem(sys.modules, "sim.machine_code", None)
         finding = only(software.check_engine())
         assert finding.state == "failed"
         assert "cannot be loaded" in finding.found

@@ -50,26 +50,24 @@ def check_packages() -> Iterator[Finding]:
 def check_engine() -> Iterator[Finding]:
     """Whether the compiled engine loads, and is kept from run to run."""
     name = "compiled engine"
-    move = "set NUMBA_CACHE_DIR to a folder that you can write to"
     try:
         from numba import config
 
         if getattr(config, "DISABLE_JIT", False):
-            slow = "compiling is switched off: simulations take hundreds of times longer"
+            slow = "numba compiles nothing: the paper's own scheme takes hundreds of times longer"
             yield failed(name, slow, "unset NUMBA_DISABLE_JIT")
             return
-        from sim.kernel import step_cycles
+        from sim.machine_code import code_folder, multiplies_and_adds
     except ImportError as error:
         yield failed(name, f"cannot be loaded: {error}", "put the packages right first")
         return
-    except RuntimeError as error:
-        # Numba finds no folder at all that its cache could lie in.
-        yield failed(name, f"cannot be loaded: {' '.join(str(error).split())}", move)
-        return
-    folder = Path(str(step_cycles.stats.cache_path))
-    kept = len(list(folder.glob("*.nbc")))
-    found = f"{kept} compiled parts kept in {folder}"
-    if not _may_write(folder):
+    folder = code_folder()
+    kept = len(list(folder.glob("*.code")))
+    found = f"{kept} compiled programs kept in {folder}"
+    if not multiplies_and_adds():
+        yield noted(name, f"{found}; this processor is an old one, which is slow", "use another")
+    elif not _may_write(folder):
+        move = "set XDG_CACHE_HOME to a folder that you can write to"
         yield noted(name, f"{found}, which you cannot write to: start-up may take longer", move)
     else:
         yield passed(name, found)

@@ -1,0 +1,123 @@
+"""From the text of a program to a function that runs, and the folder that keeps what was compiled.
+
+Owns what the compiler is told of the machine, and what is kept on disk. It writes no program.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+import llvmlite
+import llvmlite.binding as llvm
+from platformdirs import user_cache_path
+
+__all__ = ["code_folder", "compiled", "multiplies_and_adds"]
+
+_INT, _POINTER = ctypes.c_int64, ctypes.c_void_p
+_KIND = ctypes.CFUNCTYPE(None, *[_POINTER] * 3, *[_INT] * 3, _POINTER)
+
+_MARK = hashlib.sha256
+
+_LOCK = Lock()
+"""The compiler is asked for one thing at a time."""
+
+_ALIVE: list[Any] = []
+"""What holds the memory in which compiled functions lie."""
+
+
+def code_folder() -> Path:
+    """Where what was compiled is kept; XDG_CACHE_HOME moves it."""
+    return user_cache_path("lashbench", appauthor=False) / "code"
+
+
+def multiplies_and_adds() -> bool:
+    """Whether the machine multiplies and adds in one instruction."""
+    features = llvm.get_host_cpu_features()
+    arm = llvm.get_process_triple().startswith(("aarch64", "arm64"))
+    return bool(arm or features.get("fma"))
+
+
+def compiled(name: str, sources: Sequence[Path], write: Callable[[], str]) -> Any:
+    """The function "step" of a program, kept from run to run.
+
+    Parameters
+    ----------
+    name
+        What tells this program from others that the same sources write.
+    sources
+        Files that decide what the program is: where one changes it is compiled anew.
+    write
+        Gives the program, if it was not kept.
+    """
+    with _LOCK:
+        key = f"{name} {_target_text()} {_sources_mark(tuple(sources))}"
+        file = code_folder() / f"{_MARK(key.encode()).hexdigest()[:24]}.code"
+        program = _read(file)
+        if program is None:
+            program = _compile(write())
+            _keep(file, program)
+        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target_machine())
+        engine.add_object_file(llvm.ObjectFileRef.from_data(program))
+        engine.finalize_object()
+        _ALIVE.append(engine)
+        return _KIND(engine.get_function_address("step"))
+
+
+def _compile(text: str) -> bytes:
+    module = llvm.parse_assembly(text)
+    module.verify()
+    # The program has no loops over lanes and nothing to simplify: only registers are to be found.
+    return bytes(_target_machine().emit_object(module))
+
+
+def _target_machine() -> Any:
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    target = llvm.Target.from_triple(llvm.get_process_triple())
+    return target.create_target_machine(
+        cpu=llvm.get_host_cpu_name(), features=_features(), opt=3, jit=True
+    )
+
+
+def _features() -> str:
+    """Of this machine; with AVX-512 whole vectors, which the compiler halves if not told."""
+    features = llvm.get_host_cpu_features()
+    wide = ",-prefer-256-bit" if features.get("avx512f") else ""
+    return f"{features.flatten()}{wide}"
+
+
+@cache
+def _target_text() -> str:
+    return f"{llvmlite.__version__} {llvm.get_host_cpu_name()} {_features()}"
+
+
+@cache
+def _sources_mark(sources: tuple[Path, ...]) -> str:
+    return _MARK(b"".join(file.read_bytes() for file in sources)).hexdigest()
+
+
+def _read(file: Path) -> bytes | None:
+    """What was kept, or None where it is not what was written: half a program would crash."""
+    with suppress(OSError):
+        kept = file.read_bytes()
+        size = _MARK().digest_size
+        if kept[:size] == _MARK(kept[size:]).digest():
+            return kept[size:]
+    return None
+
+
+def _keep(file: Path, program: bytes) -> None:
+    """Keep what was compiled; a folder that cannot be written costs time later and nothing else."""
+    part = file.with_suffix(f".{os.getpid()}.part")
+    with suppress(OSError):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        part.write_bytes(_MARK(program).digest() + program)
+        part.replace(file)
