@@ -20,6 +20,7 @@ from analysis.ensemble import TOLERANCES
 from analysis.observation import Observation
 from analysis.population import DEVIATING, Population
 from analysis.surface import Fit, Surface, differences
+from analysis.threads import each
 from analysis.widths import learn_width
 from sim.unit import Unit
 
@@ -53,15 +54,16 @@ def form_candidates(
         for key, population in fine.items()
     }
     slopes = _pooled_slopes(observation, fine, raw)
-    found = {}
-    for key, population in fine.items():
-        surface = _without_deviations(raw[key], population, slopes)
+
+    def form(key: Effects) -> Candidate:
+        surface = _without_deviations(raw[key], fine[key], slopes)
         charts = surface.on_chart(surface.places), surface.on_chart(starts[key][None])
         width = learn_width(charts[0], surface.difference, surface.width, charts[1])
         surface = replace(surface, width=width)
         best = surface.climb(starts[key])
-        found[key] = Candidate(Hypothesis(unit, key), population, surface, best)
-    return found
+        return Candidate(Hypothesis(unit, key), fine[key], surface, best)
+
+    return dict(zip(fine, each(form, fine), strict=True))
 
 
 def _surface(observation: Observation, population: Population, hypothesis: Hypothesis) -> Surface:

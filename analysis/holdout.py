@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from analysis.candidate import Candidate
 from analysis.observation import Observation
-from analysis.surface import Surface
+from analysis.surface import Fit, Surface
+from analysis.threads import each
 from daq.frf import DB_PER_NEPER
 
 __all__ = ["AT_NOISE", "HeldOut", "hold_out", "hold_out_surface"]
@@ -69,10 +70,14 @@ def hold_out_surface(
     shape = (3, len(observation))
     residual, std = np.full(shape, np.nan), np.full(shape, np.nan)
     score = 0.0
-    for fold in _folds(observation):
+
+    def seen_without(fold: slice) -> list[Fit]:
         rows = np.ones(len(observation), dtype=bool)
         rows[fold] = False
-        fits = surface.walk(start, rows, tries=_TRIES)
+        return surface.walk(start, rows, tries=_TRIES)
+
+    folds = _folds(observation)
+    for fold, fits in zip(folds, each(seen_without, folds), strict=True):
         share = surface.shares(fits)
         left = np.stack([fit.residual[:, fold] for fit in fits])
         spread = np.stack([fit.std[:, fold] for fit in fits])

@@ -1,7 +1,8 @@
 """Local regression: the value at a point, and its error, from weighted runs around it.
 
-Owns the arithmetic of many small regressions at once. It knows neither what
-the runs are nor how near they have to be.
+Owns the arithmetic of many small regressions at once, compiled, as a diagnosis
+asks for tens of thousands of them (but for the planes that widths
+are learned from). It knows neither what the runs are nor how near they have to be.
 """
 
 from __future__ import annotations
@@ -11,7 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["TAIL", "TAIL_SCALE", "Planes", "fit_planes", "regress"]
+from sim.compiling import njit
+
+__all__ = ["TAIL", "TAIL_SCALE", "Planes", "fit_planes", "invert", "solve_plane"]
 
 _RIDGE = 0.1
 """Ridge of the slopes, in units of the kernel's reach: few runs must not make a wild slope."""
@@ -23,20 +26,20 @@ TAIL_SCALE = float(np.sqrt((TAIL - 2.0) / TAIL))
 
 _TAIL_ITERATIONS = 5
 
+_ANY_ORDER = {"contract", "reassoc", "nsz", "arcp"}
+"""Sums may be made in any order: vectors need it. NaN stays NaN."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Planes:
     """Fits of values by planes, p problems with c columns over n runs.
 
     `coefficients` (p, c, 1 + k): value and slopes; `squares` (p, c, n): of what is
-    left of every run; `weighed` (p, 1 + k, n): weights times basis; `inverse`
-    (p, 1 + k, 1 + k): of the normal matrix.
+    left of every run.
     """
 
     coefficients: NDArray[np.float64]
     squares: NDArray[np.float64]
-    weighed: NDArray[np.float64]
-    inverse: NDArray[np.float64]
 
 
 def fit_planes(
@@ -60,46 +63,156 @@ def fit_planes(
     squares = coefficients @ basis
     np.subtract(values, squares, out=squares)
     np.square(squares, out=squares)
-    return Planes(coefficients, squares, weighed, inverse)
+    return Planes(coefficients, squares)
 
 
-def regress(
-    offset: NDArray[np.float64],
-    weight: NDArray[np.float64],
-    reach: NDArray[np.float64],
-    values: NDArray,
-    *,
-    tailed: bool,
-) -> tuple[NDArray, NDArray]:
-    """Value and variance (p, c) at offset 0 of p regressions with c columns each.
+@njit(nogil=True, error_model="numpy")
+def solve_plane(offset, weight, reach, values, tailed, value, variance):
+    """Value and variance (c,) at offset 0 of c columns, which are overwritten.
 
     Parameters
     ----------
     offset
-        (1 or p, n, k): where the runs are, in widths.
+        (n, k): where the runs are, in widths.
     weight, reach
-        (p, n), (p,): how much each counts, and how far the kernel reaches, in widths.
+        (n,): how much each counts; how far the kernel reaches, in widths.
     values
-        (p, c, n); the arithmetic has their precision.
+        (c, n), single precision, as the arithmetic is.
     tailed
         Whether the scatter is that of Student's t, which a few runs far out do not
         blow up (slower), or a mean square.
     """
+    n, k = offset.shape
+    near = np.empty(n, np.int64)
+    count = 0
+    for i in range(n):
+        if weight[i] > 0.0:
+            near[count] = i
+            count += 1
+    basis = np.empty((k + 1, count), np.float32)
+    w = np.empty(count, np.float32)
+    for i in range(count):
+        run = near[i]
+        w[i] = weight[run]
+        basis[0, i] = 1.0
+        for j in range(k):
+            basis[j + 1, i] = offset[run, j]
+    normal, doubly, total = _products(basis, w)
     # The ridge is for slopes in units of the kernel's reach.
-    planes = fit_planes(offset, weight, _RIDGE * reach**2, values)
-    squares, weighed, inverse = planes.squares, planes.weighed, planes.inverse
-    w = weight[:, None].astype(values.dtype, copy=False)
-    total, most = w.sum(axis=2), w * squares
-    variance = most.sum(axis=2) / total
-    # New arrays of this size would be asked of the system, and cost more than what fills them.
-    share = np.empty_like(most)
-    for _ in range(_TAIL_ITERATIONS if tailed else 0):
-        bound = TAIL * (TAIL_SCALE**2 * variance + 1e-12)
-        np.add(squares, bound[:, :, None], out=share)
-        np.divide(most, share, out=share)
-        variance = (TAIL + 1.0) * variance * share.sum(axis=2) / total
-    used = (inverse * (weighed @ weighed.transpose(0, 2, 1))).sum(axis=(1, 2))[:, None]
-    variance *= total / np.maximum(total - used, 0.3 * total)
-    leverage = ((inverse[:, :1] @ weighed) ** 2).sum(axis=2)
-    variance *= 1.0 + leverage
-    return planes.coefficients[:, :, 0], variance
+    normal[0, 0] += 1e-9
+    for j in range(1, k + 1):
+        normal[j, j] += _RIDGE * reach * reach
+    inverse, _ = invert(normal)
+    hat = _hat(inverse, basis, w)
+    used, leverage = 0.0, 0.0
+    for i in range(k + 1):
+        leverage_i = 0.0
+        for j in range(k + 1):
+            used += inverse[i, j] * doubly[i, j]
+            leverage_i += doubly[i, j] * inverse[0, j]
+        leverage += leverage_i * inverse[0, i]
+    widened = total / max(total - used, 0.3 * total) * (1.0 + leverage)
+    whole = count == n
+    v, squares = np.empty(count, np.float32), np.empty(count, np.float32)
+    for c in range(len(values)):
+        if whole:
+            v[:] = values[c]
+        else:
+            for i in range(count):
+                v[i] = values[c, near[i]]
+        value[c] = _squares_left(v, basis, hat, squares)
+        variance[c] = widened * _spread(squares, w, total, tailed)
+
+
+@njit(nogil=True, error_model="numpy")
+def invert(matrix):
+    """Inverse of a small matrix, symmetric and positive, and the logarithm of its determinant."""
+    size = len(matrix)
+    left, inverse, log_det = matrix.copy(), np.eye(size), 0.0
+    for a in range(size):
+        log_det += np.log(left[a, a])
+        per_pivot = 1.0 / left[a, a]
+        for c in range(size):
+            left[a, c] *= per_pivot
+            inverse[a, c] *= per_pivot
+        for b in range(size):
+            if b != a:
+                factor = left[b, a]
+                for c in range(size):
+                    left[b, c] -= factor * left[a, c]
+                    inverse[b, c] -= factor * inverse[a, c]
+    return inverse, log_det
+
+
+@njit(nogil=True, fastmath=_ANY_ORDER, error_model="numpy")
+def _products(basis, w):
+    """The normal matrix, the same with weights squared, and the sum of the weights."""
+    size, count = basis.shape
+    normal, doubly = np.empty((size, size)), np.empty((size, size))
+    for a in range(size):
+        for b in range(a + 1):
+            one, two = np.float32(0.0), np.float32(0.0)
+            for i in range(count):
+                both = w[i] * basis[a, i] * basis[b, i]
+                one += both
+                two += w[i] * both
+            normal[a, b] = normal[b, a] = one
+            doubly[a, b] = doubly[b, a] = two
+    return normal, doubly, normal[0, 0]
+
+
+@njit(nogil=True, fastmath=_ANY_ORDER, error_model="numpy")
+def _hat(inverse, basis, w):
+    """What makes value and slopes of what runs show (1 + k, n)."""
+    size, count = basis.shape
+    hat = np.zeros((size, count), np.float32)
+    for a in range(size):
+        for b in range(size):
+            share = np.float32(inverse[a, b])
+            for i in range(count):
+                hat[a, i] += share * w[i] * basis[b, i]
+    return hat
+
+
+@njit(nogil=True, fastmath=_ANY_ORDER, error_model="numpy")
+def _squares_left(v, basis, hat, squares):
+    """Value of the plane through v (n,); `squares` of what it leaves are overwritten."""
+    size, count = basis.shape
+    value = np.float32(0.0)
+    for i in range(count):
+        value += hat[0, i] * v[i]
+    for i in range(count):
+        squares[i] = v[i] - value
+    for a in range(1, size):
+        slope = np.float32(0.0)
+        for i in range(count):
+            slope += hat[a, i] * v[i]
+        for i in range(count):
+            squares[i] -= slope * basis[a, i]
+    for i in range(count):
+        squares[i] *= squares[i]
+    return value
+
+
+@njit(nogil=True, fastmath=_ANY_ORDER, error_model="numpy")
+def _spread(squares, w, total, tailed):
+    """Their weighted mean, or the variance of Student's t that they show."""
+    count = len(squares)
+    most = np.float32(0.0)
+    for i in range(count):
+        most += w[i] * squares[i]
+    variance = most / total
+    if not tailed:
+        return variance
+    half = count // 2
+    for _ in range(_TAIL_ITERATIONS):
+        bound = np.float32(TAIL * (TAIL_SCALE**2 * variance + 1e-12))
+        share = np.float32(0.0)
+        # Two fractions on one denominator: dividing is what takes long.
+        for i in range(half):
+            x, y = squares[i] + bound, squares[i + half] + bound
+            share += (w[i] * squares[i] * y + w[i + half] * squares[i + half] * x) / (x * y)
+        for i in range(2 * half, count):
+            share += w[i] * squares[i] / (squares[i] + bound)
+        variance *= (TAIL + 1.0) * share / total
+    return variance

@@ -23,9 +23,11 @@ from analysis.branches import Motions
 from analysis.candidate import Candidate, Effects
 from analysis.causes import Hypothesis
 from analysis.chart import Chart, is_at_load
+from analysis.expectation import total_densities
 from analysis.observation import Observation
 from analysis.population import Population
 from analysis.surface import Surface, differences
+from analysis.threads import each
 from sim.unit import Unit
 
 __all__ = [
@@ -85,15 +87,16 @@ def screen_singles(
     unit: Unit, coarse: Observation, atlas: Atlas, wanted: Collection[Effects] | None = None
 ) -> dict[Effects, Place]:
     """The best place of every hypothesis of an atlas, or of those that are wanted."""
-    surfaces, found = _surfaces(unit, coarse, atlas), {}
-    for effects in atlas if wanted is None else wanted:
-        found[effects] = _best_place(surfaces[effects])
-    return found
+    surfaces = _surfaces(unit, coarse, atlas)
+    asked = list(atlas if wanted is None else wanted)
+    places = each(_best_place, [surfaces[effects] for effects in asked])
+    return dict(zip(asked, places, strict=True))
 
 
 def screen_felt(additions: Additions) -> dict[Effects, Place]:
     """The best place of every pair that is seen by what the load is felt as."""
-    return {key: _refined(one, _FELT_PAIR_COUNTS) for key, one in additions.felt.items()}
+    places = each(_best_felt, additions.felt.values())
+    return dict(zip(additions.felt, places, strict=True))
 
 
 def near(places: Mapping[Effects, Place], log_likelihood: float) -> dict[Effects, Place]:
@@ -105,16 +108,19 @@ def near(places: Mapping[Effects, Place], log_likelihood: float) -> dict[Effects
 def screen_pairs(additions: Additions, beside: Effects = ()) -> dict[Effects, Place]:
     """The best place of every pair of causes, or of those with one of `beside`."""
     plain, added = additions.plain, additions.added
-    found = {}
-    for first, second in combinations(sorted(added), 2):
-        key = *first, *second
-        if beside and not set(beside) & set(key):
-            continue
-        if key in additions.felt:
-            found[key] = _refined(additions.felt[key], _FELT_PAIR_COUNTS)
-        else:
-            found[key] = _best_pair(plain, added[first], added[second])
-    return found
+    pairs = [
+        (first, second)
+        for first, second in combinations(sorted(added), 2)
+        if not beside or set(beside) & {*first, *second}
+    ]
+
+    def best(pair: tuple[Effects, Effects]) -> Place:
+        first, second = pair
+        felt = additions.felt.get((*first, *second))
+        return _best_pair(plain, added[first], added[second]) if felt is None else _best_felt(felt)
+
+    places = each(best, pairs)
+    return {(*first, *second): one for (first, second), one in zip(pairs, places, strict=True)}
 
 
 def screen_further(additions: Additions, known: Candidate) -> dict[Effects, Place]:
@@ -124,17 +130,19 @@ def screen_further(additions: Additions, known: Candidate) -> dict[Effects, Plac
     for with a further cause its best place is another.
     """
     rows = _rows_of(additions.coarse, known.surface.observation)
-    shown = [np.array(known.surface.expected(p))[..., rows] for p in known.population.places]
+    expected = each(known.surface.expected, known.population.places)
+    shown = [np.array(one)[..., rows] for one in expected]
+    nothing = np.zeros((1, 3 * len(rows)))
     ratios = _centres(_PAIR_RATIOS)
     nearest = [int(np.argmin(abs(ratios - p[0]))) for p in known.population.places]
     found = {}
     for effects, further in additions.added.items():
         if set(effects) <= set(known.hypothesis.effects):
             continue
-        likelihood = np.array(
+        likelihood = np.concatenate(
             [
-                Surface.log_density(mean + further.shift[at], np.maximum(std, further.std[at])).sum(
-                    axis=(1, 2)
+                total_densities(
+                    mean.ravel(), nothing, further.shift[at], std.reshape(1, -1), further.std[at]
                 )
                 for (mean, std), at in zip(shown, nearest, strict=True)
             ]
@@ -162,8 +170,8 @@ def _rows_of(thinned: Observation, whole: Observation) -> NDArray[np.intp]:
 class _Added:
     """What a cause adds to the baseline.
 
-    `sizes` (count, d - 1); `shift`, `std` (ratios, count, 3, rows): by how much it
-    moves the mean, and the scatter of single runs with it.
+    `sizes` (count, d - 1); `shift`, `std` (ratios, count, 3 rows): by how much it
+    moves the mean of every channel at every row, and the scatter of single runs with it.
     """
 
     sizes: NDArray[np.float64]
@@ -190,8 +198,10 @@ def add_causes(unit: Unit, coarse: Observation, atlas: Atlas) -> Additions:
     surfaces = _surfaces(unit, coarse, atlas)
     ratios = _centres(_PAIR_RATIOS)
     plain = np.array([surfaces[()].expected(np.array([ratio]))[0] for ratio in ratios])
-    added = {e: _added(surface, plain) for e, surface in surfaces.items() if e}
-    return Additions(coarse, plain, added, _felt_pairs(unit, coarse, atlas))
+    causes = [effects for effects in surfaces if effects]
+    added = each(lambda effects: _added(surfaces[effects], plain), causes)
+    felt = _felt_pairs(unit, coarse, atlas)
+    return Additions(coarse, plain, dict(zip(causes, added, strict=True)), felt)
 
 
 def _added(surface: Surface, plain: NDArray[np.float64]) -> _Added:
@@ -200,15 +210,17 @@ def _added(surface: Surface, plain: NDArray[np.float64]) -> _Added:
     expected = np.array(
         [[surface.expected(np.array([ratio, *size])) for size in sizes] for ratio in ratios]
     )
-    return _Added(sizes, expected[:, :, 0] - plain[:, None], expected[:, :, 1])
+    flat = expected.reshape(*expected.shape[:3], -1)
+    shift = flat[:, :, 0] - plain.reshape(len(plain), 1, -1)
+    return _Added(sizes, np.ascontiguousarray(shift), np.ascontiguousarray(flat[:, :, 1]))
 
 
 def _best_pair(plain: NDArray[np.float64], first: _Added, second: _Added) -> Place:
     top, where = -np.inf, np.empty(0)
     for at, ratio in enumerate(_centres(_PAIR_RATIOS)):
-        mean = plain[at] + first.shift[at][:, None] + second.shift[at]
-        std = np.maximum(first.std[at][:, None], second.std[at])
-        likelihood = Surface.log_density(mean, std).sum(axis=(2, 3))
+        likelihood = total_densities(
+            plain[at].ravel(), first.shift[at], second.shift[at], first.std[at], second.std[at]
+        )
         one, other = np.unravel_index(np.argmax(likelihood), likelihood.shape)
         if likelihood[one, other] > top:
             top = float(likelihood[one, other])
@@ -299,6 +311,11 @@ def _best_place(surface: Surface) -> Place:
         return _refined(surface, _FELT_COUNTS)
     counts = _COUNTS[surface.places.shape[1]]
     return _best_of(surface, _mesh([np.linspace(0.0, 1.0, count) for count in counts]))
+
+
+def _best_felt(surface: Surface) -> Place:
+    """The best place of two causes of one size each, both at the load."""
+    return _refined(surface, _FELT_PAIR_COUNTS)
 
 
 def _refined(surface: Surface, counts: Sequence[int]) -> Place:

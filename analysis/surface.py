@@ -20,23 +20,18 @@ from numpy.typing import NDArray
 from analysis.branches import Motions
 from analysis.chart import Chart
 from analysis.emulator import GAIN_TOLERANCE
+from analysis.expectation import expect_alike, expect_by_row, lean, log_densities, weigh
 from analysis.likelihood import HEAT
 from analysis.observation import Observation
 from analysis.population import Population
-from analysis.regression import TAIL, TAIL_SCALE, regress
 
 __all__ = ["Fit", "Surface", "differences"]
-
-_WIDENINGS: NDArray[np.float64] = 1.3 ** np.arange(-3, 9, dtype=np.float64)
-"""Reaches of the kernel, in widths: the first is taken that holds enough runs."""
 
 _BLUR = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0
 """Weights over neighbouring frequencies by which a scatter is smoothed: few runs tell little."""
 
 _FLOOR = np.array([0.003, 0.003, 0.15])
 """What the regression itself gets wrong, by channel, in log units and rad."""
-
-_ITERATIONS = 6
 
 _STRIDES = (0.5, 0.25, 0.12, 0.06)
 """Reach of the random steps of a climb, as shares of what was simulated."""
@@ -128,61 +123,33 @@ class Surface:
         return self._expected(self._offset(place))
 
     def _expected(self, offset: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
-        mean, variance = self._by_row(offset) if len(offset) > 1 else self._at_once(offset)
+        mean, variance = self._by_row(offset) if len(offset) > 1 else self._at_once(offset[0])
         variance = variance @ self._blur
         return mean + self._unread, np.sqrt(variance + self._least)
 
     def _at_once(self, offset: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
         """Mean and variance (3, rows) where runs are as near at one row as at any other."""
-        weights = _weigh(np.sum(offset[0] ** 2, axis=1))
-        shape = self.difference.shape[1:]
+        mixed, shape = self.motions.mixed, self.difference.shape[1:]
+        plain, others, alike = self._parted
+        one, spread, more, wider, rested = expect_alike(
+            offset, self.enough, plain, others, alike, self.tailed
+        )
         mean, variance = np.empty(shape), np.empty(shape)
-        mixed = self.motions.mixed
-        if not mixed.all():
-            pick = self._reach(weights.sum(axis=1))
-            (near,) = np.nonzero(weights[pick])
-            one, other = regress(
-                offset[:, near],
-                weights[pick, near][None],
-                _WIDENINGS[[pick]],
-                self._parted[0].take(near, axis=2),
-                tailed=self.tailed,
-            )
-            mean[:, ~mixed], variance[:, ~mixed] = one.reshape(-1, 3).T, other.reshape(-1, 3).T
-        if mixed.any():
-            alike = self.alike[:, mixed]
-            picks = self._reach(weights @ alike)
-            weight = weights[picks] * alike.T
-            (near,) = np.nonzero(weight.max(axis=0))
-            one, other = regress(
-                offset[:, near],
-                weight.take(near, axis=1),
-                _WIDENINGS[picks],
-                self._parted[1].take(near, axis=2),
-                tailed=self.tailed,
-            )
-            mean[:, mixed] = one.T
-            variance[:, mixed] = other.T + _variance_unknown(weight)
+        mean[:, ~mixed], variance[:, ~mixed] = one.reshape(-1, 3).T, spread.reshape(-1, 3).T
+        mean[:, mixed], variance[:, mixed] = more.T, wider.T + _variance_unknown(rested)
         return mean, variance
 
     def _by_row(self, offset: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
         """Mean and variance (3, rows) where every row has its own neighbours."""
-        squares, alike = np.einsum("rnk,rnk->rn", offset, offset), self.alike.T
-        most = min(int(_MOST * self.enough), squares.shape[1])
+        alike = self._alike_by_row
+        far = np.einsum("rnk,rnk->rn", offset, offset) / alike
+        most = min(int(_MOST * self.enough), far.shape[1])
         # Those in another state of motion come last.
-        near = np.argpartition(squares / alike, most - 1, axis=1)[:, :most]
-        alike = np.take_along_axis(alike, near, axis=1)
-        weights = _weigh(np.take_along_axis(squares, near, axis=1)) * alike
-        picks = self._reach(weights.sum(axis=2))
-        weight = weights[picks, np.arange(len(picks))]
-        mean, variance = regress(
-            np.take_along_axis(offset, near[..., None], axis=1),
-            weight,
-            _WIDENINGS[picks],
-            np.take_along_axis(self._values, near[:, None], axis=2),
-            tailed=self.tailed,
+        near = np.argpartition(far, most - 1, axis=1)[:, :most]
+        mean, variance, rested = expect_by_row(
+            offset, near, self.enough, self._values, alike, self.tailed
         )
-        return mean.T, variance.T + self.motions.mixed * _variance_unknown(weight)
+        return mean.T, variance.T + self.motions.mixed * _variance_unknown(rested)
 
     def fit(self, place: NDArray[np.float64], rows: NDArray[np.bool_] | None = None) -> Fit:
         """Agreement at a place, deviations fitted to some rows (all where None)."""
@@ -192,18 +159,11 @@ class Surface:
         seen = np.isfinite(mean)
         if rows is not None:
             seen &= rows
-        y, slope, least = -mean[seen], slopes[:, seen], np.diag(1.0 / sigmas**2)
-        s2, best = (TAIL_SCALE * std[seen]) ** 2, np.zeros(len(sigmas))
-        for _ in range(_ITERATIONS):
-            trusted = slope * ((TAIL + 1.0) / (TAIL * s2 + (y - best @ slope) ** 2))
-            normal = trusted @ slope.T + least
-            best = np.linalg.solve(normal, trusted @ y)
-        residual = -mean - np.tensordot(best, slopes, axes=1)
+        best, prior = lean(-mean.ravel(), std.ravel(), slopes, sigmas, seen.ravel())
+        residual = -mean - (best @ slopes).reshape(mean.shape)
         density = self.log_density(-residual, std)
         # Of runs near the place so many do as was observed.
-        density[2] += self.motions.log_shares(self._near(_distance(offset)))
-        _, log_det = np.linalg.slogdet(normal @ np.diag(sigmas**2))
-        prior = -0.5 * float(np.sum((best / sigmas) ** 2)) - 0.5 * float(log_det)
+        density[2] += self.motions.log_shares(weigh(_distance(offset), self.enough))
         total = float(density[seen].sum()) + prior
         return Fit(place, total, residual, np.where(np.isfinite(mean), std, np.nan), density, best)
 
@@ -253,13 +213,11 @@ class Surface:
     @staticmethod
     def log_density(mean: NDArray[np.float64], std: NDArray[np.float64]) -> NDArray[np.float64]:
         """Student's t with a mean and a standard deviation (3, rows); 0 where nothing is known."""
-        scale = TAIL_SCALE * std
-        tail = -0.5 * (TAIL + 1.0) * np.log1p((mean / scale) ** 2 / TAIL)
-        return np.where(np.isfinite(mean), tail - np.log(scale), 0.0)
+        return np.asarray(log_densities(mean.ravel(), std.ravel()).reshape(mean.shape))
 
     def lost(self, place: NDArray[np.float64]) -> int:
         """How many rows no run near a place shows as they were observed."""
-        near = self._near(self.distance(place))
+        near = weigh(self.distance(place), self.enough)
         return int(np.count_nonzero(near @ self.motions.alike < 1.0))
 
     def distance(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -273,17 +231,6 @@ class Surface:
     def _offset(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
         """How far (1 or rows, n, k) the runs are from a place, in widths."""
         return np.asarray((self._charted - self.on_chart(place[None])) / self.width)
-
-    def _near(self, distance: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Weights (n,) of runs near a place, whatever they do there."""
-        weights = _weigh(distance)
-        return np.asarray(weights[self._reach(weights.sum(axis=1))])
-
-    def _reach(self, totals: NDArray[np.float64]) -> NDArray[np.intp]:
-        """The first reach whose weights (reaches, ...) suffice, or the last."""
-        enough = totals >= self.enough
-        enough[-1] = True
-        return np.argmax(enough, axis=0)
 
     @cached_property
     def _charted(self) -> NDArray[np.float64]:
@@ -318,20 +265,28 @@ class Surface:
         return np.stack([noise**2, noise**2, 0.0 * noise]) + _FLOOR[:, None] ** 2
 
     @cached_property
-    def _parted(self) -> tuple[NDArray, NDArray]:
-        """The values (1, columns, n) of rows where all runs do as was observed; (rows, 3, n) else.
+    def _parted(self) -> tuple[NDArray, NDArray, NDArray]:
+        """The values (columns, n) of rows where all runs do as was observed; (rows, 3, n) else.
 
-        Weighted alike, the former are one problem.
+        Weighted alike, the former are one problem. Last (rows, n): how much runs count
+        at the latter.
         """
         mixed = self.motions.mixed
-        return self._values[~mixed].reshape(1, -1, len(self.places)), self._values[mixed]
+        plain = self._values[~mixed].reshape(-1, len(self.places))
+        return plain, self._values[mixed], self._alike_by_row[mixed]
+
+    @cached_property
+    def _alike_by_row(self) -> NDArray[np.float64]:
+        """(rows, n): how much runs count at each row."""
+        return np.ascontiguousarray(self.alike.T)
 
     @cached_property
     def _leanings(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The slopes (k + 1, 3, rows) and sigmas (k + 1,), those of the tachometer's gain last."""
+        """The slopes (k + 1, 3 rows) and sigmas (k + 1,), those of the tachometer's gain last."""
         gain = np.zeros((1, *self.difference.shape[1:]))
         gain[0, 0] = 1.0
-        return np.concatenate([self.slopes, gain]), np.append(self.sigmas, GAIN_TOLERANCE)
+        slopes = np.concatenate([self.slopes, gain]).reshape(len(self.sigmas) + 1, -1)
+        return slopes, np.append(self.sigmas, GAIN_TOLERANCE)
 
     @cached_property
     def _values(self) -> NDArray:
@@ -348,13 +303,7 @@ def _distance(offset: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.einsum("rnk,rnk->n", offset, offset) / len(offset))
 
 
-def _weigh(squares: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Weights (reaches, ...) of runs at squared distances, for every reach that may be needed."""
-    reaches = _WIDENINGS.reshape(-1, *[1] * squares.ndim)
-    return np.asarray(np.clip(1.0 - squares / reaches**2 / 4.0, 0.0, None) ** 2)
-
-
-def _variance_unknown(weight: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What to add to the variance (3, rows) where the weights (rows, n) are next to nothing."""
-    unknown = np.clip(1.0 - weight.sum(axis=1), 0.0, 1.0)
+def _variance_unknown(rested: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What to add to the variance (3, rows) where runs rest on next to nothing (rows,)."""
+    unknown = np.clip(1.0 - rested, 0.0, 1.0)
     return np.asarray(unknown * _UNKNOWN[:, None] ** 2)
