@@ -88,5 +88,6 @@ $(READY): pyproject.toml requirements.lock
 	@$(BIN)/python -c "from daq.plan import SweepPlan; from sim.unit import load_unit; \
 	  from sim.response import Servo, simulate_cycles; \
 	  plan = SweepPlan((500.0,), (1.0,), settle_cycles=1, integrate_cycles=1); \
-	  [simulate_cycles([Servo.of(load_unit('adss'), 0.5)], plan, single=s) for s in (False, True)]"
+	  [simulate_cycles([Servo.of(load_unit('adss'), 0.5)], plan, single=s) for s in (False, True)]; \
+	  from analysis.expectation import compile_all; compile_all()"
 	@touch $@

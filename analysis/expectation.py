@@ -13,6 +13,7 @@ from analysis.regression import TAIL, TAIL_SCALE, invert, solve_plane
 from sim.compiling import njit
 
 __all__ = [
+    "compile_all",
     "expect_alike",
     "expect_by_row",
     "lean",
@@ -219,3 +220,18 @@ def total_densities(mean, one_shift, other_shift, one_std, other_std):
                     tails, scales, held = 1.0, 1.0, 0
             found[i, j] = total - 0.5 * (TAIL + 1.0) * np.log(tails) - np.log(scales)
     return found
+
+
+def compile_all() -> None:
+    """Compile what is here, or load what was: seconds that a set-up may spend beforehand."""
+    runs, rows = 6, 4
+    values, alike = np.zeros((rows, 3, runs), np.float32), np.ones((rows, runs))
+    offset = np.linspace(-1.0, 1.0, runs)[:, None]
+    near = np.tile(np.arange(runs), (rows, 1))
+    expect_alike(offset, 1.0, values.reshape(-1, runs), values, alike, True)
+    expect_by_row(np.tile(offset, (rows, 1, 1)), near, 1.0, values, alike, True)
+    one, many = np.ones(3 * rows), np.ones((2, 3 * rows))
+    weigh(np.ones(runs), 1.0)
+    log_densities(one, one)
+    lean(one, one, many, np.ones(2), one > 0.0)
+    total_densities(one, many, many, many, many)

@@ -24,7 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.assembly import PiecewiseLinearSystem
-from sim.kernel import MOST_VECTORS, SUMS, Layout, Structure, step_cycles
+from sim.kernel import MOST_VECTORS, step_cycles
+from sim.layout import SUMS, Layout, Structure
 from sim.propagator import Modes, Propagator, build_propagator, find_modes
 from sim.solving import kinds_of, law_coefficients, order_of
 

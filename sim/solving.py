@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.assembly import Law, Nonlinearity
-from sim.kernel import PAIR, STRIBECK
+from sim.layout import PAIR, STRIBECK
 
 __all__ = ["kinds_of", "law_coefficients", "order_of"]
 
@@ -29,7 +29,7 @@ _OF_A_LAW = 5
 
 
 def kinds_of(laws: Sequence[Nonlinearity]) -> tuple[int, ...]:
-    """Kinds as `sim.kernel` has them: a friction that peaks at rest, and springs in pairs."""
+    """Kinds as `sim.layout` has them: a friction that peaks at rest, and springs in pairs."""
     kinds = [
         STRIBECK if law.law is Law.FRICTION and law.parameters[1] != 0.0 else int(law.law)
         for law in laws
@@ -90,7 +90,7 @@ def _hardly_feel(j: int, k: int, kinds: Sequence[int], gain: NDArray[np.float64]
 def law_coefficients(
     kinds: Sequence[int], gain: NDArray[np.float64], fixed: Sequence[tuple[float, float]]
 ) -> NDArray[np.float64]:
-    """(m, 5) what solving each law takes besides its parameters, see `sim.kernel.Layout`."""
+    """(m, 5) what solving each law takes besides its parameters, see `sim.layout.Layout`."""
     found = np.zeros((len(kinds), _OF_A_LAW))
     for j, (kind, (k, c)) in enumerate(zip(kinds, fixed, strict=True)):
         beta = gain[j, j]

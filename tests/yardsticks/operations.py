@@ -15,7 +15,8 @@ import numpy as np
 from llvmlite import ir
 
 from sim.compiling import njit
-from sim.kernel import Layout, Program, Structure
+from sim.kernel import Program
+from sim.layout import Layout, Structure
 
 _KINDS = {"fadd": "add or multiply", "fsub": "add or multiply", "fmul": "add or multiply",
           "fdiv": "divide", "fcmp_ordered": "compare"}  # fmt: skip

@@ -1,0 +1,146 @@
+"""The compiled arithmetic of a fit against numpy, scipy and textbooks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import stats
+from synthetic import ROWS, candidate, observation, read
+
+from analysis import expectation
+from analysis.regression import TAIL, TAIL_SCALE, fit_planes, invert, solve_plane
+
+
+def weighted(seed, n=40, k=2, c=5):
+    """Offsets, weights and values of runs about a plane, and that plane at offset zero."""
+    rng = np.random.default_rng(seed)
+    offset, weight = rng.standard_normal((n, k)), rng.uniform(0.1, 1.0, n)
+    level, slopes = rng.standard_normal(c), rng.standard_normal((c, k))
+    scatter = 0.05 * rng.standard_normal((c, n))
+    return offset, weight, (level[:, None] + slopes @ offset.T + scatter).astype(np.float32), level
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_plane_is_that_of_weighted_least_squares(seed):
+    offset, weight, values, _ = weighted(seed)
+    value, variance = np.empty(len(values)), np.empty(len(values))
+    solve_plane(offset, weight, 0.0, values, False, value, variance)
+    basis = np.column_stack([np.ones(len(offset)), offset])
+    root = np.sqrt(weight)[:, None]
+    found, *_ = np.linalg.lstsq(basis * root, values.T.astype(float) * root, rcond=None)
+    assert value == pytest.approx(found[0], abs=2e-6)
+    left = (values.T - basis @ found) ** 2
+    hat = np.linalg.inv((basis * weight[:, None]).T @ basis) @ (basis * weight[:, None]).T
+    used = np.trace(hat @ (basis * weight[:, None]))
+    expected = (weight @ left) / (weight.sum() - used) * (1.0 + np.sum(hat[0] ** 2))
+    assert variance == pytest.approx(expected, rel=1e-4)
+    (planes,) = fit_planes(
+        offset[None], weight[None], np.zeros(1), values[None].astype(float)
+    ).coefficients
+    assert planes == pytest.approx(found.T, abs=1e-6)
+
+
+@pytest.mark.parametrize("n", [7, 8, 33])
+def test_a_run_without_weight_does_not_count(n):
+    offset, weight, values, _ = weighted(3, n)
+    more = np.concatenate([offset, [[9.0, -9.0]]])
+    wild = np.concatenate([values, np.full((len(values), 1), 50.0, np.float32)], axis=1)
+    results = []
+    for at, w, v in ((offset, weight, values), (more, np.append(weight, 0.0), wild)):
+        value, variance = np.empty(len(v)), np.empty(len(v))
+        solve_plane(at, w, 0.5, v, True, value, variance)
+        results.append((value, variance))
+    assert np.array_equal(results[0], results[1])
+
+
+def test_the_variance_of_students_t_is_found_and_a_wild_run_hardly_moves_it():
+    rng = np.random.default_rng(5)
+    n, columns = 4000, 6
+    values = (0.3 * TAIL_SCALE * rng.standard_t(TAIL, (columns, n))).astype(np.float32)
+    offset, weight = 0.01 * rng.standard_normal((n, 1)), np.ones(n)
+    value, variance = np.empty(columns), np.empty(columns)
+    solve_plane(offset, weight, 1.0, values, True, value, variance)
+    assert np.sqrt(variance) == pytest.approx(np.full(columns, 0.3), rel=0.08)
+    spoilt, moved = values.copy(), np.empty(columns)
+    spoilt[:, :20] = 9.0
+    solve_plane(offset, weight, 1.0, spoilt, True, value, moved)
+    assert moved == pytest.approx(variance, rel=0.15)
+    solve_plane(offset, weight, 1.0, spoilt, False, value, moved)
+    assert np.all(moved > 3.0 * variance)
+
+
+@pytest.mark.parametrize("size", [1, 2, 6])
+def test_a_matrix_times_its_inverse_is_one(size):
+    rng = np.random.default_rng(size)
+    root = rng.standard_normal((size, size + 3)) * 10.0 ** rng.uniform(-3, 3, (size, 1))
+    matrix = root @ root.T
+    inverse, log_det = invert(matrix)
+    assert matrix @ inverse == pytest.approx(np.eye(size), abs=1e-8)
+    assert log_det == pytest.approx(np.linalg.slogdet(matrix)[1])
+
+
+def test_densities_are_students_t_and_nothing_where_nothing_was_observed():
+    mean, std = np.array([0.1, -2.0, np.nan, 0.0]), np.array([0.5, 0.7, 1.0, 2.0])
+    found = expectation.log_densities(mean, std)
+    scale = TAIL_SCALE * std
+    # A constant of every column is left out.
+    constant = stats.t(TAIL).logpdf(0.0)
+    expected = stats.t(TAIL, scale=scale).logpdf(np.nan_to_num(mean)) - constant
+    assert found[2] == 0.0
+    assert found[[0, 1, 3]] == pytest.approx(expected[[0, 1, 3]])
+
+
+def test_densities_of_two_shifts_together_are_summed_over_what_was_observed():
+    rng = np.random.default_rng(2)
+    mean = rng.standard_normal(29)
+    mean[[3, 17]] = np.nan
+    shifts = [rng.standard_normal((count, 29)) for count in (3, 4)]
+    stds = [rng.uniform(1e-3, 3.0, (count, 29)) for count in (3, 4)]
+    shifts[0][:, 17] = np.nan
+    found = expectation.total_densities(mean, *shifts, *stds)
+    for i in range(3):
+        for j in range(4):
+            together = mean + shifts[0][i] + shifts[1][j]
+            each = expectation.log_densities(together, np.maximum(stds[0][i], stds[1][j]))
+            assert found[i, j] == pytest.approx(each.sum(), rel=1e-10)
+
+
+def test_leaning_is_the_most_probable_deviation():
+    rng = np.random.default_rng(4)
+    slope, truth = rng.standard_normal((3, 200)), np.array([0.4, -0.2, 0.0])
+    std, sigmas = rng.uniform(0.05, 0.2, 200), np.array([0.5, 0.5, 1e-4])
+    apart = truth @ slope + std * rng.standard_normal(200)
+    seen = rng.uniform(size=200) < 0.8
+    best, log_prior = expectation.lean(apart, std, slope, sigmas, seen)
+    assert best == pytest.approx(truth, abs=0.06)
+
+    def log_posterior(deviations):
+        left = (apart - deviations @ slope)[seen]
+        likely = expectation.log_densities(left, std[seen]).sum()
+        return likely - 0.5 * np.sum((deviations / sigmas) ** 2)
+
+    top = log_posterior(best)
+    for step in 0.02 * np.vstack([np.eye(3), -np.eye(3)]) * sigmas:
+        assert log_posterior(best + step) < top + 1e-3
+    assert log_prior < -0.5 * np.sum((best / sigmas) ** 2)
+
+
+def test_weights_are_those_of_the_first_reach_that_suffices():
+    squares = np.array([0.0, 0.04, 0.5, 2.0, 9.0])
+    weight = expectation.weigh(squares, 2.0)
+    assert weight.sum() >= 2.0
+    assert np.all(np.diff(weight) <= 0.0)
+    assert expectation.weigh(squares, 1e9).sum() < len(squares)
+
+
+def test_what_is_compiled_beforehand_is_what_a_fit_takes():
+    expectation.compile_all()
+    before = {
+        name: list(getattr(expectation, name).signatures)
+        for name in ("expect_alike", "expect_by_row", "lean", "log_densities", "weigh")
+    }
+    seen = observation(read(("load-inertia",), np.array([0.5, 0.4]), np.random.default_rng(0)))
+    candidate(seen, ("load-inertia",))
+    assert len(seen) == ROWS
+    for name, known in before.items():
+        assert list(getattr(expectation, name).signatures) == known, name
