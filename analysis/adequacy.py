@@ -15,9 +15,8 @@ import numpy as np
 
 from analysis.candidate import Candidate
 from analysis.holdout import HeldOut, hold_out_surface
-from analysis.own_runs import MOST_RUNS, OwnRun, own_runs
+from analysis.own_runs import MOST_RUNS, own_runs
 from analysis.structure import judge_structure
-from analysis.threads import each
 
 __all__ = ["Adequacy", "judge_adequacy", "judge_chance", "misses_alike"]
 
@@ -44,7 +43,7 @@ def judge_adequacy(candidate: Candidate, rng: np.random.Generator) -> Adequacy:
     The runs are given reading noise; each is fitted without the group that
     shares its deviations.
     """
-    fits = each(lambda run: run.alone.climb(run.place, tries=1), own_runs(candidate, rng))
+    fits = [run.alone.climb(run.place, tries=1) for run in own_runs(candidate, rng)]
     surface, best = candidate.surface, candidate.best
     own = [fit.log_likelihood for fit in fits]
     centre = float(np.median(own))
@@ -63,12 +62,12 @@ def judge_chance(simpler: Candidate, alleged: Candidate, rng: np.random.Generato
     (D. R. Cox, "Tests of separate families of hypotheses", 1961).
     """
     seen = alleged.best.log_likelihood - simpler.best.log_likelihood
-
-    def gain(run: OwnRun) -> float:
-        better = run.seen_by(alleged.surface).climb(alleged.best.place, tries=_TRIES)
-        return better.log_likelihood - run.alone.climb(run.place, tries=_TRIES).log_likelihood
-
-    return float(np.mean(np.array(each(gain, own_runs(simpler, rng))) >= seen))
+    gains = [
+        run.seen_by(alleged.surface).climb(alleged.best.place, tries=_TRIES).log_likelihood
+        - run.alone.climb(run.place, tries=_TRIES).log_likelihood
+        for run in own_runs(simpler, rng)
+    ]
+    return float(np.mean(np.array(gains) >= seen))
 
 
 def misses_alike(

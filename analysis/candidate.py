@@ -20,7 +20,6 @@ from analysis.ensemble import TOLERANCES
 from analysis.observation import Observation
 from analysis.population import DEVIATING, Population
 from analysis.surface import Fit, Surface, differences
-from analysis.threads import each
 from analysis.widths import learn_width
 from sim.unit import Unit
 
@@ -54,16 +53,15 @@ def form_candidates(
         for key, population in fine.items()
     }
     slopes = _pooled_slopes(observation, fine, raw)
-
-    def form(key: Effects) -> Candidate:
-        surface = _without_deviations(raw[key], fine[key], slopes)
+    found = {}
+    for key, population in fine.items():
+        surface = _without_deviations(raw[key], population, slopes)
         charts = surface.on_chart(surface.places), surface.on_chart(starts[key][None])
         width = learn_width(charts[0], surface.difference, surface.width, charts[1])
         surface = replace(surface, width=width)
         best = surface.climb(starts[key])
-        return Candidate(Hypothesis(unit, key), fine[key], surface, best)
-
-    return dict(zip(fine, each(form, fine), strict=True))
+        found[key] = Candidate(Hypothesis(unit, key), population, surface, best)
+    return found
 
 
 def _surface(observation: Observation, population: Population, hypothesis: Hypothesis) -> Surface:

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from analysis.candidate import Candidate
 from analysis.observation import Observation
-from analysis.surface import Fit, Surface
-from analysis.threads import each
+from analysis.surface import Surface
 from daq.frf import DB_PER_NEPER
 
 __all__ = ["AT_NOISE", "HeldOut", "hold_out", "hold_out_surface"]
@@ -70,14 +69,10 @@ def hold_out_surface(
     shape = (3, len(observation))
     residual, std = np.full(shape, np.nan), np.full(shape, np.nan)
     score = 0.0
-
-    def seen_without(fold: slice) -> list[Fit]:
+    for fold in _folds(observation):
         rows = np.ones(len(observation), dtype=bool)
         rows[fold] = False
-        return surface.walk(start, rows, tries=_TRIES)
-
-    folds = _folds(observation)
-    for fold, fits in zip(folds, each(seen_without, folds), strict=True):
+        fits = surface.walk(start, rows, tries=_TRIES)
         share = surface.shares(fits)
         left = np.stack([fit.residual[:, fold] for fit in fits])
         spread = np.stack([fit.std[:, fold] for fit in fits])

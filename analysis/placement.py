@@ -16,7 +16,6 @@ from analysis.candidate import Candidate
 from analysis.causes import Hypothesis
 from analysis.likelihood import HEAT
 from analysis.population import Group
-from analysis.threads import each
 
 __all__ = ["groups_about", "groups_along", "groups_around"]
 
@@ -65,7 +64,7 @@ def groups_along(candidate: Candidate, groups: int, rng: np.random.Generator) ->
     margin = _BEYOND * (high - low)
     bottom, top = np.clip([low - margin, high + margin], 0.0, 1.0)
     cloud = np.vstack([rng.uniform(bottom, top, (_CLOUD, len(low))), candidate.best.place])
-    likelihood = np.array(each(lambda place: surface.fit(place).log_likelihood, cloud))
+    likelihood = np.array([surface.fit(place).log_likelihood for place in cloud])
     weight = np.exp((likelihood - likelihood.max()) / HEAT)
     order = np.argsort(cloud[:, min(1, cloud.shape[1] - 1)])
     share = np.cumsum(weight[order]) / weight.sum()

@@ -27,7 +27,6 @@ from analysis.expectation import total_densities
 from analysis.observation import Observation
 from analysis.population import Population
 from analysis.surface import Surface, differences
-from analysis.threads import each
 from sim.unit import Unit
 
 __all__ = [
@@ -88,15 +87,13 @@ def screen_singles(
 ) -> dict[Effects, Place]:
     """The best place of every hypothesis of an atlas, or of those that are wanted."""
     surfaces = _surfaces(unit, coarse, atlas)
-    asked = list(atlas if wanted is None else wanted)
-    places = each(_best_place, [surfaces[effects] for effects in asked])
-    return dict(zip(asked, places, strict=True))
+    asked = atlas if wanted is None else wanted
+    return {effects: _best_place(surfaces[effects]) for effects in asked}
 
 
 def screen_felt(additions: Additions) -> dict[Effects, Place]:
     """The best place of every pair that is seen by what the load is felt as."""
-    places = each(_best_felt, additions.felt.values())
-    return dict(zip(additions.felt, places, strict=True))
+    return {key: _best_felt(one) for key, one in additions.felt.items()}
 
 
 def near(places: Mapping[Effects, Place], log_likelihood: float) -> dict[Effects, Place]:
@@ -108,19 +105,16 @@ def near(places: Mapping[Effects, Place], log_likelihood: float) -> dict[Effects
 def screen_pairs(additions: Additions, beside: Effects = ()) -> dict[Effects, Place]:
     """The best place of every pair of causes, or of those with one of `beside`."""
     plain, added = additions.plain, additions.added
-    pairs = [
-        (first, second)
-        for first, second in combinations(sorted(added), 2)
-        if not beside or set(beside) & {*first, *second}
-    ]
-
-    def best(pair: tuple[Effects, Effects]) -> Place:
-        first, second = pair
-        felt = additions.felt.get((*first, *second))
-        return _best_pair(plain, added[first], added[second]) if felt is None else _best_felt(felt)
-
-    places = each(best, pairs)
-    return {(*first, *second): one for (first, second), one in zip(pairs, places, strict=True)}
+    found = {}
+    for first, second in combinations(sorted(added), 2):
+        key = *first, *second
+        if beside and not set(beside) & set(key):
+            continue
+        if key in additions.felt:
+            found[key] = _best_felt(additions.felt[key])
+        else:
+            found[key] = _best_pair(plain, added[first], added[second])
+    return found
 
 
 def screen_further(additions: Additions, known: Candidate) -> dict[Effects, Place]:
@@ -130,8 +124,7 @@ def screen_further(additions: Additions, known: Candidate) -> dict[Effects, Plac
     for with a further cause its best place is another.
     """
     rows = _rows_of(additions.coarse, known.surface.observation)
-    expected = each(known.surface.expected, known.population.places)
-    shown = [np.array(one)[..., rows] for one in expected]
+    shown = [np.array(known.surface.expected(p))[..., rows] for p in known.population.places]
     nothing = np.zeros((1, 3 * len(rows)))
     ratios = _centres(_PAIR_RATIOS)
     nearest = [int(np.argmin(abs(ratios - p[0]))) for p in known.population.places]
@@ -198,10 +191,8 @@ def add_causes(unit: Unit, coarse: Observation, atlas: Atlas) -> Additions:
     surfaces = _surfaces(unit, coarse, atlas)
     ratios = _centres(_PAIR_RATIOS)
     plain = np.array([surfaces[()].expected(np.array([ratio]))[0] for ratio in ratios])
-    causes = [effects for effects in surfaces if effects]
-    added = each(lambda effects: _added(surfaces[effects], plain), causes)
-    felt = _felt_pairs(unit, coarse, atlas)
-    return Additions(coarse, plain, dict(zip(causes, added, strict=True)), felt)
+    added = {e: _added(surface, plain) for e, surface in surfaces.items() if e}
+    return Additions(coarse, plain, added, _felt_pairs(unit, coarse, atlas))
 
 
 def _added(surface: Surface, plain: NDArray[np.float64]) -> _Added:
