@@ -120,10 +120,14 @@ class Surface:
 
     def expected(self, place: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
         """Mean difference (3, rows) of runs at a place, and the scatter of a single run there."""
-        return self._expected(self._offset(place))
+        offset = self._offset(place)
+        return self._expected(offset, _squares(offset))
 
-    def _expected(self, offset: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
-        mean, variance = self._by_row(offset) if len(offset) > 1 else self._at_once(offset[0])
+    def _expected(
+        self, offset: NDArray[np.float64], squares: NDArray[np.float64]
+    ) -> tuple[NDArray, NDArray]:
+        several = len(offset) > 1
+        mean, variance = self._by_row(offset, squares) if several else self._at_once(offset[0])
         variance = variance @ self._blur
         return mean + self._unread, np.sqrt(variance + self._least)
 
@@ -139,10 +143,12 @@ class Surface:
         mean[:, mixed], variance[:, mixed] = more.T, wider.T + _variance_unknown(rested)
         return mean, variance
 
-    def _by_row(self, offset: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
+    def _by_row(
+        self, offset: NDArray[np.float64], squares: NDArray[np.float64]
+    ) -> tuple[NDArray, NDArray]:
         """Mean and variance (3, rows) where every row has its own neighbours."""
         alike = self._alike_by_row
-        far = np.einsum("rnk,rnk->rn", offset, offset) / alike
+        far = squares / alike
         most = min(int(_MOST * self.enough), far.shape[1])
         # Those in another state of motion come last.
         near = np.argpartition(far, most - 1, axis=1)[:, :most]
@@ -154,7 +160,8 @@ class Surface:
     def fit(self, place: NDArray[np.float64], rows: NDArray[np.bool_] | None = None) -> Fit:
         """Agreement at a place, deviations fitted to some rows (all where None)."""
         offset = self._offset(place)
-        mean, std = self._expected(offset)
+        squares = _squares(offset)
+        mean, std = self._expected(offset, squares)
         slopes, sigmas = self._leanings
         seen = np.isfinite(mean)
         if rows is not None:
@@ -163,7 +170,7 @@ class Surface:
         residual = -mean - (best @ slopes).reshape(mean.shape)
         density = self.log_density(-residual, std)
         # Of runs near the place so many do as was observed.
-        density[2] += self.motions.log_shares(weigh(_distance(offset), self.enough))
+        density[2] += self.motions.log_shares(weigh(squares.mean(axis=0), self.enough))
         total = float(density[seen].sum()) + prior
         return Fit(place, total, residual, np.where(np.isfinite(mean), std, np.nan), density, best)
 
@@ -222,7 +229,7 @@ class Surface:
 
     def distance(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
         """How far (n,) the runs are from a place, in widths squared, over all rows."""
-        return _distance(self._offset(place))
+        return np.asarray(_squares(self._offset(place)).mean(axis=0))
 
     def on_chart(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
         """Coordinates (1 or rows, m, k) of places (m, d) in which runs are compared."""
@@ -298,9 +305,9 @@ class Surface:
         return np.ascontiguousarray(known, dtype=np.float32)
 
 
-def _distance(offset: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Squares (n,) of how far runs are in the mean of all rows, from offsets (rows, n, k)."""
-    return np.asarray(np.einsum("rnk,rnk->n", offset, offset) / len(offset))
+def _squares(offset: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Squares (rows, n) of how far runs are, from offsets (rows, n, k)."""
+    return np.asarray(np.einsum("rnk,rnk->rn", offset, offset))
 
 
 def _variance_unknown(rested: NDArray[np.float64]) -> NDArray[np.float64]:
