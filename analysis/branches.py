@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.expectation import log_shares
 from analysis.observation import Observation
 from analysis.population import Population
 
@@ -24,8 +25,7 @@ _ABOVE_NOISE = 0.7
 """Logarithm of a scatter above what the reading's noise alone shows: twice, and it chatters."""
 
 _STAY = 0.98
-"""Prior share of runs that stay in their state from one row to the next, worth `_PRIOR` runs."""
-_PRIOR = 1.0
+"""Prior share of runs that stay in their state from one row to the next, worth one run."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,20 +72,19 @@ class Motions:
         Of those in the observed state one row before: what is observed of a
         level begins on one branch and then stays there or changes.
         """
-        before, both, prior = self._course
-        return np.asarray(np.log((weight @ both + prior) / (weight @ before + _PRIOR)))
+        return np.asarray(log_shares(weight, *self.course))
 
     @cached_property
-    def _course(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def course(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Whether runs (n, rows) did as observed one row before, and there too; the prior (rows,).
 
-        The prior is that of the latter, as a number of runs.
+        The prior is that of the latter, as a number of runs, of one in all.
         """
         before = np.where(self.starts, 1.0, np.roll(self.alike, 1, axis=1))
         changed = (self.seen != np.roll(self.seen, 1)) & ~self.starts
         prior = np.where(self.starts, 0.5, np.where(changed, 1.0 - _STAY, _STAY))
         prior[self.seen < 0] = 1.0
-        return before, before * self.alike, _PRIOR * prior
+        return before, before * self.alike, prior
 
 
 def find_motions(observation: Observation, population: Population) -> Motions:

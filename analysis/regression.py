@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.compiling import njit
+from sim.compiling import njit, part
 
 __all__ = ["TAIL", "TAIL_SCALE", "Planes", "fit_planes", "invert", "solve_plane"]
 
@@ -112,14 +112,10 @@ def solve_plane(offset, weight, reach, values, tailed, value, variance):
             leverage_i += doubly[i, j] * inverse[0, j]
         leverage += leverage_i * inverse[0, i]
     widened = total / max(total - used, 0.3 * total) * (1.0 + leverage)
-    whole = count == n
     v, squares = np.empty(count, np.float32), np.empty(count, np.float32)
     for c in range(len(values)):
-        if whole:
-            v[:] = values[c]
-        else:
-            for i in range(count):
-                v[i] = values[c, near[i]]
+        for i in range(count):
+            v[i] = values[c, near[i]]
         value[c] = _squares_left(v, basis, hat, squares)
         variance[c] = widened * _spread(squares, w, total, tailed)
 
@@ -128,7 +124,11 @@ def solve_plane(offset, weight, reach, values, tailed, value, variance):
 def invert(matrix):
     """Inverse of a small matrix, symmetric and positive, and the logarithm of its determinant."""
     size = len(matrix)
-    left, inverse, log_det = matrix.copy(), np.eye(size), 0.0
+    left, inverse, log_det = np.empty((size, size)), np.zeros((size, size)), 0.0
+    for a in range(size):
+        inverse[a, a] = 1.0
+        for b in range(size):
+            left[a, b] = matrix[a, b]
     for a in range(size):
         log_det += np.log(left[a, a])
         per_pivot = 1.0 / left[a, a]
@@ -144,7 +144,7 @@ def invert(matrix):
     return inverse, log_det
 
 
-@njit(nogil=True, fastmath=_ANY_ORDER, error_model="numpy")
+@part(fastmath=_ANY_ORDER)
 def _products(basis, w):
     """The normal matrix, the same with weights squared, and the sum of the weights."""
     size, count = basis.shape
@@ -161,7 +161,7 @@ def _products(basis, w):
     return normal, doubly, normal[0, 0]
 
 
-@njit(nogil=True, fastmath=_ANY_ORDER, error_model="numpy")
+@part(fastmath=_ANY_ORDER)
 def _hat(inverse, basis, w):
     """What makes value and slopes of what runs show (1 + k, n)."""
     size, count = basis.shape
@@ -174,7 +174,7 @@ def _hat(inverse, basis, w):
     return hat
 
 
-@njit(nogil=True, fastmath=_ANY_ORDER, error_model="numpy")
+@part(fastmath=_ANY_ORDER)
 def _squares_left(v, basis, hat, squares):
     """Value of the plane through v (n,); `squares` of what it leaves are overwritten."""
     size, count = basis.shape
@@ -194,7 +194,7 @@ def _squares_left(v, basis, hat, squares):
     return value
 
 
-@njit(nogil=True, fastmath=_ANY_ORDER, error_model="numpy")
+@part(fastmath=_ANY_ORDER)
 def _spread(squares, w, total, tailed):
     """Their weighted mean, or the variance of Student's t that they show."""
     count = len(squares)

@@ -20,15 +20,12 @@ from numpy.typing import NDArray
 from analysis.branches import Motions
 from analysis.chart import Chart
 from analysis.emulator import GAIN_TOLERANCE
-from analysis.expectation import expect_alike, expect_by_row, lean, log_densities, weigh
+from analysis.expectation import Readings, Runs, agree, log_densities, weigh
 from analysis.likelihood import HEAT
 from analysis.observation import Observation
 from analysis.population import Population
 
 __all__ = ["Fit", "Surface", "differences"]
-
-_BLUR = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0
-"""Weights over neighbouring frequencies by which a scatter is smoothed: few runs tell little."""
 
 _FLOOR = np.array([0.003, 0.003, 0.15])
 """What the regression itself gets wrong, by channel, in log units and rad."""
@@ -38,10 +35,6 @@ _STRIDES = (0.5, 0.25, 0.12, 0.06)
 
 _UNALIKE = 1e-4
 """Weight of runs in another state of motion: they count only where there are no others."""
-
-_UNKNOWN = np.array([0.5, 0.5, 1.5])
-"""Scatter of a motion that no run shows, by channel: a machine that never does what was observed
-is unlikely, but not as unlikely as its other motion would have it."""
 
 _MOST = 3.0
 """How many of the nearest runs take part in a regression at one row, as multiples of `enough`."""
@@ -116,63 +109,25 @@ class Surface:
 
     def scan(self, grid: NDArray[np.float64]) -> NDArray[np.float64]:
         """Log-likelihood (count,) at places (count, d), deviations left in the scatter."""
-        return np.array([self.log_density(*self.expected(place)).sum() for place in grid])
+        charted = np.ascontiguousarray(self.on_chart(grid).swapaxes(0, 1))
+        likelihoods, *_ = agree(self._runs, self._readings, charted, self._every_row, False)
+        return np.asarray(likelihoods)
 
     def expected(self, place: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
         """Mean difference (3, rows) of runs at a place, and the scatter of a single run there."""
-        offset = self._offset(place)
-        return self._expected(offset, _squares(offset))
-
-    def _expected(
-        self, offset: NDArray[np.float64], squares: NDArray[np.float64]
-    ) -> tuple[NDArray, NDArray]:
-        several = len(offset) > 1
-        mean, variance = self._by_row(offset, squares) if several else self._at_once(offset[0])
-        variance = variance @ self._blur
-        return mean + self._unread, np.sqrt(variance + self._least)
-
-    def _at_once(self, offset: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
-        """Mean and variance (3, rows) where runs are as near at one row as at any other."""
-        mixed, shape = self.motions.mixed, self.difference.shape[1:]
-        plain, others, alike = self._parted
-        one, spread, more, wider, rested = expect_alike(
-            offset, self.enough, plain, others, alike, self.tailed
+        asked = self._every_row
+        _, residual, std, *_ = agree(
+            self._runs, self._readings, self._charted_at(place)[None], asked, False
         )
-        mean, variance = np.empty(shape), np.empty(shape)
-        mean[:, ~mixed], variance[:, ~mixed] = one.reshape(-1, 3).T, spread.reshape(-1, 3).T
-        mean[:, mixed], variance[:, mixed] = more.T, wider.T + _variance_unknown(rested)
-        return mean, variance
-
-    def _by_row(
-        self, offset: NDArray[np.float64], squares: NDArray[np.float64]
-    ) -> tuple[NDArray, NDArray]:
-        """Mean and variance (3, rows) where every row has its own neighbours."""
-        alike = self._alike_by_row
-        far = squares / alike
-        most = min(int(_MOST * self.enough), far.shape[1])
-        # Those in another state of motion come last.
-        near = np.argpartition(far, most - 1, axis=1)[:, :most]
-        mean, variance, rested = expect_by_row(
-            offset, near, self.enough, self._values, alike, self.tailed
-        )
-        return mean.T, variance.T + self.motions.mixed * _variance_unknown(rested)
+        return -residual, std
 
     def fit(self, place: NDArray[np.float64], rows: NDArray[np.bool_] | None = None) -> Fit:
         """Agreement at a place, deviations fitted to some rows (all where None)."""
-        offset = self._offset(place)
-        squares = _squares(offset)
-        mean, std = self._expected(offset, squares)
-        slopes, sigmas = self._leanings
-        seen = np.isfinite(mean)
-        if rows is not None:
-            seen &= rows
-        best, prior = lean(-mean.ravel(), std.ravel(), slopes, sigmas, seen.ravel())
-        residual = -mean - (best @ slopes).reshape(mean.shape)
-        density = self.log_density(-residual, std)
-        # Of runs near the place so many do as was observed.
-        density[2] += self.motions.log_shares(weigh(squares.mean(axis=0), self.enough))
-        total = float(density[seen].sum()) + prior
-        return Fit(place, total, residual, np.where(np.isfinite(mean), std, np.nan), density, best)
+        asked = self._every_row if rows is None else rows
+        likelihoods, residual, std, density, deviations = agree(
+            self._runs, self._readings, self._charted_at(place)[None], asked, True
+        )
+        return Fit(place, float(likelihoods[0]), residual, std, density, deviations)
 
     def climb(
         self, start: NDArray[np.float64], rows: NDArray[np.bool_] | None = None, tries: int = 12
@@ -229,15 +184,16 @@ class Surface:
 
     def distance(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
         """How far (n,) the runs are from a place, in widths squared, over all rows."""
-        return np.asarray(_squares(self._offset(place)).mean(axis=0))
+        offset = (self._charted - self._charted_at(place)[:, None]) / self.width
+        return np.asarray(np.einsum("rnk,rnk->n", offset, offset) / len(offset))
 
     def on_chart(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
         """Coordinates (1 or rows, m, k) of places (m, d) in which runs are compared."""
         return places[None] if self.chart is None else self.chart(places)
 
-    def _offset(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How far (1 or rows, n, k) the runs are from a place, in widths."""
-        return np.asarray((self._charted - self.on_chart(place[None])) / self.width)
+    def _charted_at(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A place in the chart (1 or rows, k)."""
+        return np.ascontiguousarray(self.on_chart(place[None])[:, 0])
 
     @cached_property
     def _charted(self) -> NDArray[np.float64]:
@@ -250,50 +206,43 @@ class Surface:
         return np.maximum(self.motions.alike, _UNALIKE)
 
     @cached_property
-    def _blur(self) -> NDArray[np.float64]:
-        """(rows, rows): smooths a scatter over neighbouring frequencies of its level."""
-        blur = np.zeros((len(self.observation),) * 2)
-        for block in self.observation.blocks:
-            rows = np.arange(block.start, block.stop)
-            for shift, weight in enumerate(_BLUR, -(len(_BLUR) // 2)):
-                source = np.clip(rows + shift, block.start, block.stop - 1)
-                np.add.at(blur, (source, rows), weight)
-        return blur
+    def _every_row(self) -> NDArray[np.bool_]:
+        return np.ones(len(self.observation), dtype=bool)
 
     @cached_property
-    def _unread(self) -> NDArray[np.float64]:
-        """(3, rows): NaN where nothing was observed, else 0."""
-        return np.where(np.isfinite(self.observation.values), 0.0, np.nan)
+    def _runs(self) -> Runs:
+        """The runs in the form that is computed with."""
+        noise, mixed = self.observation.noise, self.motions.mixed
+        return Runs(
+            charted=np.ascontiguousarray(self._charted, dtype=float),
+            width=np.asarray(self.width, dtype=float),
+            enough=float(self.enough),
+            most=int(_MOST * self.enough),
+            tailed=self.tailed,
+            plain=self._values[~mixed].reshape(-1, self._values.shape[2]),
+            plain_rows=np.flatnonzero(~mixed),
+            mixed=self._values[mixed],
+            mixed_rows=np.flatnonzero(mixed),
+            values=self._values,
+            alike=np.ascontiguousarray(self.alike.T),
+            neighbours=Runs.smoothed_over(list(self.observation.blocks)),
+            # Of reading and regression, apart from the runs' own.
+            least=np.stack([noise**2, noise**2, 0.0 * noise]) + _FLOOR[:, None] ** 2,
+        )
 
     @cached_property
-    def _least(self) -> NDArray[np.float64]:
-        """(3, rows): variance of reading and regression, apart from the runs' own."""
-        noise = self.observation.noise
-        return np.stack([noise**2, noise**2, 0.0 * noise]) + _FLOOR[:, None] ** 2
-
-    @cached_property
-    def _parted(self) -> tuple[NDArray, NDArray, NDArray]:
-        """The values (columns, n) of rows where all runs do as was observed; (rows, 3, n) else.
-
-        Weighted alike, the former are one problem. Last (rows, n): how much runs count
-        at the latter.
-        """
-        mixed = self.motions.mixed
-        plain = self._values[~mixed].reshape(-1, len(self.places))
-        return plain, self._values[mixed], self._alike_by_row[mixed]
-
-    @cached_property
-    def _alike_by_row(self) -> NDArray[np.float64]:
-        """(rows, n): how much runs count at each row."""
-        return np.ascontiguousarray(self.alike.T)
-
-    @cached_property
-    def _leanings(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The slopes (k + 1, 3 rows) and sigmas (k + 1,), those of the tachometer's gain last."""
+    def _readings(self) -> Readings:
+        """What was observed, in the form that is computed with."""
         gain = np.zeros((1, *self.difference.shape[1:]))
         gain[0, 0] = 1.0
+        # The tachometer's gain comes last.
         slopes = np.concatenate([self.slopes, gain]).reshape(len(self.sigmas) + 1, -1)
-        return slopes, np.append(self.sigmas, GAIN_TOLERANCE)
+        return Readings(
+            np.isfinite(self.observation.values),
+            slopes,
+            np.append(self.sigmas, GAIN_TOLERANCE),
+            *self.motions.course,
+        )
 
     @cached_property
     def _values(self) -> NDArray:
@@ -303,14 +252,3 @@ class Surface:
         """
         known = np.nan_to_num(self.difference).transpose(2, 1, 0)
         return np.ascontiguousarray(known, dtype=np.float32)
-
-
-def _squares(offset: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Squares (rows, n) of how far runs are, from offsets (rows, n, k)."""
-    return np.asarray(np.einsum("rnk,rnk->rn", offset, offset))
-
-
-def _variance_unknown(rested: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What to add to the variance (3, rows) where runs rest on next to nothing (rows,)."""
-    unknown = np.clip(1.0 - rested, 0.0, 1.0)
-    return np.asarray(unknown * _UNKNOWN[:, None] ** 2)

@@ -7,13 +7,14 @@ disk does not look at this file: after a change here, empty the `__pycache__` fo
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import llvmlite.binding as llvm
 import numba
 from numba import njit
 
-__all__ = ["njit"]
+__all__ = ["njit", "part"]
 
 
 def _ask_for_whole_vectors() -> None:
@@ -31,3 +32,10 @@ def _ask_for_whole_vectors() -> None:
 
 
 _ask_for_whole_vectors()
+
+_NOT_FROM_PYTHON: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""Numba's own types do not know these two; its compiler does."""
+
+part = partial(njit, error_model="numpy", nogil=True, **_NOT_FROM_PYTHON)
+"""For a part of a compiled function, called by others alone: what would let Python call it is a
+share of the time to compile."""

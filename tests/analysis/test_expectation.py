@@ -9,6 +9,7 @@ from synthetic import ROWS, candidate, observation, read
 
 from analysis import expectation
 from analysis.regression import TAIL, TAIL_SCALE, fit_planes, invert, solve_plane
+from sim.compiling import njit
 
 
 def weighted(seed, n=40, k=2, c=5):
@@ -133,14 +134,61 @@ def test_weights_are_those_of_the_first_reach_that_suffices():
     assert expectation.weigh(squares, 1e9).sum() < len(squares)
 
 
+@pytest.mark.parametrize("most", [1, 5, 12, 40])
+def test_the_nearest_are_those_that_sorting_finds(most):
+    rng = np.random.default_rng(most)
+    for _ in range(20):
+        far = rng.integers(0, 15, 40).astype(float)
+        near = np.full(most, -1)
+        nearest(far, most, near)
+        assert len(set(near.tolist())) == most
+        assert np.sort(far[near]) == pytest.approx(np.sort(far)[:most])
+
+
+@njit
+def nearest(far, most, near):
+    """Calls what only compiled code can call."""
+    expectation._nearest(far, most, np.empty(len(far)), near)
+
+
+def agreement(surface, place, leaning):
+    """What the compiled function says of a place, by one row's own neighbours or by all alike."""
+    results = []
+    for rows in (1, len(surface.observation)):
+        charted = np.tile(surface._runs.charted[:1], (rows, 1, 1))
+        points = np.tile(place, (1, rows, 1))
+        runs = surface._runs._replace(charted=charted, most=charted.shape[1])
+        every = np.ones(len(surface.observation), dtype=bool)
+        results.append(expectation.agree(runs, surface._readings, points, every, leaning))
+    return results
+
+
+@pytest.mark.parametrize("leaning", [False, True])
+def test_rows_with_neighbours_of_their_own_agree_where_these_are_all(leaning):
+    seen = observation(read(("load-inertia",), np.array([0.5, 0.4]), np.random.default_rng(3)))
+    surface = candidate(seen, ("load-inertia",)).surface
+    alike, by_row = agreement(surface, np.array([0.45, 0.5]), leaning)
+    for one, other in zip(alike, by_row, strict=True):
+        assert one == pytest.approx(other, rel=1e-3, abs=1e-4)
+
+
+def test_a_scatter_is_smoothed_over_its_own_level_alone():
+    rows = expectation.Runs.smoothed_over([slice(0, 4), slice(4, 7)])
+    assert rows.tolist() == [
+        [0, 0, 0, 1, 2], [0, 0, 1, 2, 3], [0, 1, 2, 3, 3], [1, 2, 3, 3, 3],
+        [4, 4, 4, 5, 6], [4, 4, 5, 6, 6], [4, 5, 6, 6, 6],
+    ]  # fmt: skip
+
+
 def test_what_is_compiled_beforehand_is_what_a_fit_takes():
     expectation.compile_all()
-    before = {
-        name: list(getattr(expectation, name).signatures)
-        for name in ("expect_alike", "expect_by_row", "lean", "log_densities", "weigh")
-    }
+    names = ("agree", "log_densities", "log_shares", "total_densities", "weigh")
+    before = {name: list(getattr(expectation, name).signatures) for name in names}
     seen = observation(read(("load-inertia",), np.array([0.5, 0.4]), np.random.default_rng(0)))
-    candidate(seen, ("load-inertia",))
+    surface = candidate(seen, ("load-inertia",)).surface
+    surface.scan(np.array([[0.3, 0.4], [0.5, 0.6]]))
+    surface.log_density(*surface.expected(np.array([0.5, 0.4])))
+    assert surface.lost(np.array([0.5, 0.4])) == 0
     assert len(seen) == ROWS
     for name, known in before.items():
         assert list(getattr(expectation, name).signatures) == known, name
