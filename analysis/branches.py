@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.expectation import log_shares
+from analysis.agreement import log_shares
 from analysis.observation import Observation
 from analysis.population import Population
 

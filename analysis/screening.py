@@ -18,12 +18,12 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.agreement import total_densities
 from analysis.atlas import Atlas
 from analysis.branches import Motions
 from analysis.candidate import Candidate, Effects
 from analysis.causes import Hypothesis
 from analysis.chart import Chart, is_at_load
-from analysis.expectation import total_densities
 from analysis.observation import Observation
 from analysis.population import Population
 from analysis.surface import Surface, differences

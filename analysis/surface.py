@@ -17,10 +17,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.agreement import agree, log_densities, weigh
 from analysis.branches import Motions
 from analysis.chart import Chart
 from analysis.emulator import GAIN_TOLERANCE
-from analysis.expectation import Readings, Runs, agree, log_densities, weigh
+from analysis.expectation import Readings, Runs
 from analysis.likelihood import HEAT
 from analysis.observation import Observation
 from analysis.population import Population

@@ -1,4 +1,4 @@
-"""The compiled arithmetic of a fit against numpy, scipy and textbooks."""
+"""The compiled arithmetic of a fit, against numpy, scipy and textbooks."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ import pytest
 from scipy import stats
 from synthetic import ROWS, candidate, observation, read
 
-from analysis import expectation
-from analysis.regression import TAIL, TAIL_SCALE, fit_planes, invert, solve_plane
+from analysis import agreement, expectation
+from analysis.agreement import TAIL, TAIL_SCALE, invert, solve_plane
+from analysis.regression import fit_planes
 from sim.compiling import njit
 
 
@@ -82,7 +83,7 @@ def test_a_matrix_times_its_inverse_is_one(size):
 
 def test_densities_are_students_t_and_nothing_where_nothing_was_observed():
     mean, std = np.array([0.1, -2.0, np.nan, 0.0]), np.array([0.5, 0.7, 1.0, 2.0])
-    found = expectation.log_densities(mean, std)
+    found = agreement.log_densities(mean, std)
     scale = TAIL_SCALE * std
     # A constant of every column is left out.
     constant = stats.t(TAIL).logpdf(0.0)
@@ -98,11 +99,11 @@ def test_densities_of_two_shifts_together_are_summed_over_what_was_observed():
     shifts = [rng.standard_normal((count, 29)) for count in (3, 4)]
     stds = [rng.uniform(1e-3, 3.0, (count, 29)) for count in (3, 4)]
     shifts[0][:, 17] = np.nan
-    found = expectation.total_densities(mean, *shifts, *stds)
+    found = agreement.total_densities(mean, *shifts, *stds)
     for i in range(3):
         for j in range(4):
             together = mean + shifts[0][i] + shifts[1][j]
-            each = expectation.log_densities(together, np.maximum(stds[0][i], stds[1][j]))
+            each = agreement.log_densities(together, np.maximum(stds[0][i], stds[1][j]))
             assert found[i, j] == pytest.approx(each.sum(), rel=1e-10)
 
 
@@ -112,12 +113,12 @@ def test_leaning_is_the_most_probable_deviation():
     std, sigmas = rng.uniform(0.05, 0.2, 200), np.array([0.5, 0.5, 1e-4])
     apart = truth @ slope + std * rng.standard_normal(200)
     seen = rng.uniform(size=200) < 0.8
-    best, log_prior = expectation.lean(apart, std, slope, sigmas, seen)
+    best, log_prior = agreement.lean(apart, std, slope, sigmas, seen)
     assert best == pytest.approx(truth, abs=0.06)
 
     def log_posterior(deviations):
         left = (apart - deviations @ slope)[seen]
-        likely = expectation.log_densities(left, std[seen]).sum()
+        likely = agreement.log_densities(left, std[seen]).sum()
         return likely - 0.5 * np.sum((deviations / sigmas) ** 2)
 
     top = log_posterior(best)
@@ -128,10 +129,10 @@ def test_leaning_is_the_most_probable_deviation():
 
 def test_weights_are_those_of_the_first_reach_that_suffices():
     squares = np.array([0.0, 0.04, 0.5, 2.0, 9.0])
-    weight = expectation.weigh(squares, 2.0)
+    weight = agreement.weigh(squares, 2.0)
     assert weight.sum() >= 2.0
     assert np.all(np.diff(weight) <= 0.0)
-    assert expectation.weigh(squares, 1e9).sum() < len(squares)
+    assert agreement.weigh(squares, 1e9).sum() < len(squares)
 
 
 @pytest.mark.parametrize("most", [1, 5, 12, 40])
@@ -148,10 +149,10 @@ def test_the_nearest_are_those_that_sorting_finds(most):
 @njit
 def nearest(far, most, near):
     """Calls what only compiled code can call."""
-    expectation._nearest(far, most, np.empty(len(far)), near)
+    agreement._nearest(far, most, np.empty(len(far)), near)
 
 
-def agreement(surface, place, leaning):
+def looked_at(surface, place, leaning):
     """What the compiled function says of a place, by one row's own neighbours or by all alike."""
     results = []
     for rows in (1, len(surface.observation)):
@@ -159,7 +160,7 @@ def agreement(surface, place, leaning):
         points = np.tile(place, (1, rows, 1))
         runs = surface._runs._replace(charted=charted, most=charted.shape[1])
         every = np.ones(len(surface.observation), dtype=bool)
-        results.append(expectation.agree(runs, surface._readings, points, every, leaning))
+        results.append(agreement.agree(runs, surface._readings, points, every, leaning))
     return results
 
 
@@ -167,7 +168,7 @@ def agreement(surface, place, leaning):
 def test_rows_with_neighbours_of_their_own_agree_where_these_are_all(leaning):
     seen = observation(read(("load-inertia",), np.array([0.5, 0.4]), np.random.default_rng(3)))
     surface = candidate(seen, ("load-inertia",)).surface
-    alike, by_row = agreement(surface, np.array([0.45, 0.5]), leaning)
+    alike, by_row = looked_at(surface, np.array([0.45, 0.5]), leaning)
     for one, other in zip(alike, by_row, strict=True):
         assert one == pytest.approx(other, rel=1e-3, abs=1e-4)
 
@@ -182,13 +183,15 @@ def test_a_scatter_is_smoothed_over_its_own_level_alone():
 
 def test_what_is_compiled_beforehand_is_what_a_fit_takes():
     expectation.compile_all()
-    names = ("agree", "log_densities", "log_shares", "total_densities", "weigh")
-    before = {name: list(getattr(expectation, name).signatures) for name in names}
+    functions = (
+        agreement.agree, agreement.log_shares, agreement.weigh, agreement.log_densities,
+        agreement.total_densities,
+    )  # fmt: skip
+    before = [list(function.signatures) for function in functions]
     seen = observation(read(("load-inertia",), np.array([0.5, 0.4]), np.random.default_rng(0)))
     surface = candidate(seen, ("load-inertia",)).surface
     surface.scan(np.array([[0.3, 0.4], [0.5, 0.6]]))
     surface.log_density(*surface.expected(np.array([0.5, 0.4])))
     assert surface.lost(np.array([0.5, 0.4])) == 0
     assert len(seen) == ROWS
-    for name, known in before.items():
-        assert list(getattr(expectation, name).signatures) == known, name
+    assert [list(function.signatures) for function in functions] == before
