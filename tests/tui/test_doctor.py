@@ -154,6 +154,16 @@ def test_an_engine_that_is_not_compiled_not_kept_or_not_there(monkeypatch, tmp_p
         assert finding.state == "note"
         assert "slow" in finding.found
     with monkeypatch.context() as patch:
+
+        def nowhere(module):
+            raise RuntimeError("cannot cache function 'agree':\n no locator available")
+
+        patch.setattr(software, "import_module", nowhere)
+        finding = only(software.check_engine())
+        assert finding.state == "failed"
+        assert "cannot cache function 'agree': no locator" in finding.found
+        assert "NUMBA_CACHE_DIR" in finding.remedy
+    with monkeypatch.context() as patch:
         patch.setitem(sys.modules, "sim.machine_code", None)
         finding = only(software.check_engine())
         assert finding.state == "failed"

@@ -54,12 +54,19 @@ def check_engine() -> Iterator[Finding]:
         from numba import config
 
         if getattr(config, "DISABLE_JIT", False):
-            slow = "numba compiles nothing: the paper's own scheme takes hundreds of times longer"
+            slow = "numba compiles nothing: a diagnosis takes hundreds of times longer"
             yield failed(name, slow, "unset NUMBA_DISABLE_JIT")
             return
         from sim.machine_code import code_folder, multiplies_and_adds
+
+        import_module("analysis.agreement")
     except ImportError as error:
         yield failed(name, f"cannot be loaded: {error}", "put the packages right first")
+        return
+    except RuntimeError as error:
+        # Numba finds no folder at all that its cache could lie in.
+        move = "set NUMBA_CACHE_DIR to a folder that you can write to"
+        yield failed(name, f"cannot be loaded: {' '.join(str(error).split())}", move)
         return
     folder = code_folder()
     kept = len(list(folder.glob("*.code")))
