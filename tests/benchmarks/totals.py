@@ -37,7 +37,12 @@ system = paper_drivetrain(ADSS, 0.25).system()
 began, used = time.perf_counter(), time.process_time()
 for single in (False, True):
     drive(system, np.zeros(len(system.states)), 1000.0, 1, amplitude=1.0, single=single)
+print(time.perf_counter() - began, time.process_time() - used)
+"""
+ARITHMETIC = """
+import time
 from analysis.expectation import compile_all
+began, used = time.perf_counter(), time.process_time()
 compile_all()
 print(time.perf_counter() - began, time.process_time() - used)
 """
@@ -126,17 +131,19 @@ def measure(folder: Path, only: list[str]) -> list[tuple[str, str, Cost]]:
         print(f"{name:52}{cost.wall_s:9.2f} s {cost.cpu_s:9.2f} s {cost.peak_mb:7.0f} MB"
               f"   goal {goal}", flush=True)  # fmt: skip
 
-    code = COMPILE.format(tests=tests)
     places = ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")
     compiled = {place: str(folder / "compiled") for place in places}
     add("help", "lashbench --help", "0.25 s", lambda: run([COMMAND, "--help"]), 7)
-    add(
-        "compile",
-        "compiling engine and arithmetic of the diagnosis, once",
-        "10 s",
-        lambda: inside(code, **compiled),
-    )
-    add("compile", "loading what was compiled", "", lambda: inside(code, **compiled), 3)
+    for what, work in (
+        ("the engine in both precisions, a servo", COMPILE.format(tests=tests)),
+        ("the arithmetic of a diagnosis", ARITHMETIC),
+    ):
+
+        def compiling(work: str = work) -> Cost:
+            return inside(work, **compiled)
+
+        add("compile", f"compiling {what}, once", "10 s", compiling)
+        add("compile", f"loading {what.split(',')[0]}", "", compiling, 3)
     add("table2", "Table 2, exact engine, 100 cycles, one draw", "3 s", lambda: inside(TABLE2), 2)
     if only and not {"estimate", "diagnose"} & set(only):
         return rows
