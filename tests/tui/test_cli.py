@@ -10,7 +10,17 @@ import pytest
 from daq import errors
 from tui import cli, output
 
-HEAVY = ("scipy", "numba", "matplotlib", "textual", "h5py", "sqlalchemy", "pyvisa", "serial")
+HEAVY = (
+    "scipy",
+    "numba",
+    "llvmlite",
+    "matplotlib",
+    "textual",
+    "h5py",
+    "sqlalchemy",
+    "pyvisa",
+    "serial",
+)
 
 
 @pytest.mark.parametrize(
