@@ -14,7 +14,7 @@ import numpy as np
 from sim.compiling import njit, part
 
 __all__ = [
-    "BLUR", "TAIL", "TAIL_SCALE", "agree", "invert", "lean", "log_densities", "log_shares",
+    "BLUR", "TAIL", "TAIL_SCALE", "agree", "invert", "lean", "log_shares",
     "solve_plane", "total_densities", "weigh",
 ]  # fmt: skip
 
@@ -364,16 +364,6 @@ def log_density(apart, std):
     """Student's t, but for a constant."""
     scale = TAIL_SCALE * std
     return -0.5 * (TAIL + 1.0) * np.log1p((apart / scale) ** 2 / TAIL) - np.log(scale)
-
-
-@njit(nogil=True, cache=True, error_model="numpy")
-def log_densities(mean, std):
-    """Student's t with means and standard deviations (columns,); 0 where a mean is not finite."""
-    found = np.zeros(len(mean))
-    for c in range(len(mean)):
-        if np.isfinite(mean[c]):
-            found[c] = log_density(mean[c], std[c])
-    return found
 
 
 @njit(nogil=True, cache=True, fastmath={"contract"}, error_model="numpy")

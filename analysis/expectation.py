@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from analysis.agreement import (
     BLUR,
     agree,
-    log_densities,
     log_shares,
     total_densities,
     weigh,
@@ -93,5 +92,4 @@ def compile_all() -> None:
     agree(runs, readings, line[None, None, 0], observed[0], True)
     weigh(one, 1.0)
     log_shares(share[:, 0].copy(), share, share, np.ones(rows))
-    log_densities(one, one)
     total_densities(one, many, many, many, many)

@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.agreement import agree, log_densities, weigh
+from analysis.agreement import agree, weigh
 from analysis.branches import Motions
 from analysis.chart import Chart
 from analysis.emulator import GAIN_TOLERANCE
@@ -172,11 +172,6 @@ class Surface:
         drawn = np.sum(inside / reaches ** len(span), axis=1)
         weight = np.exp([(fit.log_likelihood - best.log_likelihood) / HEAT for fit in fits]) / drawn
         return np.asarray(weight / weight.sum())
-
-    @staticmethod
-    def log_density(mean: NDArray[np.float64], std: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Student's t with a mean and a standard deviation (3, rows); 0 where nothing is known."""
-        return np.asarray(log_densities(mean.ravel(), std.ravel()).reshape(mean.shape))
 
     def lost(self, place: NDArray[np.float64]) -> int:
         """How many rows no run near a place shows as they were observed."""

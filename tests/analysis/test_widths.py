@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 from synthetic import ROWS, observation
 
+from analysis.agreement import TAIL, TAIL_SCALE
 from analysis.branches import Motions
 from analysis.surface import Surface
 from analysis.widths import learn_width
@@ -85,7 +87,7 @@ def gain_of_more_runs(rng):
         surface = Surface(seen, *known)
         expected = [surface.expected(place) for place in places[120:]]
         densities = [
-            surface.log_density(one - mean, std).sum()
+            stats.t(TAIL, scale=TAIL_SCALE * std).logpdf(one - mean).sum()
             for one, (mean, std) in zip(difference[120:], expected, strict=True)
         ]
         return np.mean(densities)

@@ -20,7 +20,7 @@ from sim.laws import peaked_friction
 ALIVE = []
 
 
-def computed(expression, columns, single):
+def computed(expression, columns, single, fused=None):
     """What an expression of lanes gives for columns (k, lanes) of numbers."""
     dtype = np.float32 if single else np.float64
     module, integer = ir.Module(), ir.IntType(64)
@@ -28,7 +28,8 @@ def computed(expression, columns, single):
     pointer = scalar.as_pointer()
     function = ir.Function(module, ir.FunctionType(ir.VoidType(), [pointer, pointer]), "run")
     emit = ir.IRBuilder(function.append_basic_block())
-    code = Code(module, emit, single, machine_code.multiplies_and_adds())
+    fused = machine_code.multiplies_and_adds() if fused is None else fused
+    code = Code(module, emit, single, fused)
     width, vectors = code.width, 2
     given_numbers = np.zeros((len(columns), vectors * width), dtype)
     count = len(columns[0])
@@ -105,6 +106,12 @@ def test_a_product_and_what_is_added_to_it_are_rounded_once():
     exact = Fraction(a[0]) ** 2 - 1
     assert Fraction(found) == Fraction(float(exact))
     assert found != a[0] * a[0] - 1.0
+
+
+def test_a_machine_that_cannot_do_both_in_one_rounds_twice():
+    a = np.array([1.0 + 2.0**-30, -3.7, 1e-9])
+    found = computed(lambda a: a * a - 1.0, [a], single=False, fused=False)
+    assert np.array_equal(found, a * a - 1.0)
 
 
 def test_nan_stays_nan_where_it_is_and_nowhere_else():
