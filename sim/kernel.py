@@ -25,7 +25,7 @@ from sim import laws
 from sim.assembly import Law
 from sim.lanes import VECTOR_BYTES, Code, Lanes, greatest
 from sim.layout import PAIR, STRIBECK, SUMS, Layout, Structure
-from sim.machine_code import compiled, multiplies_and_adds
+from sim.machine_code import architecture, compiled, multiplies_and_adds
 
 __all__ = ["MOST_VECTORS", "Program", "step_cycles"]
 
@@ -83,21 +83,21 @@ def step_cycles(
 
 @cache
 def _program(structure: Structure, vectors: int) -> Any:
-    fused = multiplies_and_adds()
+    can = multiplies_and_adds(), architecture()
     return compiled(
-        f"{structure} {vectors} {fused}",
+        f"{structure} {vectors} {can}",
         [
             Path(__file__).with_name(file)
             for file in ("kernel.py", "layout.py", "laws.py", "lanes.py")
         ],
-        lambda: Program(Layout(structure), vectors, fused).text(),
+        lambda: Program(Layout(structure), vectors, *can).text(),
     )
 
 
 class Program:
     """Writes the program of one structure."""
 
-    def __init__(self, layout: Layout, vectors: int, fused: bool) -> None:
+    def __init__(self, layout: Layout, vectors: int, fused: bool, architecture: str) -> None:
         self._layout, self._structure = layout, layout.structure
         self._all = range(vectors)
         self._module = ir.Module()
@@ -116,11 +116,12 @@ class Program:
         # Aligns the stack with it: a vector that lies across two lines of the cache costs twice.
         self._sweeps.align = VECTOR_BYTES
         self._emit.store(_INT(_FIRST_SWEEPS), self._sweeps)
-        with self._times(settle):
-            self._cycle(kept=False)
-        with self._times(kept) as cycle:
-            self._cycle(kept=True)
-            self._hand_over(cycle)
+        with self._code.without_denormals(architecture):
+            with self._times(settle):
+                self._cycle(kept=False)
+            with self._times(kept) as cycle:
+                self._cycle(kept=True)
+                self._hand_over(cycle)
         self._emit.ret_void()
 
     def text(self) -> str:

@@ -19,7 +19,7 @@ import llvmlite
 import llvmlite.binding as llvm
 from platformdirs import user_cache_path
 
-__all__ = ["code_folder", "compiled", "multiplies_and_adds"]
+__all__ = ["architecture", "code_folder", "compiled", "multiplies_and_adds"]
 
 _INT, _POINTER = ctypes.c_int64, ctypes.c_void_p
 _KIND = ctypes.CFUNCTYPE(None, *[_POINTER] * 3, *[_INT] * 3, _POINTER)
@@ -38,11 +38,16 @@ def code_folder() -> Path:
     return user_cache_path("lashbench", appauthor=False) / "code"
 
 
+def architecture() -> str:
+    """The family of processors that the machine belongs to: "x86", "arm", or "" for others."""
+    triple = llvm.get_process_triple()
+    known = {"x86_64": "x86", "amd64": "x86", "aarch64": "arm", "arm64": "arm"}
+    return known.get(triple.split("-")[0], "")
+
+
 def multiplies_and_adds() -> bool:
     """Whether the machine multiplies and adds in one instruction."""
-    features = llvm.get_host_cpu_features()
-    arm = llvm.get_process_triple().startswith(("aarch64", "arm64"))
-    return bool(arm or features.get("fma"))
+    return architecture() == "arm" or bool(llvm.get_host_cpu_features().get("fma"))
 
 
 def compiled(name: str, sources: Sequence[Path], write: Callable[[], str]) -> Any:

@@ -19,8 +19,8 @@ __all__ = ["kinds_of", "law_coefficients", "order_of"]
 _HARDENING_SWEEPS = 3
 """Passes where a hardening shaft and a play push one tiny inertia; the shaft goes once more."""
 
-_COUPLED_SWEEPS = 4
-"""Passes where one play pushes another within a step, as through a heavily damped shaft."""
+_MOST_PASSES = 8
+"""Passes at most where one play pushes another within a step, as through a heavily damped shaft."""
 
 _LOOSE = 1e-4
 """Share of its motion that a law may take over from another before that counts."""
@@ -46,9 +46,9 @@ def order_of(
 ) -> tuple[tuple[int, ...], ...]:
     """Laws in an order that settles what they do to each other within one step.
 
-    Where springs harden, they and the plays are gone through until they agree; what acts on
-    the heavy inertias alone follows once. Neighbours that hardly feel each other are
-    solved side by side, as each then waits less for the other.
+    Where springs harden, or plays push each other, these are gone through until they agree;
+    what acts on the heavy inertias alone follows once. Neighbours that hardly feel each other
+    are solved side by side, as each then waits less for the other.
 
     `gain` (m or more, m): what laws see of forces. `fixed`: stiffness and damping over a step.
     """
@@ -59,12 +59,24 @@ def order_of(
     slope = np.array([fixed[j][0] + 2.0 * fixed[j][1] for j in plays])
     taken_over = np.abs(gain[np.ix_(plays, plays)]) * slope
     np.fill_diagonal(taken_over, 0.0)
-    sweeps = _COUPLED_SWEEPS if taken_over.max(initial=0.0) > _LOOSE else 1
-    if not springs:
-        return _side_by_side(once * sweeps, kinds, gain)
+    passes = _passes(taken_over.max(initial=0.0))
     rest = [j for j in once if j not in springs and j not in plays]
-    order = (springs + plays) * max(sweeps, _HARDENING_SWEEPS) + springs + rest
-    return _side_by_side(order, kinds, gain)
+    if springs:
+        order = (springs + plays) * max(_HARDENING_SWEEPS, passes // 2) + springs + rest
+        return _side_by_side(order, kinds, gain)
+    if passes == 1:
+        return _side_by_side(once, kinds, gain)
+    return (tuple(plays),) * passes + _side_by_side(rest, kinds, gain)
+
+
+def _passes(taken_over: float) -> int:
+    """Passes, side by side, after which plays that take over such a share from each other agree.
+
+    What is left after each is that share of what was left before, and before the first all by
+    which a force has changed since the last step.
+    """
+    left = taken_over ** np.arange(1, _MOST_PASSES)
+    return int(np.count_nonzero(left > _LOOSE)) + 1
 
 
 def _side_by_side(

@@ -6,10 +6,11 @@ from permutation import permutation_p
 from side_by_side import ADSS, EDSS, FRICTIONLESS, departure, drive, engine_gain
 
 from daq.plan import SweepPlan
-from sim import propagator
+from sim import engine, propagator
 from sim.catalogue import CATALOGUE
 from sim.drivetrain import paper_drivetrain
 from sim.effects import EffectSetting, drivetrain_with, parse_effect
+from sim.machine_code import architecture
 from sim.response import Servo, simulate_cycles
 
 STEP_S = 1e-5
@@ -73,6 +74,26 @@ def test_every_effect_is_the_same_for_as_long_as_a_start_is_remembered(unit, eff
     )
     assert np.any(one != other)
     assert np.abs(one - other).max() < 2e-3 * np.abs(one[:, 1]).max()
+
+
+@pytest.mark.skipif(not architecture(), reason="what this processor does is not known here")
+def test_what_dies_away_ends_at_zero_and_not_among_numbers_that_take_long(monkeypatch):
+    system = drivetrain_with(ADSS, 0.4, [parse_effect("amplifier-lag:tau_a=0.0005")]).system()
+    ends = []
+
+    def kept(layout, coefficients, values, *rest):
+        found = step(layout, coefficients, values, *rest)
+        ends.append(values["q"].copy())
+        return found
+
+    step = engine._step
+    monkeypatch.setattr(engine, "_step", kept)
+    # 0.2 s are 400 times the lag; the smallest number of full digits is left behind after 90.
+    drive(system, np.zeros((len(system.states), 16)), 100.0, 20, 2.5, step_s=STEP_S, single=True)
+    (q,) = ends
+    assert np.any(np.all(q == 0.0, axis=1))
+    assert np.all((q == 0.0) | (np.abs(q) >= np.finfo(np.float32).tiny))
+    assert np.float32(1e-38) * np.float32(0.1) > 0.0, "the caller's own arithmetic has changed"
 
 
 def test_a_system_without_usable_modes_keeps_all_its_digits(monkeypatch):

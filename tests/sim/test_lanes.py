@@ -114,6 +114,36 @@ def test_a_machine_that_cannot_do_both_in_one_rounds_twice():
     assert np.array_equal(found, a * a - 1.0)
 
 
+@pytest.mark.parametrize(
+    ("architecture", "triple", "sets"),
+    [("x86", "x86_64-unknown-linux-gnu", "ldmxcsr"), ("arm", "aarch64-unknown-linux-gnu", "msr")],
+)
+def test_every_architecture_is_told_and_put_back(architecture, triple, sets):
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    module = ir.Module()
+    emit = ir.IRBuilder(
+        ir.Function(module, ir.FunctionType(ir.VoidType(), []), "run").append_basic_block()
+    )
+    with Code(module, emit, True, True).without_denormals(architecture):
+        pass
+    emit.ret_void()
+    target = llvm.Target.from_triple(triple).create_target_machine()
+    text = target.emit_assembly(llvm.parse_assembly(str(module)))
+    assert text.count(f"\t{sets}\t") == 2
+
+
+def test_an_architecture_that_is_not_known_is_told_nothing():
+    module = ir.Module()
+    emit = ir.IRBuilder(
+        ir.Function(module, ir.FunctionType(ir.VoidType(), []), "run").append_basic_block()
+    )
+    with Code(module, emit, True, True).without_denormals(""):
+        pass
+    emit.ret_void()
+    assert "call" not in str(module).split("define")[1]
+
+
 def test_nan_stays_nan_where_it_is_and_nowhere_else():
     a = np.array([1.0, np.nan, 3.0])
     found = computed(lambda a, b: a * b + a, [a, a], single=True)
