@@ -116,6 +116,11 @@ class Hunt:
         self._simulate(more)
         self._form({key: self.found[key].best.place for key in chosen})
 
+    def leave_out(self, keys: Collection[Effects]) -> None:
+        """Look at some candidates no more."""
+        for key in keys:
+            del self.found[key]
+
     def hear(self) -> None:
         """Take the reading for as noisy as the most likely candidate would have it."""
         best = self.best

@@ -13,11 +13,16 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.adequacy import judge_adequacy, judge_chance
 from analysis.atlas import Atlas, coarse_stride, make_atlas
 from analysis.candidate import Candidate, Effects
 from analysis.causes import Hypothesis
 from analysis.chart import Chart
+from analysis.doubt import (
+    is_doubtful,
+    is_doubtful_at_once,
+    is_doubtful_still,
+    is_nothing_missing,
+)
 from analysis.executor import Executor
 from analysis.holdout import AT_NOISE, hold_out
 from analysis.hunt import Hunt, Starts
@@ -51,6 +56,10 @@ _BESIDE, _BESIDE_CLOSER, _BESIDE_GROUPS = (5, 8), (2, 4), (2, 4)
 """How many pairs with a leader that is not doubted are tried, and how many looked at closer, where
 it predicts other levels well and where worse than true causes do; in how many groups each time."""
 
+_CALLED_FOR = 37.5
+"""By so much must one of these lead a cause that predicts well to be looked at any further: half of
+what it takes to be named in its place (`analysis.verdict`)."""
+
 _TRIPLES, _TRIPLES_CLOSER, _TRIPLE_GROUPS, _TRIPLES_AFTER = 8, 4, (2, 4), 2
 """The same for sets with a third cause beside a leading pair that is doubted."""
 
@@ -75,11 +84,6 @@ _TOO_FAR, _HOPELESS = 200.0, 300.0
 """Log-likelihood behind the leader from which the second and the third round leave one out, and the
 last ones its parts, and from which there is no second chance."""
 
-_DOUBT = 2.0
-"""Misfit of the best single cause, and the structure that it leaves, in standard deviations, from
-which pairs are tried; and the root mean square of what it misses of levels not fitted, in theirs:
-where few runs of its own fit each other the first two are blind, and the last is not."""
-
 _LEAST_SURE = 1.5
 """What a pair may miss of levels not fitted, in their standard deviations, before a third cause is
 tried: more of it is no explanation (`analysis.verdict`)."""
@@ -93,13 +97,6 @@ _PREDICTED, _NOT_PREDICTED, _MORE_ROUNDS, _ROUNDS_ALONE = (1.3, 1.0), 2.5, 3, 7
 from which it gets more runs (several are refused for less, `analysis.verdict`) and up to which
 that may help; how many times, and how many where it leaves all others far behind: a pair with four
 parameters took six rounds to be seen as the truth that it was."""
-
-_CLOSER_LOOKS = 2
-"""How often a doubtful leader that is far ahead gets more runs before pairs are looked at."""
-
-_COMMON = 0.2
-"""Share of the baseline's own runs that the leader explains better by as much, from which on there
-is nothing to be found, and nothing more is simulated."""
 
 
 def search_causes(
@@ -141,10 +138,7 @@ def search_causes(
     rough.hear()
     rough.look_closer(_with_baseline(rough.leading(_SECOND, _TOO_FAR)), _SECOND_GROUPS)
     rough.hear()
-    if _is_doubtful(rough.best, rng):
-        # A cause with several parameters may only want a closer look.
-        rough.settle([rough.best.hypothesis.effects], _LAST_GROUPS)
-    doubted = _is_doubtful(rough.best, rng)
+    doubted = is_doubtful_at_once(rough, rng)
     if doubted:
         search_pairs(rough, atlas)
     fine = Hunt(
@@ -159,26 +153,26 @@ def search_causes(
     fine.take_over([rough.found[key] for key in third], _THIRD_GROUPS)
     fine.hear()
     while True:
-        if not doubted and _is_doubtful_still(fine, rng):
+        if not doubted and is_doubtful_still(fine, rng):
             # More rows, or more runs, show that a single cause will not do after all.
             doubted = True
             search_pairs(rough, atlas)
             pairs = [key for key in _third(rough) if key not in fine.found]
             fine.take_over([rough.found[key] for key in pairs], _THIRD_GROUPS)
             fine.hear()
-        if _is_doubtful(fine.best, rng):
+        if doubted and is_doubtful(fine.best, rng):
             # Parameters trade off in ways that evenly placed runs miss: a second chance.
             leading = [key for key in fine.leading(len(fine.found), _HOPELESS) if key]
             _settle(fine, leading[:_CHANCES])
         missing = _compare(fine, rng)
-        if doubted or not _is_doubtful(fine.best, rng):
+        if doubted or not is_doubtful(fine.best, rng):
             break
     if missing:
         if not doubted:
             _look_beside(rough, fine, atlas, rng)
         _see_it_predict(fine)
         _weigh_parts(fine)
-        if len(fine.best.hypothesis.effects) == 2 and _is_doubtful(fine.best, rng, _LEAST_SURE):
+        if len(fine.best.hypothesis.effects) == 2 and is_doubtful(fine.best, rng, _LEAST_SURE):
             _search_triples(rough, fine, atlas, rng)
             _see_it_predict(fine)
         rare = make_atlas(unit, coarse, cache, executor, fine.report(), rare=True)
@@ -191,11 +185,11 @@ def _look_beside(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator
     leader = fine.best.hypothesis.effects
     if len(leader) != 1:
         return
-    alone = screen_singles(rough.unit, rough.observation, atlas, [leader])[leader]
+    glance = screen_singles(rough.unit, rough.observation, atlas, [leader])[leader]
     additions = add_causes(rough.unit, rough.observation, atlas)
     places = screen_pairs(additions, leader)
     poor = hold_out(fine.best, fine.observation).rms_sigma > AT_NOISE
-    enough = -np.inf if poor else alone.log_likelihood - _LITTLE
+    enough = -np.inf if poor else glance.log_likelihood - _LITTLE
     chosen = [k for k in ranked(places)[: _BESIDE[poor]] if places[k].log_likelihood > enough]
     # Of what adds up exactly the place is right, and how likely it is not comparable.
     chosen += [k for k in places if k in additions.felt and k not in chosen]
@@ -203,13 +197,17 @@ def _look_beside(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator
     kept = _narrow(rough, starts, _BESIDE_CLOSER[poor], _BESIDE_GROUPS)
     if Chart(Hypothesis(rough.unit, leader), rough.observation.frequency_hz).bent.any():
         # What swings on the load has stood for two causes there, and is likely by that measure.
-        stood_for = near(screen_felt(additions), alone.log_likelihood)
+        stood_for = near(screen_felt(additions), glance.log_likelihood)
         look_at_felt(rough, stood_for)
         kept = rough.among([*kept, *(key for key in stood_for if earns(key, rough.found))])
     kept = kept[: _BESIDE_CLOSER[0]]
     if kept:
         fine.take_over([rough.found[key] for key in kept], _THIRD_GROUPS)
         _catch_up(fine, kept, leader)
+        if not poor:
+            alone = fine.found[leader].best.log_likelihood
+            beside = {k: fine.found[k].best.log_likelihood - alone for k in kept if leader[0] in k}
+            fine.leave_out([k for k, lead in beside.items() if 0.0 < lead < _CALLED_FOR])
         if fine.best.hypothesis.effects != leader:
             _compare(fine, rng)
 
@@ -313,7 +311,7 @@ def _compare(fine: Hunt, rng: np.random.Generator) -> bool:
     """
     missing = True
     for done, (most, behind) in enumerate(_LAST_ROUNDS):
-        missing = not _is_nothing_missing(fine, rng)
+        missing = not is_nothing_missing(fine, rng)
         if not missing:
             break
         leader, *near = fine.leading(most, behind)
@@ -325,6 +323,8 @@ def _compare(fine: Hunt, rng: np.random.Generator) -> bool:
             # Who wants a size that no bench has is no explanation, however well it fits.
             plausible = [key for key in [leader, *near] if not is_pressed(fine.found[key])]
             leader, *near = plausible or [leader, *near]
+            # Nor is it a question who leads of two that say the same.
+            near = [key for key in near if not _say_the_same(fine.found[leader], fine.found[key])]
         if done and not near:
             break
         near += [key for key in fine.leading(len(fine.found), behind) if not key]
@@ -339,35 +339,6 @@ def _singles(unit: Unit, coarse: Observation, atlas: Atlas) -> Starts:
     return {key: places[key].place for key in _with_baseline(ranked(places)[:_FIRST])}
 
 
-def _is_doubtful(candidate: Candidate, rng: np.random.Generator, missed: float = _DOUBT) -> bool:
-    fitted = judge_adequacy(candidate, rng)
-    if max(fitted.sigma, fitted.structure) > _DOUBT:
-        return True
-    return hold_out(candidate, candidate.surface.observation).rms_sigma > missed
-
-
-def _is_doubtful_still(fine: Hunt, rng: np.random.Generator) -> bool:
-    """Whether the leader is doubtful with more runs, too, where it leaves all others far behind.
-
-    Few runs leave a shape of their own beside a sharp resonance, and pairs cost far more.
-    """
-    for _ in range(_CLOSER_LOOKS):
-        if not _is_doubtful(fine.best, rng):
-            return False
-        leader = fine.best.hypothesis.effects
-        if not leader or len(fine.leading(2, _TOO_FAR)) > 1:
-            return True
-        _settle(fine, [leader])
-    return _is_doubtful(fine.best, rng)
-
-
-def _is_nothing_missing(fine: Hunt, rng: np.random.Generator) -> bool:
-    baseline = fine.found[()]
-    if _is_doubtful(baseline, rng):
-        return False
-    return fine.best is baseline or judge_chance(baseline, fine.best, rng) > _COMMON
-
-
 def _third(rough: Hunt) -> list[Effects]:
     """Who is looked at on all rows: the leaders, the parts of the first, and the baseline.
 
@@ -379,6 +350,10 @@ def _third(rough: Hunt) -> list[Effects]:
     others = [*parts_of(leading[0], rough.found), rough.best_single]
     others += [key for key in hopeful if _is_plainer(rough.found[key], leading, rough)]
     return _with_baseline([*leading, *(key for key in others if key in hopeful)])
+
+
+def _say_the_same(one: Candidate, other: Candidate) -> bool:
+    return is_felt_alike(one, other) or is_felt_alike(other, one)
 
 
 def _is_plainer(candidate: Candidate, leading: Sequence[Effects], rough: Hunt) -> bool:

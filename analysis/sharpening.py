@@ -23,12 +23,16 @@ from sim.unit import Unit
 
 __all__ = ["sharpen_candidate"]
 
-_ROUNDS, _GROUPS = 5, 4
+_ROUNDS, _ROUNDS_MORE, _GROUPS = 5, 3, 4
 _SHARP = 0.035
 """Standard deviation of every coordinate from which on nothing more is simulated."""
 _WORTHWHILE, _BACK = 0.9, 2
 """Nor where two rounds left the largest of them above this share of what it was. What few runs say
 of their error is uncertain itself, so that a single round may seem worthless by chance."""
+
+_BLUNT = 0.06
+"""While the contribution ratio is known no better than this neither counts, and there are some more
+rounds: where it trades off with a size, two often bring nothing and five or eight do."""
 
 _APART = 1.5
 """Nor is either believed while the runs lie closer together than so many of those standard
@@ -53,10 +57,13 @@ def sharpen_candidate(
     """
     key, found = candidate.hypothesis.effects, size_candidate(candidate, observation, rng)
     widest: list[float] = []
-    for done in range(_ROUNDS):
+    for done in range(_ROUNDS + _ROUNDS_MORE):
         std = np.sqrt(np.diag(found.covariance))
         widest.append(std.max())
-        stalled = done >= _BACK and widest[-1] > _WORTHWHILE * widest[-1 - _BACK]
+        blunt = std[0] > _BLUNT
+        if done >= _ROUNDS and not blunt:
+            break
+        stalled = not blunt and done >= _BACK and widest[-1] > _WORTHWHILE * widest[-1 - _BACK]
         apart = bool(np.all(candidate.population.places.std(axis=0) > _APART * std))
         if apart and (widest[-1] <= _SHARP or stalled):
             break
@@ -66,5 +73,5 @@ def sharpen_candidate(
         candidate = replace(candidate, population=candidate.population.joined(made))
         found = size_candidate(candidate, observation, rng)
         if progress is not None:
-            progress((done + 1) / _ROUNDS)
+            progress((done + 1) / (_ROUNDS + _ROUNDS_MORE))
     return found

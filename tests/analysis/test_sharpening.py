@@ -36,12 +36,17 @@ def asked(monkeypatch):
     return rounds
 
 
-def sized(stds):
-    """A stand-in for the sizing: what it says of the error, call by call."""
+def sized(stds, ratio_std=None):
+    """A stand-in for the sizing: what it says of the error of the ratio, call by call.
+
+    Or of the size, where that of the ratio is given.
+    """
     told = iter(stds)
 
     def size(candidate, observation, rng):
-        return Calibrated(np.array([0.5, 0.5]), np.diag([next(told) ** 2, 0.001**2]))
+        std = next(told)
+        both = (std, 0.001) if ratio_std is None else (ratio_std, std)
+        return Calibrated(np.array([0.5, 0.5]), np.diag(np.square(both)))
 
     return size
 
@@ -87,11 +92,27 @@ def test_it_stops_as_soon_as_the_answer_is_sharp(monkeypatch, asked):
 
 def test_it_ends_where_the_data_tell_no_more(monkeypatch, asked):
     observed = observed_at(0)
-    monkeypatch.setattr(sharpening, "size_candidate", sized([0.2] * 50))
+    monkeypatch.setattr(sharpening, "size_candidate", sized([0.2] * 50, 0.05))
+    monkeypatch.setattr(sharpening, "_APART", 0.0)
     rng = np.random.default_rng(0)
     answer = sharpening.sharpen_candidate(synthetic.ADSS, found(observed, 0), observed, rng)
     assert len(asked) == 2
-    assert answer.covariance[0, 0] == pytest.approx(0.2**2)
+    assert answer.covariance[1, 1] == pytest.approx(0.2**2)
+
+
+@pytest.mark.parametrize(
+    ("stds", "rounds"),
+    [
+        ([0.07] * 50, 8), ([0.07] * 6 + [0.059] * 50, 6), ([0.07] * 3 + [0.055] * 50, 5),
+        ([0.07] * 2 + [0.03], 2),
+    ],
+)  # fmt: skip
+def test_a_ratio_that_is_hardly_known_gets_all_rounds(monkeypatch, asked, stds, rounds):
+    observed = observed_at(0)
+    monkeypatch.setattr(sharpening, "size_candidate", sized(stds))
+    rng = np.random.default_rng(0)
+    sharpening.sharpen_candidate(synthetic.ADSS, found(observed, 0), observed, rng)
+    assert len(asked) == rounds
 
 
 @pytest.mark.parametrize(
@@ -106,7 +127,8 @@ def test_one_round_that_seems_worthless_does_not_end_it_and_two_do(
     monkeypatch, asked, stds, rounds
 ):
     observed = observed_at(0)
-    monkeypatch.setattr(sharpening, "size_candidate", sized(stds))
+    monkeypatch.setattr(sharpening, "size_candidate", sized(stds, 0.03))
+    monkeypatch.setattr(sharpening, "_APART", 0.0)
     rng = np.random.default_rng(0)
     sharpening.sharpen_candidate(synthetic.ADSS, found(observed, 0), observed, rng)
     assert len(asked) == rounds

@@ -1,0 +1,59 @@
+"""When the leader of a search is doubted, and what that costs."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from analysis import doubt
+
+
+@pytest.mark.parametrize(
+    ("misfits", "structures", "missed", "doubted", "settled"),
+    [
+        ([1.9], [1.9], [1.9], False, 0),
+        # What few rows leave open is asked again on all; what is plain is not.
+        ([2.1, 3.4], [0.0, 0.0], [1.0], False, 1), ([0.0, 0.0], [2.1, 3.4], [1.0], False, 1),
+        ([2.1, 3.6], [0.0, 0.0], [], True, 1), ([0.0, 0.0], [2.1, 3.6], [], True, 1),
+        ([9.0, 1.0], [9.0, 1.0], [1.0], False, 1), ([0.0, 0.0], [0.0, 0.0], [2.1, 2.1], True, 1),
+    ],
+)  # fmt: skip
+def test_few_rows_call_for_pairs_where_the_doubt_is_plain(
+    monkeypatch, misfits, structures, missed, doubted, settled
+):
+    leader, more = ("load-inertia",), []
+    fits = [SimpleNamespace(sigma=m, structure=s) for m, s in zip(misfits, structures, strict=True)]
+    best = SimpleNamespace(
+        hypothesis=SimpleNamespace(effects=leader), surface=SimpleNamespace(observation=None)
+    )
+    rough = SimpleNamespace(best=best, settle=lambda chosen, groups: more.append(chosen))
+    monkeypatch.setattr(doubt, "judge_adequacy", lambda *_: fits.pop(0))
+    monkeypatch.setattr(doubt, "hold_out", lambda *_: SimpleNamespace(rms_sigma=missed.pop(0)))
+    assert doubt.is_doubtful_at_once(rough, None) is doubted
+    assert more == [[leader]] * settled
+    assert not fits
+    assert not missed
+
+
+@pytest.mark.parametrize(
+    ("leader", "alone", "doubts", "still", "settled"),
+    [
+        (("load-inertia",), True, [False], False, 0),
+        (("load-inertia",), True, [True, False], False, 1),
+        (("load-inertia",), True, [True, True, True], True, 2),
+        (("load-inertia",), False, [True], True, 0),
+        ((), True, [True], True, 0),
+    ],
+)
+def test_a_doubted_leader_far_ahead_gets_more_runs_before_pairs_are_looked_at(
+    monkeypatch, leader, alone, doubts, still, settled
+):
+    more = []
+    fine = SimpleNamespace(
+        best=SimpleNamespace(hypothesis=SimpleNamespace(effects=leader)),
+        leading=lambda most, behind: [leader] if alone else [leader, ("mesh1-damping",)],
+        settle=lambda chosen, groups: more.append(chosen),
+    )
+    monkeypatch.setattr(doubt, "is_doubtful", lambda *_: doubts.pop(0))
+    assert doubt.is_doubtful_still(fine, None) is still
+    assert more == [[leader]] * settled
+    assert not doubts
