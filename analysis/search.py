@@ -48,9 +48,9 @@ __all__ = ["search_causes"]
 
 _FIRST, _FIRST_GROUPS, _FIRST_OF_MANY = 9, 2, 4
 _SECOND, _SECOND_GROUPS = 5, 4
-_THIRD, _THIRD_GROUPS = 4, 4
+_THIRD, _THIRD_GROUPS, _SINGLES = 4, 4, 3
 """How many hypotheses are looked at in each round, and in how many groups of runs each; at first
-in more where one has many sizes."""
+in more where one has many sizes. So many single causes that are close are always in the third."""
 
 _BESIDE, _BESIDE_CLOSER, _BESIDE_GROUPS = (5, 8), (2, 4), (2, 4)
 """How many pairs with a leader that is not doubted are tried, and how many looked at closer, where
@@ -342,14 +342,24 @@ def _singles(unit: Unit, coarse: Observation, atlas: Atlas) -> Starts:
 def _third(rough: Hunt) -> list[Effects]:
     """Who is looked at on all rows: the leaders, the parts of the first, and the baseline.
 
-    Who says the same as a leader with fewer sizes, too.
+    Single causes close to the best of them, too, however many pairs stand before them, and who says
+    the same as a leader with fewer sizes.
     """
     leading = [k for k in rough.leading(len(rough.found), _TOO_FAR) if earns(k, rough.found)]
     leading = leading[:_THIRD]
     hopeful = rough.leading(len(rough.found), _HOPELESS)
-    others = [*parts_of(leading[0], rough.found), rough.best_single]
+    others = [*parts_of(leading[0], rough.found), *_close_singles(rough)]
     others += [key for key in hopeful if _is_plainer(rough.found[key], leading, rough)]
     return _with_baseline([*leading, *(key for key in others if key in hopeful)])
+
+
+def _close_singles(rough: Hunt) -> list[Effects]:
+    """The best single cause, and a few that are hardly behind it."""
+    likelihood: dict[Effects, float] = {
+        k: c.best.log_likelihood for k, c in rough.found.items() if len(k) == 1
+    }
+    close = [k for k, found in likelihood.items() if found >= max(likelihood.values()) - _CLOSE]
+    return sorted(close, key=lambda key: -likelihood[key])[:_SINGLES]
 
 
 def _say_the_same(one: Candidate, other: Candidate) -> bool:

@@ -140,6 +140,36 @@ def test_a_payload_is_held_against_two_causes_at_the_load_that_it_may_stand_for(
     assert taken == ([key, pair] if taken_over else [])
 
 
+def test_close_single_causes_are_looked_at_on_all_rows_however_many_pairs_stand_before_them():
+    def standing(effects, likelihood):
+        best = SimpleNamespace(
+            place=np.zeros(Hypothesis(ADSS, effects).d), log_likelihood=likelihood
+        )
+        seen = SimpleNamespace(observation=SimpleNamespace(frequency_hz=np.array([100.0, 140.0])))
+        return SimpleNamespace(best=best, hypothesis=Hypothesis(ADSS, effects), surface=seen)
+
+    pairs = [("motor-constant", partner) for partner in ("motor-resistance", "total-backlash",
+             "motor-viscous-friction", "shaft-hardening", "tachometer-gain")]  # fmt: skip
+    singles = {"motor-resistance": 85.0, "amplifier-gain": 78.0, "shaft-stiffness": 56.0,
+               "amplifier-lag": 54.0, "motor-constant": 60.0, "filter-corner": 57.0}  # fmt: skip
+    found = {pair: standing(pair, 130.0 - i) for i, pair in enumerate(pairs)}
+    found |= {(one,): standing((one,), likelihood) for one, likelihood in singles.items()}
+    found[()] = standing((), 0.0)
+    ranking = sorted(found, key=lambda key: -found[key].best.log_likelihood)
+    rough = SimpleNamespace(found=found, leading=lambda *_: ranking)
+    looked_at = search._third(rough)
+    assert looked_at[:4] == pairs[:4]
+    # Three at most; the parts of the leading pair and the baseline are there in any case.
+    assert set(looked_at[4:]) == {
+        ("motor-resistance",), ("motor-constant",), ("amplifier-gain",), (),
+    }  # fmt: skip
+    assert search._close_singles(rough) == [
+        ("motor-resistance",), ("amplifier-gain",), ("motor-constant",),
+    ]  # fmt: skip
+    found[("amplifier-gain",)].best.log_likelihood = 54.0
+    assert ("amplifier-gain",) not in search._close_singles(rough)
+
+
 @pytest.mark.parametrize(
     ("f_p", "behind", "taken"), [(5.0, 299.0, True), (5.0, 301.0, False), (0.9, 299.0, False)]
 )
@@ -153,7 +183,10 @@ def test_who_says_the_same_as_a_leader_with_fewer_sizes_is_looked_at_with_it(f_p
 
     def standing(effects):
         one = Hypothesis(ADSS, effects)
-        best = SimpleNamespace(place=place if effects == payload else np.full(one.d, 0.5))
+        best = SimpleNamespace(
+            place=place if effects == payload else np.full(one.d, 0.5),
+            log_likelihood=-behind_by[effects],
+        )
         return SimpleNamespace(hypothesis=one, best=best, surface=SimpleNamespace(observation=seen))
 
     def leading(most, within):
@@ -161,7 +194,7 @@ def test_who_says_the_same_as_a_leader_with_fewer_sizes_is_looked_at_with_it(f_p
         return [key for key in ranked if behind_by[key] <= within][:most]
 
     found = {key: standing(key) for key in behind_by}
-    rough = SimpleNamespace(found=found, leading=leading, best_single=payload)
+    rough = SimpleNamespace(found=found, leading=leading)
     expected = [payload, ("motor-constant",), (), *([load] if taken else [])]
     assert sorted(search._third(rough)) == sorted(expected)
 

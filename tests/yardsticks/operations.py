@@ -62,7 +62,7 @@ def count_step(structure: Structure) -> Counter[str]:
                 counts.append(tally - before)
 
     with patch.object(ir, "IRBuilder", Counting):
-        Watched(Layout(structure), 1, True)
+        Watched(Layout(structure), 1, True, "")
     (found,) = counts
     return found
 
