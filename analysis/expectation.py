@@ -28,7 +28,7 @@ class Runs(NamedTuple):
     `charted` (1 or rows, n, k): where they are, one for all rows where they are alike.
     `width` (k,). `enough`: weight of the runs that a regression takes; `most`: how many
     of the nearest take part, where every row has its own. `tailed`: see
-    `analysis.regression.solve_plane`. `plain` (3 len(plain_rows), n): what they show minus what
+    `analysis.agreement.solve_plane`. `plain` (3 len(plain_rows), n): what they show minus what
     was observed, at rows where all runs count; `mixed` (len(mixed_rows), 3, n): at the others,
     where they count as `alike` (rows, n) says; `values` (rows, 3, n): at all. `neighbours`
     (rows, 5): which rows of its level a scatter is smoothed over. `least` (3, rows): variance

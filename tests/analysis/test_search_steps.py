@@ -1,0 +1,258 @@
+"""Each step of the search by itself: who gets runs, and how many, given how all stand."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import synthetic
+
+from analysis import search
+from analysis.causes import Hypothesis
+
+ADSS = synthetic.ADSS
+
+
+def test_close_single_causes_are_looked_at_on_all_rows_however_many_pairs_stand_before_them():
+    def standing(effects, likelihood):
+        best = SimpleNamespace(
+            place=np.zeros(Hypothesis(ADSS, effects).d), log_likelihood=likelihood
+        )
+        seen = SimpleNamespace(observation=SimpleNamespace(frequency_hz=np.array([100.0, 140.0])))
+        return SimpleNamespace(best=best, hypothesis=Hypothesis(ADSS, effects), surface=seen)
+
+    pairs = [("motor-constant", partner) for partner in ("motor-resistance", "total-backlash",
+             "motor-viscous-friction", "shaft-hardening", "tachometer-gain")]  # fmt: skip
+    singles = {"motor-resistance": 85.0, "amplifier-gain": 78.0, "shaft-stiffness": 56.0,
+               "amplifier-lag": 54.0, "motor-constant": 60.0, "filter-corner": 57.0}  # fmt: skip
+    found = {pair: standing(pair, 130.0 - i) for i, pair in enumerate(pairs)}
+    found |= {(one,): standing((one,), likelihood) for one, likelihood in singles.items()}
+    found[()] = standing((), 0.0)
+    ranking = sorted(found, key=lambda key: -found[key].best.log_likelihood)
+    rough = SimpleNamespace(found=found, leading=lambda *_: ranking)
+    looked_at = search._third(rough)
+    assert looked_at[:4] == pairs[:4]
+    # Three at most; the parts of the leading pair and the baseline are there in any case.
+    assert set(looked_at[4:]) == {
+        ("motor-resistance",), ("motor-constant",), ("amplifier-gain",), (),
+    }  # fmt: skip
+    assert search._close_singles(rough) == [
+        ("motor-resistance",), ("amplifier-gain",), ("motor-constant",),
+    ]  # fmt: skip
+    found[("amplifier-gain",)].best.log_likelihood = 54.0
+    assert ("amplifier-gain",) not in search._close_singles(rough)
+
+
+@pytest.mark.parametrize(
+    ("f_p", "behind", "taken"), [(5.0, 299.0, True), (5.0, 301.0, False), (0.9, 299.0, False)]
+)
+def test_who_says_the_same_as_a_leader_with_fewer_sizes_is_looked_at_with_it(f_p, behind, taken):
+    """A payload far above all that was measured is a heavier load; one amid it is a payload."""
+    payload, load = ("payload-flexibility",), ("load-inertia",)
+    behind_by = {payload: 0.0, ("motor-constant",): 5.0, load: behind, (): 100.0}
+    hypothesis = Hypothesis(ADSS, payload)
+    place = hypothesis.place(0.4, [0.2 * ADSS.load.J_L, f_p * synthetic.FREQUENCIES[-1], 0.02])
+    seen = SimpleNamespace(frequency_hz=synthetic.FREQUENCIES)
+
+    def standing(effects):
+        one = Hypothesis(ADSS, effects)
+        best = SimpleNamespace(
+            place=place if effects == payload else np.full(one.d, 0.5),
+            log_likelihood=-behind_by[effects],
+        )
+        return SimpleNamespace(hypothesis=one, best=best, surface=SimpleNamespace(observation=seen))
+
+    def leading(most, within):
+        ranked = sorted(behind_by, key=behind_by.get)
+        return [key for key in ranked if behind_by[key] <= within][:most]
+
+    found = {key: standing(key) for key in behind_by}
+    rough = SimpleNamespace(found=found, leading=leading)
+    expected = [payload, ("motor-constant",), (), *([load] if taken else [])]
+    assert sorted(search._third(rough)) == sorted(expected)
+
+
+@pytest.mark.parametrize(
+    ("runs_of_part", "weighed"), [(0, True), (79, True), (80, True), (81, False)]
+)
+def test_a_part_with_no_more_runs_than_a_pair_is_weighed_where_the_pair_has_it(
+    runs_of_part, weighed
+):
+    pair, part = ("amplifier-gain", "payload-flexibility"), ("payload-flexibility",)
+    known, started = {("amplifier-gain",): SimpleNamespace(population=range(200))}, []
+    if runs_of_part:
+        known[part] = SimpleNamespace(population=range(runs_of_part))
+    leader = SimpleNamespace(
+        hypothesis=Hypothesis(ADSS, pair),
+        best=SimpleNamespace(place=np.array([0.1, 0.5, 0.2, 0.3, 0.4])),
+        population=range(80),
+    )
+    fine = SimpleNamespace(
+        best=leader,
+        found={pair: leader, **known},
+        start=lambda places, groups: started.append(places),
+        leading=lambda *_: [pair, part],
+        settle=lambda chosen, groups: started.append(chosen),
+        hear=lambda: None,
+    )
+    search._weigh_parts(fine)
+    assert len(started) == (2 if weighed else 0)
+    if weighed:
+        assert list(started[0]) == [part]
+        assert started[0][part].tolist() == [0.1, 0.2, 0.3, 0.4]
+        assert started[1] == [part]
+
+
+def test_two_of_three_causes_are_weighed_where_the_three_lead(monkeypatch):
+    """They may not have been looked at, and explain as much."""
+    pair, third = ("amplifier-lag", "load-inertia"), "mesh1-damping"
+    three = Hypothesis(ADSS, (*pair, third))
+
+    def standing(effects, likelihood):
+        hypothesis = Hypothesis(ADSS, effects)
+        best = SimpleNamespace(place=np.full(hypothesis.d, 0.3), log_likelihood=likelihood)
+        return SimpleNamespace(hypothesis=hypothesis, best=best)
+
+    found = {pair: standing(pair, 100.0)}
+    looked = []
+
+    def rough_start(places, groups):
+        found[three.effects] = standing(three.effects, 200.0)
+
+    rough = SimpleNamespace(
+        unit=ADSS,
+        observation=None,
+        found=found,
+        among=list,
+        start=rough_start,
+        look_closer=lambda keys, groups: None,
+    )
+    fine = SimpleNamespace(
+        best=found[pair],
+        take_over=lambda candidates, groups: setattr(fine, "best", candidates[0]),
+        start=lambda places, groups: looked.append(set(places)),
+    )
+    monkeypatch.setattr(search, "add_causes", lambda *_: None)
+    monkeypatch.setattr(
+        search, "screen_further", lambda *_: {three.effects: standing(three.effects, 1.0).best}
+    )
+    monkeypatch.setattr(search, "_compare", lambda *_: True)
+    search._search_triples(rough, fine, {}, None)
+    assert looked == [{pair, ("amplifier-lag", third), ("load-inertia", third)}]
+
+
+@pytest.mark.parametrize(
+    ("causes", "missed", "second", "rounds"),
+    [
+        (1, [1.0], 10.0, 0),
+        (1, [1.29], 10.0, 0),
+        (1, [1.6, 1.1], 10.0, 1),
+        (1, [1.6, 1.5, 1.2], 10.0, 2),
+        (1, [1.6] * 4, 10.0, 3),
+        (1, [1.6] * 4, 199.0, 3),
+        (1, [1.6] * 5 + [1.2], 201.0, 5),
+        (1, [1.6] * 9, 201.0, 7),
+        (1, [2.6], 10.0, 0),
+        (2, [0.99], 201.0, 0),
+        (2, [1.1, 1.1, 0.9], 201.0, 2),
+        (3, [1.6, 1.2, 0.9], 10.0, 2),
+        (2, [2.6], 10.0, 0),
+        (0, [1.6], 10.0, 0),
+    ],
+)
+def test_a_leader_that_predicts_badly_gets_more_runs(monkeypatch, causes, missed, second, rounds):
+    settled, left = [], iter(missed)
+    leader = ("amplifier-lag", "load-inertia", "motor-constant")[:causes]
+    best = SimpleNamespace(hypothesis=Hypothesis(ADSS, leader))
+    fine = SimpleNamespace(
+        best=best,
+        found={leader: SimpleNamespace(population=range(40))},
+        observation=None,
+        leading=lambda most, behind: [leader, ()] if second < behind else [leader],
+        settle=lambda chosen, groups: settled.append(chosen),
+        hear=lambda: None,
+    )
+    monkeypatch.setattr(search, "hold_out", lambda *_: SimpleNamespace(rms_sigma=next(left)))
+    search._see_it_predict(fine)
+    assert settled == [[leader]] * rounds
+
+
+@pytest.mark.parametrize(("gap", "rounds"), [(50.0, 4), (199.0, 4), (201.0, 1)])
+def test_a_pair_is_compared_with_its_parts_in_every_round(monkeypatch, gap, rounds):
+    pair, part, settled = ("amplifier-lag", "load-inertia"), ("load-inertia",), []
+    standing = {pair: 300.0, part: 300.0 - gap, (): 0.0}
+
+    def leading(most, behind):
+        return [key for key in list(standing)[:most] if standing[key] >= 300.0 - behind]
+
+    fine = SimpleNamespace(found=standing, leading=leading, hear=lambda: None)
+    monkeypatch.setattr(search, "is_nothing_missing", lambda *_: False)
+    monkeypatch.setattr(search, "is_pressed", lambda _: False)
+    monkeypatch.setattr(search, "is_felt_alike", lambda *_: False)
+    monkeypatch.setattr(search, "_settle", lambda _, chosen: settled.append(chosen))
+    assert search._compare(fine, None)
+    assert settled == ([[pair, part]] if gap < 200.0 else [[pair]]) * rounds
+
+
+@pytest.mark.parametrize(
+    ("pressed", "alike", "rounds"),
+    [
+        ("", "", 4), ("near", "", 2), ("leader", "", 2), ("leader near", "", 4),
+        ("", "leader", 2), ("", "near", 2),
+    ],
+)  # fmt: skip
+def test_who_is_no_rival_is_left_aside_after_two_rounds(monkeypatch, pressed, alike, rounds):
+    """Who wants a size that no bench has, unless all do, or says the same as the leader."""
+    leader, near, settled = ("load-inertia",), ("payload-flexibility",), []
+    found = {leader: "leader", near: "near"}
+    fine = SimpleNamespace(found=found, leading=lambda *_: list(found), hear=lambda: None)
+    monkeypatch.setattr(search, "is_nothing_missing", lambda *_: False)
+    monkeypatch.setattr(search, "is_pressed", lambda candidate: candidate in pressed)
+    monkeypatch.setattr(search, "is_felt_alike", lambda one, simpler: simpler == alike)
+    monkeypatch.setattr(search, "_settle", lambda _, chosen: settled.append(chosen))
+    assert search._compare(fine, None)
+    assert settled == [[leader, near]] * rounds
+
+
+@pytest.mark.parametrize(
+    ("of_leader", "behind", "rounds", "left"),
+    [
+        # The leader's runs, or enough, and no more; none where they show that it is not close.
+        (120, [20.0, 20.0, 20.0], 2, 120), (121, [20.0] * 4, 3, 160), (400, [0.0] * 9, 7, 320),
+        (120, [20.0, 31.0], 1, 80), (120, [31.0], 0, 40), (40, [20.0, 20.0], 0, 40),
+    ],
+)  # fmt: skip
+def test_a_newcomer_that_is_close_gets_as_many_runs_as_the_leader(of_leader, behind, rounds, left):
+    leader, pair, other = ("load-inertia",), ("amplifier-lag", "load-inertia"), ("motor-constant",)
+    runs, settled = {leader: of_leader, pair: 40, other: 40}, []
+
+    class Fine:
+        """One whose newcomer stands elsewhere after each round of runs."""
+
+        found = property(
+            lambda _: {key: SimpleNamespace(population=range(n)) for key, n in runs.items()}
+        )
+
+        def leading(self, most, within):
+            here = behind[min(len(settled), len(behind) - 1)] <= within
+            return [leader, other, *([pair] if here else [])]
+
+        def settle(self, chosen, groups):
+            settled.append(chosen)
+            for key in chosen:
+                runs[key] += 40
+
+    search._catch_up(Fine(), [pair], leader)
+    assert settled == [[pair]] * rounds
+    assert runs == {leader: of_leader, pair: left, other: 40}
+
+
+def test_who_has_runs_enough_gets_no_more_to_be_compared_by():
+    settled, few, enough = [], ("load-inertia",), ("amplifier-lag",)
+    found = {
+        few: SimpleNamespace(population=range(319)),
+        enough: SimpleNamespace(population=range(320)),
+    }
+    fine = SimpleNamespace(found=found, settle=lambda chosen, groups: settled.append(chosen))
+    search._settle(fine, [few, enough])
+    search._settle(fine, [enough])
+    assert settled == [[few]]
