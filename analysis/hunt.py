@@ -17,7 +17,13 @@ from analysis.candidate import Candidate, Effects, form_candidates
 from analysis.causes import Hypothesis
 from analysis.executor import Executor
 from analysis.observation import Observation
-from analysis.placement import groups_about, groups_along, groups_around
+from analysis.placement import (
+    Reach,
+    groups_about,
+    groups_along,
+    groups_around,
+    groups_beside,
+)
 from analysis.population import Group, Population, simulate_groups
 from analysis.reading_noise import likeliest_noise, possible_noises
 from analysis.sizing import size_candidate
@@ -79,15 +85,18 @@ class Hunt:
         few, noise_v = self.observation.thinned(stride), self.observation.noise_v
         return Hunt(self.unit, few, self._rng, self._executor, self.report(), noise_v)
 
-    def start(self, places: Starts, groups: int, of_many: int = 0) -> None:
+    def start(
+        self, places: Starts, groups: int, of_many: int = 0, *, reach: Reach | None = None
+    ) -> None:
         """Simulate hypotheses about places, or more of them than before about other places.
 
-        In so many groups each; in `of_many`, if more, those with many coordinates.
+        In so many groups each; in `of_many`, if more, those with many coordinates. `reach`: how far
+        about them, if that is known.
         """
         wanted: list[Group] = []
         for key, place in places.items():
             count = max(groups, of_many if len(place) >= _MANY else 0)
-            wanted += groups_about(Hypothesis(self.unit, key), place, count, self._rng)
+            wanted += groups_about(Hypothesis(self.unit, key), place, count, self._rng, reach)
         self._simulate(wanted)
         known = {key: self.found[key].best.place for key in places if key in self.found}
         self._form({**places, **known})
@@ -96,6 +105,15 @@ class Hunt:
             there = one.surface.climb(places[key])
             if there.log_likelihood > one.best.log_likelihood:
                 self.found[key] = replace(one, best=there)
+
+    def beside(
+        self, known: Hypothesis, place: NDArray[np.float64], further: Sequence[Hypothesis]
+    ) -> dict[Effects, Population]:
+        """Runs of known causes at a place (d,) with one more at a few sizes; none is kept."""
+        rng, band_hz = self._rng, self.observation.frequency_hz
+        return self._made(
+            [g for one in further for g in groups_beside(known, place, one, band_hz, rng)]
+        )
 
     def take_over(self, candidates: Sequence[Candidate], groups: int) -> None:
         """Simulate candidates that were formed on other rows."""
@@ -140,12 +158,14 @@ class Hunt:
         self.take_over([self.found[key] for key in chosen], groups)
 
     def _simulate(self, groups: Sequence[Group]) -> None:
-        made = simulate_groups(
-            self.unit, groups, self.observation, self._rng, self._executor, self.report()
-        )
-        for key, population in made.items():
+        for key, population in self._made(groups).items():
             known = self._runs.get(key)
             self._runs[key] = population if known is None else known.joined(population)
+
+    def _made(self, groups: Sequence[Group]) -> dict[Effects, Population]:
+        return simulate_groups(
+            self.unit, groups, self.observation, self._rng, self._executor, self.report()
+        )
 
     def _form(self, starts: Starts) -> None:
         runs = {key: self._runs[key] for key in starts}

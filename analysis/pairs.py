@@ -7,11 +7,12 @@ It leaves what it found in the hunt, and does not tell whether a pair is called 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping
 
 from analysis.atlas import Atlas, coarse_stride
+from analysis.beside import place_beside
 from analysis.candidate import Candidate, Effects
-from analysis.hunt import Hunt
+from analysis.hunt import Hunt, Starts
 from analysis.parts import earns, parts_of, places_of_parts
 from analysis.screening import (
     Additions,
@@ -19,7 +20,6 @@ from analysis.screening import (
     add_causes,
     near,
     ranked,
-    screen_further,
     screen_pairs,
 )
 
@@ -35,9 +35,14 @@ _FELT_GROUPS = (2, 2, 2)
 """Groups of each look at a pair that is placed by what the load is felt as: ever closer ones told a
 true one from a cable alone, as many runs about the first place did not."""
 
-_SWAPS, _SWAPS_CLOSER, _SWAP_ROUNDS = 8, 4, 2
-"""Pairs with each cause of the leading one that are looked at then, how many of them closer, and
-how often, where one of them takes the lead."""
+_HOPELESS, _BESIDE_GROUPS, _BESIDE_REACH = 100.0, 2, (0.12, 0.03)
+"""Log-likelihood at few frequencies behind the likeliest, from which on nobody looks at another
+beside a cause of the leading pair; true ones lay up to 75 behind. In how many groups the rest are
+looked at, and how far about their places, which are known well: what sizes further off do would
+have to be told apart by too few runs, and ranked them by chance."""
+
+_BESIDE_CLOSER, _BESIDE_ROUNDS = 4, 2
+"""How many beside each cause are looked at closer, and how often, where one takes the lead."""
 
 
 def search_pairs(rough: Hunt, atlas: Atlas) -> None:
@@ -79,19 +84,25 @@ def _hold_against_neighbours(
     """Look at others with a cause of the leading pair: true pairs nearly all share one with it."""
     before: Effects = ()
     leader = rough.among(looked_at)[0]
-    for _ in range(_SWAP_ROUNDS):
+    for _ in range(_BESIDE_ROUNDS):
         _look_at_parts(rough, leader)
-        if not earns(leader, rough.found):
-            return  # One of its causes does as well alone.
         if additions.coarse is not rough.observation:
             # Another reading noise was heard since.
             additions = add_causes(rough.unit, rough.observation, atlas)
-        fresh = set(parts_of(leader, rough.found)) - set(parts_of(before, rough.found))
-        looked_at = looked_at | _swap(rough, additions, sorted(fresh), looked_at)
+        fresh = {k: p for k, p in _kept(rough, leader).items() if not set(k) & set(before)}
+        looked_at = looked_at | _look_beside(rough, additions, fresh)
         before, leader = leader, rough.among(looked_at)[0]
         if leader == before:
             return
     _look_at_parts(rough, leader)
+
+
+def _kept(rough: Hunt, leader: Effects) -> Starts:
+    """The causes of a leading pair where it has them; the one that does as well alone, if any."""
+    if earns(leader, rough.found):
+        return places_of_parts(rough.found[leader])
+    alone = rough.among(parts_of(leader, rough.found))[0]
+    return {alone: rough.found[alone].best.place}
 
 
 def _look_at_parts(rough: Hunt, leader: Effects) -> None:
@@ -100,22 +111,20 @@ def _look_at_parts(rough: Hunt, leader: Effects) -> None:
     rough.hear()
 
 
-def _swap(
-    rough: Hunt, additions: Additions, kept: Sequence[Effects], looked_at: Collection[Effects]
-) -> set[Effects]:
-    """Look at others beside what is kept of a leading pair; those that are worth it closer.
-
-    What it does where the leader has it tells better than the atlas what a second adds.
-    """
-    places: dict[Effects, Place] = {}
-    for part in kept:
-        further = screen_further(additions, rough.found[part])
-        others = [key for key in ranked(further) if key not in looked_at]
-        places |= {key: further[key] for key in others[:_SWAPS]}
-    closer = _glance(rough, places, _SWAPS_CLOSER)
-    rough.take_over(closer, sum(_GROUPS))
+def _look_beside(rough: Hunt, additions: Additions, kept: Starts) -> set[Effects]:
+    """Look at all others beside what is kept of a leading pair; those that are worth it closer."""
+    few = rough.thinned(coarse_stride(rough.observation, _GLANCE_FREQUENCIES))
+    looked: set[Effects] = set()
+    for part, place in kept.items():
+        placed = place_beside(few, additions, rough.found[part].hypothesis, place)
+        least = max(one.log_likelihood for one in placed.values()) - _HOPELESS
+        worth = {k: one.place for k, one in placed.items() if one.log_likelihood > least}
+        rough.start(worth, _BESIDE_GROUPS, reach=_BESIDE_REACH)
+        closer = rough.among(worth)[:_BESIDE_CLOSER]
+        rough.start({key: rough.found[key].best.place for key in closer}, _GROUPS[1])
+        looked |= set(closer)
     rough.hear()
-    return {one.hypothesis.effects for one in closer}
+    return looked
 
 
 def _glance(rough: Hunt, places: dict[Effects, Place], most: int) -> list[Candidate]:

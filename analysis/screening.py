@@ -35,6 +35,8 @@ __all__ = [
     "add_causes",
     "near",
     "ranked",
+    "ratios_of_pairs",
+    "rows_of",
     "screen_felt",
     "screen_further",
     "screen_pairs",
@@ -123,10 +125,10 @@ def screen_further(additions: Additions, known: Candidate) -> dict[Effects, Plac
     What a cause adds to the baseline is added to the candidate wherever there are runs of it,
     for with a further cause its best place is another.
     """
-    rows = _rows_of(additions.coarse, known.surface.observation)
+    rows = rows_of(additions.coarse, known.surface.observation)
     shown = [np.array(known.surface.expected(p))[..., rows] for p in known.population.places]
     nothing = np.zeros((1, 3 * len(rows)))
-    ratios = _centres(_PAIR_RATIOS)
+    ratios = ratios_of_pairs()
     nearest = [int(np.argmin(abs(ratios - p[0]))) for p in known.population.places]
     found = {}
     for effects, further in additions.added.items():
@@ -150,7 +152,7 @@ def screen_further(additions: Additions, known: Candidate) -> dict[Effects, Plac
     return found
 
 
-def _rows_of(thinned: Observation, whole: Observation) -> NDArray[np.intp]:
+def rows_of(thinned: Observation, whole: Observation) -> NDArray[np.intp]:
     """Where the rows of a thinned observation stand; levels may have frequencies of their own."""
     found = [
         every.start + np.flatnonzero(np.isin(whole.frequency_hz[every], thinned.frequency_hz[some]))
@@ -189,7 +191,7 @@ class Additions:
 def add_causes(unit: Unit, coarse: Observation, atlas: Atlas) -> Additions:
     """Look at every cause at all ratios and sizes: seconds, so once for many pairs."""
     surfaces = _surfaces(unit, coarse, atlas)
-    ratios = _centres(_PAIR_RATIOS)
+    ratios = ratios_of_pairs()
     plain = np.array([surfaces[()].expected(np.array([ratio]))[0] for ratio in ratios])
     added = {e: _added(surface, plain) for e, surface in surfaces.items() if e}
     return Additions(coarse, plain, added, _felt_pairs(unit, coarse, atlas))
@@ -197,7 +199,7 @@ def add_causes(unit: Unit, coarse: Observation, atlas: Atlas) -> Additions:
 
 def _added(surface: Surface, plain: NDArray[np.float64]) -> _Added:
     sizes = _mesh([_centres(count) for count in _PAIR_SIZES[surface.places.shape[1]]])
-    ratios = _centres(_PAIR_RATIOS)
+    ratios = ratios_of_pairs()
     expected = np.array(
         [[surface.expected(np.array([ratio, *size])) for size in sizes] for ratio in ratios]
     )
@@ -208,7 +210,7 @@ def _added(surface: Surface, plain: NDArray[np.float64]) -> _Added:
 
 def _best_pair(plain: NDArray[np.float64], first: _Added, second: _Added) -> Place:
     top, where = -np.inf, np.empty(0)
-    for at, ratio in enumerate(_centres(_PAIR_RATIOS)):
+    for at, ratio in enumerate(ratios_of_pairs()):
         likelihood = total_densities(
             plain[at].ravel(), first.shift[at], second.shift[at], first.std[at], second.std[at]
         )
@@ -322,6 +324,11 @@ def _best_of(surface: Surface, grid: NDArray[np.float64]) -> Place:
     likelihood = surface.scan(grid)
     top = int(np.argmax(likelihood))
     return Place(grid[top], float(likelihood[top]))
+
+
+def ratios_of_pairs() -> NDArray[np.float64]:
+    """Ratios at which it is known what causes add."""
+    return _centres(_PAIR_RATIOS)
 
 
 def _centres(count: int) -> NDArray[np.float64]:

@@ -48,7 +48,9 @@ class Standings:
 
     def __init__(self, likelihood):
         self.found = {
-            key: SimpleNamespace(best=SimpleNamespace(log_likelihood=value))
+            key: SimpleNamespace(
+                of=key, best=SimpleNamespace(log_likelihood=value, place=f"where {key} is")
+            )
             for key, value in likelihood.items()
         }
 
@@ -60,8 +62,8 @@ class Standings:
 @pytest.mark.parametrize(
     ("part", "brought_in", "swapped", "weighed"),
     [
-        # One of the leader's causes does as well alone.
-        (95.0, [], [], [("a", "b")]),
+        # One of the leader's causes does as well alone: it is the one that is known.
+        (95.0, [[("a", "c")]], [[("a",)]], [("a", "b")]),
         # What is tried beside them does no better.
         (60.0, [[("a", "c"), ("b", "d")]], [[("a",), ("b",)]], [("a", "b")]),
         # One does; what is tried beside its new cause does no better.
@@ -86,19 +88,17 @@ def test_others_are_tried_beside_the_causes_of_a_leading_pair(
     likelihood = {("a", "b"): 100.0, ("a", "c"): 90.0, ("a", "e"): 200.0, ("e", "f"): 300.0}
     likelihood |= {("b", "d"): 80.0, ("d", "e"): 150.0, (): 0.0}
     likelihood |= {(cause,): part for cause in "abcdef"}
-    beside, alone, known = [], [], [{("a", "b"), ("a", "c")}]
+    beside, alone = [], []
 
-    def swap(rough, additions, kept, looked_at):
+    def look(rough, additions, kept):
         beside.append(list(kept))
-        assert looked_at == known[-1]
-        new = set(brought_in[len(beside) - 1])
-        known.append(known[-1] | new)
-        return new
+        return set(brought_in[len(beside) - 1])
 
-    monkeypatch.setattr(pairs, "_swap", swap)
+    monkeypatch.setattr(pairs, "_look_beside", look)
+    monkeypatch.setattr(pairs, "places_of_parts", lambda leader: {(e,): None for e in leader.of})
     monkeypatch.setattr(pairs, "_look_at_parts", lambda rough, leader: alone.append(leader))
     additions = SimpleNamespace(coarse=Standings.observation)
-    pairs._hold_against_neighbours(Standings(likelihood), {}, additions, known[0])
+    pairs._hold_against_neighbours(Standings(likelihood), {}, additions, {("a", "b"), ("a", "c")})
     assert (beside, alone) == (swapped, weighed)
 
 
@@ -117,46 +117,56 @@ def test_what_causes_add_is_looked_at_again_where_another_noise_was_heard(
         anew.append(SimpleNamespace(coarse=coarse))
         return anew[-1]
 
-    def swap(rough, additions, kept, looked_at):
+    def beside(rough, additions, kept):
         used.append(additions)
         return {("a", "e")}
 
     monkeypatch.setattr(pairs, "_look_at_parts", look)
     monkeypatch.setattr(pairs, "add_causes", add)
-    monkeypatch.setattr(pairs, "_swap", swap)
+    monkeypatch.setattr(pairs, "_look_beside", beside)
+    monkeypatch.setattr(pairs, "places_of_parts", lambda leader: {(e,): None for e in leader.of})
     pairs._hold_against_neighbours(rough, {}, first, {("a", "b")})
     assert len(anew) == added_up
     assert used == [anew[0] if added_up else first] * 2
 
 
-def test_what_the_atlas_adds_to_each_part_is_tried_but_for_what_was_looked_at(monkeypatch):
-    found = {("a",): "alone", ("b",): "by itself"}
-    further = {
-        "alone": {("a", f"x{i:02}"): Place(None, -float(i)) for i in range(12)},
-        "by itself": {("b", f"x{i:02}"): Place(None, 100.0 - i) for i in range(3)},
+def test_all_that_is_not_hopeless_beside_a_part_is_looked_at_where_it_was_placed(monkeypatch):
+    found = {key: SimpleNamespace(hypothesis=key) for key in [("a",), ("b",)]}
+    placed = {
+        ("a",): {("a", f"x{i}"): Place(f"near x{i}", -30.0 * i) for i in range(6)},
+        ("b",): {("b", f"x{i}"): Place(f"by x{i}", 500.0 - i) for i in range(3)},
     }
-    taken = []
+    where, started = {("a",): "where the leader has a", ("b",): "where it has b"}, []
+
+    def place(few, additions, known, at):
+        assert (few, at) == ("few", where[known])
+        return placed[known]
+
+    def start(places, groups, **reach):
+        started.append((places, groups, reach))
+        for key, at in places.items():
+            found[key] = SimpleNamespace(best=SimpleNamespace(place=f"{at}, better"))
+
     rough = SimpleNamespace(
         observation=None,
         found=found,
-        take_over=lambda candidates, groups: taken.append((candidates, groups)),
+        thinned=lambda stride: "few",
+        start=start,
+        among=lambda keys: sorted(keys, reverse=True),
         hear=lambda: None,
     )
-    tried = []
-
-    def glance(rough, places, most):
-        tried.extend(places)
-        best = [SimpleNamespace(hypothesis=SimpleNamespace(effects=key)) for key in places]
-        return best[-most:]
-
-    monkeypatch.setattr(pairs, "screen_further", lambda _, known: further[known])
-    monkeypatch.setattr(pairs, "_glance", glance)
-    looked_at = {("a", "x00"), ("a", "x03"), ("b", "x01")}
-    closer = pairs._swap(rough, None, [("a",), ("b",)], looked_at)
-    eight = [("a", f"x{i:02}") for i in (1, 2, 4, 5, 6, 7, 8, 9)]
-    assert tried == [*eight, ("b", "x00"), ("b", "x02")]
-    assert closer == {("a", "x08"), ("a", "x09"), ("b", "x00"), ("b", "x02")}
-    assert [(len(candidates), groups) for candidates, groups in taken] == [(4, 5)]
+    monkeypatch.setattr(pairs, "place_beside", place)
+    monkeypatch.setattr(pairs, "coarse_stride", lambda *_: 2)
+    closer = pairs._look_beside(rough, None, where)
+    near = {"reach": (0.12, 0.03)}
+    assert started == [
+        # Those 120 and 150 behind are not.
+        ({("a", f"x{i}"): f"near x{i}" for i in range(4)}, 2, near),
+        ({("a", f"x{i}"): f"near x{i}, better" for i in (3, 2, 1, 0)}, 3, {}),
+        ({("b", f"x{i}"): f"by x{i}" for i in range(3)}, 2, near),
+        ({("b", f"x{i}"): f"by x{i}, better" for i in (2, 1, 0)}, 3, {}),
+    ]
+    assert closer == set(placed["a",]) - {("a", "x4"), ("a", "x5")} | set(placed["b",])
 
 
 def test_pairs_that_add_up_exactly_are_looked_at_whatever_is_favoured(monkeypatch):

@@ -5,7 +5,7 @@ import pytest
 import synthetic
 
 from analysis.causes import Hypothesis
-from analysis.placement import groups_about
+from analysis.placement import groups_about, groups_beside
 
 
 @pytest.mark.parametrize(
@@ -45,3 +45,45 @@ def test_the_plain_model_has_no_sizes_to_spread():
         groups_about(Hypothesis(synthetic.ADSS), np.array([0.4]), 3, np.random.default_rng(2))
     )
     assert [group.sizes.shape for group in groups] == [(0,)] * 3
+
+
+def test_groups_lie_no_farther_about_a_place_than_they_are_told():
+    hypothesis = Hypothesis(synthetic.ADSS, ("load-inertia", "mesh1-damping"))
+    rng = np.random.default_rng(4)
+    for group in groups_about(hypothesis, np.full(3, 0.5), 5, rng, (0.12, 0.03)):
+        assert np.all(abs(group.sizes - 0.5) <= 0.03)
+        assert np.all(abs(group.ratios - 0.5) <= 0.12)
+
+
+@pytest.mark.parametrize(
+    ("further", "tried"),
+    [
+        # To either side of the datasheet's value, which is known: nothing is added there.
+        ("shaft-stiffness", [[0.36], [0.64]]),
+        ("mesh1-damping", [[0.4], [0.65]]),
+        ("load-stribeck-friction", [[0.4, 0.4], [0.4, 0.65], [0.65, 0.4], [0.65, 0.65]]),
+    ],
+)
+def test_a_further_cause_is_tried_at_sizes_all_over_its_range(further, tried):
+    known, place = Hypothesis(synthetic.ADSS, ("load-inertia",)), np.array([0.9, 0.23])
+    one = Hypothesis(synthetic.ADSS, (further,))
+    rng = np.random.default_rng(5)
+    groups = list(groups_beside(known, place, one, np.array([100.0, 180.0]), rng))
+    assert [list(group.sizes) for group in groups] == [[0.23, *sizes] for sizes in tried]
+    for group in groups:
+        assert group.hypothesis.effects == ("load-inertia", further)
+        assert np.all((group.ratios >= 0.7) & (group.ratios <= 1.0))
+
+
+def test_what_resonates_by_itself_is_tried_in_the_band_that_was_measured():
+    known = Hypothesis(synthetic.ADSS, ("motor-resistance",))
+    payload = Hypothesis(synthetic.ADSS, ("payload-flexibility",))
+    groups = groups_beside(
+        known, np.array([0.5, 0.6]), payload, np.array([100.0, 180.0]), np.random.default_rng(6)
+    )
+    named = [dict(zip([p.name for _, p in g.hypothesis.parameters],
+                      g.hypothesis.values(np.array([0.5, *g.sizes])), strict=True))
+             for g in groups]  # fmt: skip
+    resonances = sorted({round(one["f_p"], 6) for one in named})
+    assert len(named) == 6
+    assert resonances == pytest.approx([106.0, 134.2, 169.7], abs=0.1)

@@ -6,38 +6,16 @@ import numpy as np
 import pytest
 import synthetic
 from synthetic import ADSS
+from synthetic_atlas import SINGLE, channels
 
 from analysis import screening
 from analysis.candidate import form_candidates
 from analysis.causes import Hypothesis
 from analysis.chart import reflections
 from analysis.placement import _FAR
-from analysis.screening import _rows_of, add_causes, screen_further, screen_pairs, screen_singles
+from analysis.screening import add_causes, rows_of, screen_further, screen_pairs, screen_singles
 from daq.plan import SweepPlan
 from sim.catalogue import CATALOGUE
-
-SINGLE = ("amplifier-lag", "load-inertia", "mesh1-damping", "shaft-stiffness", "tachometer-gain")
-
-
-def channels(sizes, ratio, rng):
-    """One run (3, rows) of effects with a size each; a size counts from the middle of its range."""
-    plain = synthetic.read((), np.array([ratio]), rng)
-    return plain + sum(synthetic.effect_slope((e,)) * (x - 0.5) for e, x in sizes.items())
-
-
-def population(effects, rng):
-    runs, places = [], []
-    for size in rng.permutation((np.arange(12) + rng.uniform(size=12)) / 12):
-        for ratio in (np.arange(10) + rng.uniform()) / 10:
-            places.append([ratio, size][: 1 + len(effects)])
-            runs.append(channels(dict.fromkeys(effects, size), ratio, rng))
-    return synthetic.population(np.array(places), np.array(runs))
-
-
-@pytest.fixture(scope="module")
-def atlas():
-    rng = np.random.default_rng(7)
-    return {effects: population(effects, rng) for effects in [(), *((e,) for e in SINGLE)]}
 
 
 def seen(sizes, ratio, seed):
@@ -125,7 +103,7 @@ def test_a_third_cause_is_seen_beside_a_pair_and_placed(atlas, seed):
 
 
 @pytest.mark.parametrize("stride", [1, 2, 3])
-def test_rows_of_a_thinned_sweep_are_found_where_levels_have_their_own_frequencies(stride):
+def testrows_of_a_thinned_sweep_are_found_where_levels_have_their_own_frequencies(stride):
     whole = seen({}, 0.4, 1)
     low, high = whole.blocks
     frequency = whole.frequency_hz.copy()
@@ -137,7 +115,7 @@ def test_rows_of_a_thinned_sweep_are_found_where_levels_have_their_own_frequenci
     )
     whole = replace(whole, frequency_hz=frequency, plans=plans)
     thinned = whole.thinned(stride)
-    rows = _rows_of(thinned, whole)
+    rows = rows_of(thinned, whole)
     assert whole.frequency_hz[rows].tolist() == thinned.frequency_hz.tolist()
     assert np.array_equal(whole.values[:, rows], thinned.values)
 
