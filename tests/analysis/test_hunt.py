@@ -6,6 +6,7 @@ import synthetic
 import synthetic_search
 
 from analysis import hunt
+from analysis.causes import Hypothesis
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -64,3 +65,23 @@ def test_many_sizes_take_more_groups_at_first_and_few_do_not(runs):
     both = {("load-inertia",): [0.4, 0.8], ("payload-flexibility",): [0.4, 0.5, 0.5, 0.5]}
     looking.start({key: np.array(place) for key, place in both.items()}, 2, of_many=4)
     assert runs == {("load-inertia",): 20, ("payload-flexibility",): 40}
+
+
+def test_runs_beside_a_known_cause_are_made_and_not_kept(runs):
+    looking = synthetic_search.hunted([0.8], 1)
+    known, place = Hypothesis(synthetic.ADSS, ("load-inertia",)), np.array([0.4, 0.8])
+    further = [Hypothesis(synthetic.ADSS, (e,)) for e in ("amplifier-lag", "shaft-stiffness")]
+    made = looking.beside(known, place, further)
+    assert set(made) == {("amplifier-lag", "load-inertia"), ("load-inertia", "shaft-stiffness")}
+    for key, population in made.items():
+        whole = Hypothesis(synthetic.ADSS, key)
+        assert len(population) == 20
+        assert {whole.part(known.effects, p)[1] for p in population.places} == {0.8}
+    assert looking.found == {}
+
+
+def test_a_look_close_about_a_place_stays_there(runs):
+    looking = synthetic_search.hunted([0.8], 1)
+    key, place = ("amplifier-lag", "load-inertia"), np.array([0.4, 0.5, 0.8])
+    looking.start({key: place}, 3, reach=(0.1, 0.02))
+    assert np.all(abs(looking.found[key].population.places - place) <= [0.1, 0.02, 0.02])
