@@ -9,6 +9,7 @@ observed. It ranks no hypotheses.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +17,7 @@ import numpy as np
 from analysis.candidate import Candidate
 from analysis.holdout import HeldOut, hold_out_surface
 from analysis.own_runs import MOST_RUNS, own_runs
-from analysis.structure import judge_structure
+from analysis.structure import credited, judge_structure
 
 __all__ = ["Adequacy", "judge_adequacy", "judge_chance", "misses_alike"]
 
@@ -41,16 +42,27 @@ def judge_adequacy(candidate: Candidate, rng: np.random.Generator) -> Adequacy:
     """Compare the fit of the observation with the fits of runs of the same hypothesis.
 
     The runs are given reading noise; each is fitted without the group that
-    shares its deviations.
+    shares its deviations. In both numbers the lowest level has a credit (see
+    `analysis.structure.credited`).
     """
     fits = [run.alone.climb(run.place, tries=1) for run in own_runs(candidate, rng)]
     surface, best = candidate.surface, candidate.best
     own = [fit.log_likelihood for fit in fits]
-    centre = float(np.median(own))
-    below = [centre - value for value in own if value <= centre]
-    spread = 1.4826 * float(np.median(below))
+    sigma = _worse([best.log_likelihood, *own])
+    lowest, *others = surface.observation.blocks
+    if others:
+        above = [np.sum(fit.density[:, lowest.stop :]) for fit in [best, *fits]]
+        sigma = credited(sigma, _worse(above))
     structure = judge_structure(best, fits, surface.observation, surface.sigmas)
-    return Adequacy((centre - best.log_likelihood) / max(spread, 1e-9), structure, tuple(own))
+    return Adequacy(sigma, structure, tuple(own))
+
+
+def _worse(likelihoods: Sequence[float]) -> float:
+    """Standard deviations by which the first of some log-likelihoods is less than the others."""
+    seen, *own = likelihoods
+    centre = np.median(own)
+    below = [centre - value for value in own if value <= centre]
+    return float((centre - seen) / max(1.4826 * np.median(below), 1e-9))
 
 
 def judge_chance(simpler: Candidate, alleged: Candidate, rng: np.random.Generator) -> float:

@@ -22,6 +22,7 @@ from analysis.doubt import (
     is_doubtful_at_once,
     is_doubtful_still,
     is_nothing_missing,
+    settle_doubt,
 )
 from analysis.executor import Executor
 from analysis.holdout import AT_NOISE, hold_out
@@ -175,6 +176,7 @@ def search_causes(
         if len(fine.best.hypothesis.effects) == 2 and is_doubtful(fine.best, rng, _LEAST_SURE):
             _search_triples(rough, fine, atlas, rng)
             _see_it_predict(fine)
+        settle_doubt(fine, rng)
         rare = make_atlas(unit, coarse, cache, executor, fine.report(), rare=True)
         _hold_rare(rough, fine, {k: v for k, v in rare.items() if not set(k) & set(without)}, rng)
     return sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)

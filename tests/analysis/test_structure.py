@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, norm
 
-from analysis.structure import judge_structure
+from analysis.structure import credited, judge_structure
 from analysis.surface import Fit
 
 ROWS = 3 * 61
@@ -38,7 +38,8 @@ def test_noise_leaves_as_much_as_noise():
     for _ in range(300):
         one, *own = noise(rng, 49)
         left.append(judge_structure(one, own, SEEN, NONE))
-    assert abs(np.median(left)) < 0.2
+    # The lower of two standard normals, alike by two thirds, has its median at -0.3.
+    assert -0.5 < np.median(left) < 0.0
     assert np.std(left) == pytest.approx(1.0, abs=0.25)
     # Binomial: seven or more of 300 have a probability of 3 % where one of a hundred is true.
     assert np.sum(np.array(left) > 2.5) <= 7
@@ -65,8 +66,43 @@ def test_a_band_that_leans_is_seen_where_a_sum_over_points_sees_little():
 def test_levels_that_lean_against_each_other_are_seen_too(seed):
     one, *own = noise(np.random.default_rng(seed), 49)
     leaning = one.residual.copy()
-    leaning[1] += np.where(np.arange(ROWS) < 61, 0.02, -0.01)
+    leaning[1] += np.where(np.arange(ROWS) < 122, 0.02, -0.01)
     assert judge_structure(fit(leaning), own, SEEN, NONE) > 2.5
+
+
+def test_a_late_jump_is_chance_at_the_lowest_level_and_nowhere_else():
+    """Ten points after it are off by twice their scatter, all to one side; medians of eleven draws.
+
+    Single ones scatter by one or so: these by 0.4, and each limit is four of that away.
+    """
+    left = []
+    for seed in range(11):
+        one, *own = noise(np.random.default_rng(seed), 49)
+        for level in SEEN.blocks:
+            jumped = one.residual.copy()
+            jumped[:2, level.stop - 10 : level.stop] += 0.04
+            left.append(judge_structure(fit(jumped), own, SEEN, NONE))
+    lowest, *higher = np.median(np.reshape(left, (11, 3)), axis=0)
+    assert lowest < 2.5
+    assert min(higher) > 3.0
+
+
+def test_the_only_level_has_no_credit_and_the_lowest_has_its_limits():
+    alone = SimpleNamespace(blocks=(slice(0, ROWS),))
+    one, *own = noise(np.random.default_rng(6), 49)
+    jumped = one.residual.copy()
+    jumped[:2, 50:61] += 0.04
+    assert judge_structure(fit(jumped), own, alone, NONE) > 3.5
+    jumped[:2, :61] += 0.5
+    assert judge_structure(fit(jumped), own, SEEN, NONE) > 3.5
+
+
+@pytest.mark.parametrize(
+    ("everywhere", "elsewhere", "counts"),
+    [(1.0, 3.0, 1.0), (4.0, 0.5, 0.5), (4.0, 3.0, 3.0), (9.0, 0.5, 4.0), (-1.0, -3.0, -3.0)],
+)
+def test_a_credit_only_forgives_and_not_without_end(everywhere, elsewhere, counts):
+    assert credited(everywhere, elsewhere) == counts
 
 
 def test_what_own_runs_leave_as_well_is_no_structure():

@@ -319,6 +319,21 @@ def test_an_observation_like_own_runs_is_adequate_and_another_is_not(seed):
     assert judge_adequacy(candidate(odd, TRUE, seed), rng).sigma > 4.0
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_an_odd_lowest_level_has_a_credit_and_an_odd_higher_one_has_none(seed):
+    fitting, levels = seen(TRUE, seed).values, observation(seen(TRUE, seed).values).blocks
+    misfits = []
+    for level in (levels[0], levels[-1]):
+        odd = fitting.copy()
+        odd[:2, level] += 0.3 * shape(77)[:2, level]
+        misfits.append(
+            judge_adequacy(
+                candidate(observation(odd), TRUE, seed), np.random.default_rng(seed)
+            ).sigma
+        )
+    assert misfits[0] < misfits[1] - 1.0
+
+
 def test_departures_are_found_where_they_are_and_nowhere_else():
     values = read((), np.array([0.5]), np.random.default_rng(4))
     quiet = observation(values)
