@@ -274,7 +274,7 @@ def test_what_misses_other_levels_must_have_own_runs_that_do(
     assert rules._find_objection(candidate, held_out, FITS, rng) == against
     unlike = rules._find_objection(candidate, held_out, replace(FITS, sigma=4.1), rng)
     assert unlike == "does not look like its own runs"
-    shaped = rules._find_objection(candidate, held_out, replace(FITS, structure=3.1), rng)
+    shaped = rules._find_objection(candidate, held_out, replace(FITS, structure=2.6), rng)
     assert shaped == "leaves structure that its own runs do not"
 
 
