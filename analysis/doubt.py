@@ -7,22 +7,14 @@ It passes no verdict (`analysis.verdict` has its own limits).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from analysis.adequacy import judge_adequacy, judge_chance
-from analysis.candidate import Candidate, Effects
+from analysis.candidate import Candidate
 from analysis.holdout import hold_out
 from analysis.hunt import Hunt
 
-__all__ = [
-    "is_doubtful",
-    "is_doubtful_at_once",
-    "is_doubtful_still",
-    "is_nothing_missing",
-    "settle_doubt",
-]
+__all__ = ["is_doubtful", "is_doubtful_at_once", "is_doubtful_still", "is_nothing_missing"]
 
 _DOUBT = 2.0
 """Misfit of the best single cause, and the structure that it leaves, in standard deviations, from
@@ -38,15 +30,6 @@ _CLOSER_LOOKS = 2
 
 _TOO_FAR, _GROUPS = 200.0, 4
 """Log-likelihood by which it is far ahead, and in how many groups of runs each of these is."""
-
-_OPEN, _SETTLED = (1.0, 8.0), 320
-"""Structure between which more runs tell, and runs that are enough. What the runs of a true cause
-leave beside a sharp resonance goes with more of them, what a false one leaves stays or grows: an
-amplifier's gain that was withheld left 1.9 as a motor's constant in 80 runs, in 240 2.0 to 4.1. Of
-28 true ones two left more than the first; what leaves more than the second is settled."""
-
-_LAST_LOOKS, _NEAR, _CLOSE = 4, 4, 30.0
-"""How often the leader is looked at so before a verdict, and with how many as close behind it."""
 
 _COMMON = 0.2
 """Share of the baseline's own runs that the leader explains better by as much, from which on there
@@ -89,28 +72,6 @@ def is_doubtful_still(fine: Hunt, rng: np.random.Generator) -> bool:
             return True
         fine.settle([leader], _GROUPS)
     return is_doubtful(fine.best, rng)
-
-
-def settle_doubt(fine: Hunt, rng: np.random.Generator) -> None:
-    """Give a leader that may or may not leave structure more runs, and who is close to it."""
-    for _ in range(_LAST_LOOKS):
-        best = fine.best
-        if len(best.population) >= _SETTLED:
-            break
-        least, most = _OPEN
-        if not least < judge_adequacy(best, rng).structure < most:
-            break
-        _look_closer(fine, fine.leading(_NEAR, _CLOSE))
-        fine.hear()
-
-
-def _look_closer(fine: Hunt, chosen: Sequence[Effects]) -> None:
-    """More runs, half where they agree and half about what is learned of the sizes.
-
-    Either alone tends to stay where its runs are.
-    """
-    fine.look_closer(chosen, _GROUPS // 2)
-    fine.settle(chosen, _GROUPS // 2)
 
 
 def is_nothing_missing(fine: Hunt, rng: np.random.Generator) -> bool:

@@ -57,37 +57,3 @@ def test_a_doubted_leader_far_ahead_gets_more_runs_before_pairs_are_looked_at(
     assert doubt.is_doubtful_still(fine, None) is still
     assert more == [[leader]] * settled
     assert not doubts
-
-
-@pytest.mark.parametrize(
-    ("structures", "runs", "looks"),
-    [
-        # Nothing left, and what is plain: no more runs tell anything.
-        ([0.9], 80, 0), ([8.1], 80, 0),
-        ([1.8, 0.5], 80, 1), ([1.8, 2.4, 3.1, 4.2], 80, 4), ([1.8, 9.0], 80, 1),
-        # Who has as many as are compared by gets no more.
-        ([], 320, 0), ([1.8], 280, 1),
-    ],
-)  # fmt: skip
-def test_a_leader_that_may_leave_structure_gets_more_runs_with_who_is_close(
-    monkeypatch, structures, runs, looks
-):
-    close, more = [("motor-constant",), ("amplifier-gain",)], []
-    fine = SimpleNamespace(
-        best=SimpleNamespace(population=[None] * runs),
-        leading=lambda most, behind: close,
-        look_closer=lambda chosen, groups: more.append((chosen, groups)),
-        hear=lambda: None,
-    )
-
-    def settle(chosen, groups):
-        more.append((chosen, groups))
-        fine.best.population += [None] * 40
-
-    fine.settle = settle
-    monkeypatch.setattr(
-        doubt, "judge_adequacy", lambda *_: SimpleNamespace(structure=structures.pop(0))
-    )
-    doubt.settle_doubt(fine, None)
-    assert more == [(close, 2), (close, 2)] * looks
-    assert not structures

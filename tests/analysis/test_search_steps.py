@@ -256,3 +256,45 @@ def test_who_has_runs_enough_gets_no_more_to_be_compared_by():
     search._settle(fine, [few, enough])
     search._settle(fine, [enough])
     assert settled == [[few]]
+
+
+@pytest.mark.parametrize(
+    ("structures", "runs", "rounds"),
+    [
+        # Where nothing is left, and where it is plain, more runs tell nothing.
+        ([1.0], 80, 0), ([8.0], 80, 0), ([1.8, 0.5], 80, 1), ([1.8, 9.0], 80, 1),
+        ([1.8, 2.4, 3.1, 4.2], 80, 4),
+        # Who has as many as are compared by gets no more.
+        ([], 320, 0), ([1.8], 280, 1),
+    ],
+)  # fmt: skip
+def test_a_leader_that_may_leave_structure_gets_more_runs_with_who_is_close(
+    monkeypatch, structures, runs, rounds
+):
+    leader, close, settled = ("motor-constant",), ("amplifier-gain",), ("motor-resistance",)
+    found = {
+        key: SimpleNamespace(population=[None] * count, hypothesis=SimpleNamespace(effects=key))
+        for key, count in ((leader, runs), (close, 40), (settled, 320))
+    }
+    more = []
+
+    def settle(chosen, groups):
+        more.append(("settle", chosen, groups))
+        for key in chosen:
+            found[key].population += [None] * 40
+
+    fine = SimpleNamespace(
+        found=found,
+        best=found[leader],
+        leading=lambda most, behind: list(found),
+        look_closer=lambda chosen, groups: more.append(("along", chosen, groups)),
+        settle=settle,
+        hear=lambda: more.append("hear"),
+    )
+    monkeypatch.setattr(
+        search, "judge_adequacy", lambda *_: SimpleNamespace(structure=structures.pop(0))
+    )
+    search._settle_doubt(fine, None)
+    few = [leader, close]
+    assert more == [("along", few, 2), ("settle", few, 2), "hear"] * rounds
+    assert not structures

@@ -320,18 +320,20 @@ def test_an_observation_like_own_runs_is_adequate_and_another_is_not(seed):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_an_odd_lowest_level_has_a_credit_and_an_odd_higher_one_has_none(seed):
-    fitting, levels = seen(TRUE, seed).values, observation(seen(TRUE, seed).values).blocks
-    misfits = []
-    for level in (levels[0], levels[-1]):
-        odd = fitting.copy()
-        odd[:2, level] += 0.3 * shape(77)[:2, level]
-        misfits.append(
-            judge_adequacy(
-                candidate(observation(odd), TRUE, seed), np.random.default_rng(seed)
-            ).sigma
-        )
-    assert misfits[0] < misfits[1] - 1.0
+def test_misfit_at_the_lowest_level_has_a_credit_and_at_a_higher_one_has_none(seed, monkeypatch):
+    """What is asked is the misfit at all levels, and that at all but the lowest."""
+    asked = []
+    monkeypatch.setattr(adequacy, "credited", lambda *both: asked.append(both) or -7.0)
+    fitting = seen(TRUE, seed)
+    for level in (fitting.blocks[0], fitting.blocks[-1]):
+        odd = fitting.values.copy()
+        odd[:, level] += 0.3 * shape(77)[:, level]
+        rng = np.random.default_rng(seed)
+        assert judge_adequacy(candidate(observation(odd), TRUE, seed), rng).sigma == -7.0
+    (everywhere, above_odd), (_, odd_above) = asked
+    # Of a standard normal, more or less, 3.5 is exceeded once in 4,000 draws.
+    assert above_odd < 3.5 < 4.0 < everywhere
+    assert odd_above > 4.0
 
 
 def test_departures_are_found_where_they_are_and_nowhere_else():
