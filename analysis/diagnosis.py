@@ -65,7 +65,8 @@ class Diagnosis:
     `ratio_baseline`, `ratio_extended`: contribution ratio and its standard
     deviation under the plain and the extended model. `departures`: of the
     measurement from the plain model; `left`: from the extended one.
-    `simulated_s`: seconds of motion that were simulated for it.
+    `given_up`: whether the search was left with no explanation, having simulated as much as it
+    may. `simulated_s`: seconds of motion that were simulated for it.
     """
 
     unit: str
@@ -78,6 +79,7 @@ class Diagnosis:
     shape: str
     next_measurement: NextMeasurement | None
     observation: Observation
+    given_up: bool = False
     warnings: tuple[str, ...] = ()
     elapsed_s: float = 0.0
     simulated_s: float = 0.0
@@ -239,7 +241,7 @@ def diagnose_response(
         found = _diagnose(observe(response), unit, without, cache, seed, executor, progress)
     return replace(
         found,
-        warnings=_warnings(response, found.observation),
+        warnings=_warnings(response, found),
         elapsed_s=time.perf_counter() - started,
         simulated_s=effort.simulated_s,
     )
@@ -259,9 +261,10 @@ def _diagnose(
         if progress is not None:
             progress(0.8 * share, text)
 
-    candidates = search_causes(
+    searched = search_causes(
         unit, observed, without=without, cache=cache, seed=seed, executor=executor, progress=early
     )
+    candidates = searched.candidates
     observation = candidates[0].surface.observation
     rng = np.random.default_rng(seed)
     verdict = judge_candidates(candidates, observation, rng)
@@ -286,6 +289,7 @@ def _diagnose(
         shape=describe_departures(departures, observation),
         next_measurement=proposal,
         observation=observation,
+        given_up=searched.given_up,
     )
 
 
@@ -330,8 +334,13 @@ def _proposal(
     )  # fmt: skip
 
 
-def _warnings(response: FrequencyResponse, observation: Observation) -> tuple[str, ...]:
-    found = []
+def _warnings(response: FrequencyResponse, diagnosis: Diagnosis) -> tuple[str, ...]:
+    found, observation = [], diagnosis.observation
+    if diagnosis.given_up:
+        found.append(
+            "the search was left with no explanation, having simulated as much motion as it may: "
+            "not every set of causes was tried"
+        )
     if len(observation.blocks) == 1:
         found.append(
             "the response holds one source level: what was held out are halves of its band; "

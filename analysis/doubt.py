@@ -14,7 +14,13 @@ from analysis.candidate import Candidate
 from analysis.holdout import hold_out
 from analysis.hunt import Hunt
 
-__all__ = ["is_doubtful", "is_doubtful_at_once", "is_doubtful_still", "is_nothing_missing"]
+__all__ = [
+    "is_doubtful",
+    "is_doubtful_at_once",
+    "is_doubtful_still",
+    "is_given_up",
+    "is_nothing_missing",
+]
 
 _DOUBT = 2.0
 """Misfit of the best single cause, and the structure that it leaves, in standard deviations, from
@@ -30,6 +36,9 @@ _CLOSER_LOOKS = 2
 
 _TOO_FAR, _GROUPS = 200.0, 4
 """Log-likelihood by which it is far ahead, and in how many groups of runs each of these is."""
+
+_HOPELESS = 4.0
+"""Misfit or structure of a leader that is refused (`analysis.verdict`), not only doubted."""
 
 _COMMON = 0.2
 """Share of the baseline's own runs that the leader explains better by as much, from which on there
@@ -80,3 +89,11 @@ def is_nothing_missing(fine: Hunt, rng: np.random.Generator) -> bool:
     if is_doubtful(baseline, rng):
         return False
     return fine.best is baseline or judge_chance(baseline, fine.best, rng) > _COMMON
+
+
+def is_given_up(fine: Hunt, rng: np.random.Generator) -> bool:
+    """Whether all was spent that may be, and the leader is no explanation.
+
+    One that may be is looked at for as long as it takes: it might be named.
+    """
+    return fine.purse.is_spent and is_doubtful(fine.best, rng, unlike=_HOPELESS)

@@ -25,6 +25,7 @@ from analysis.placement import (
     groups_beside,
 )
 from analysis.population import Group, Population, simulate_groups
+from analysis.purse import Purse
 from analysis.reading_noise import likeliest_noise, possible_noises
 from analysis.sizing import size_candidate
 from sim.unit import Unit
@@ -51,11 +52,13 @@ class Hunt:
         executor: Executor | None,
         progress: Callable[[float], None] | None,
         noise_v: float | None = None,
+        purse: Purse | None = None,
     ) -> None:
         heard = observation if noise_v is None else observation.with_noise(noise_v)
         self.unit, self.observation, self._rng = unit, heard, rng
         self._noises = possible_noises(observation)
         self._executor, self._progress, self._left = executor, progress, 1.0
+        self.purse = Purse() if purse is None else purse
         self._runs: dict[Effects, Population] = {}
         self.found: dict[Effects, Candidate] = {}
 

@@ -5,6 +5,7 @@ import pytest
 import synthetic
 
 import analysis.diagnosis as diagnosis_module
+from analysis.search import Searched
 from daq.frf import FrequencyResponse
 from sim.unit import load_unit
 
@@ -62,14 +63,18 @@ def response(**words: object) -> FrequencyResponse:
 
 
 def diagnosis(
-    monkeypatch: pytest.MonkeyPatch, hidden: tuple[str, ...], judged: list[tuple[str, ...]]
+    monkeypatch: pytest.MonkeyPatch,
+    hidden: tuple[str, ...],
+    judged: list[tuple[str, ...]],
+    given_up: bool = False,
 ):
     """A real diagnosis of a synthetic world in which some effects are hidden."""
     rng = np.random.default_rng(3)
     place = np.array([0.5, *([0.6] if hidden else [])])
     seen = synthetic.observation(synthetic.read(hidden, place, rng))
     candidates = [synthetic.candidate(seen, effects) for effects in [(), *judged]]
+    searched = Searched(candidates, given_up)
     monkeypatch.setattr(diagnosis_module, "observe", lambda response: seen)
-    monkeypatch.setattr(diagnosis_module, "search_causes", lambda *_, **__: candidates)
+    monkeypatch.setattr(diagnosis_module, "search_causes", lambda *_, **__: searched)
     monkeypatch.setattr(diagnosis_module, "propose_measurement", lambda *_, **__: None)
     return diagnosis_module.diagnose_response(response(), load_unit("adss"))

@@ -88,8 +88,14 @@ def diagnosed(effects, sizes, seed, without=FELT, **given):
     """
     rng = np.random.default_rng(seed)
     seen = observed(effects, sizes, rng)
-    found = search.search_causes(ADSS, seen, without=without, seed=seed, **given)
+    found = search.search_causes(ADSS, seen, without=without, seed=seed, **given).candidates
     return found, judge_candidates(found, found[0].surface.observation, rng)
+
+
+def searched(effects, sizes, seed):
+    """What a search for hidden effects came to, whatever it says of them."""
+    seen = observed(effects, sizes, np.random.default_rng(seed))
+    return search.search_causes(ADSS, seen, without=FELT, seed=seed)
 
 
 def hunted(sizes, seed):

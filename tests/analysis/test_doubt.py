@@ -5,6 +5,8 @@ from types import SimpleNamespace
 import pytest
 
 from analysis import doubt
+from analysis.purse import Purse
+from sim.effort import Effort, counting, spend
 
 
 @pytest.mark.parametrize(
@@ -57,3 +59,34 @@ def test_a_doubted_leader_far_ahead_gets_more_runs_before_pairs_are_looked_at(
     assert doubt.is_doubtful_still(fine, None) is still
     assert more == [[leader]] * settled
     assert not doubts
+
+
+@pytest.mark.parametrize(
+    ("misfit", "structure", "missed", "hopeless"),
+    [(4.1, 0.0, 1.0, True), (0.0, 4.1, 1.0, True), (0.0, 0.0, 2.1, True), (3.9, 3.9, 1.9, False)],
+)
+def test_a_leader_that_may_explain_is_looked_at_whatever_was_spent(
+    monkeypatch, misfit, structure, missed, hopeless
+):
+    fitted = SimpleNamespace(sigma=misfit, structure=structure)
+    monkeypatch.setattr(doubt, "judge_adequacy", lambda *_: fitted)
+    monkeypatch.setattr(doubt, "hold_out", lambda *_: SimpleNamespace(rms_sigma=missed))
+    best = SimpleNamespace(surface=SimpleNamespace(observation=None))
+    effort = Effort()
+    fine = SimpleNamespace(best=best, purse=Purse.for_rows(183, effort))
+    effort.add(fine.purse.allowed_s)
+    assert not doubt.is_given_up(fine, None)
+    effort.add(1.0)
+    assert doubt.is_given_up(fine, None) is hopeless
+
+
+def test_a_purse_grows_with_what_was_measured_and_holds_what_comes_after_it():
+    with counting() as effort:
+        spend(5e5)
+        small, large = Purse.for_rows(61, effort), Purse.for_rows(183, effort)
+        assert large.allowed_s - 5e5 == pytest.approx(3.0 * (small.allowed_s - 5e5))
+        assert not small.is_spent
+        spend(small.allowed_s - 5e5 + 1.0)
+        assert small.is_spent
+        assert not large.is_spent
+    assert not Purse().is_spent

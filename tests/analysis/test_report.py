@@ -141,6 +141,15 @@ def test_the_diagnosis_has_its_causes_gain_and_pictures(report, explained):
     assert f"    To make sure: {cause['check']}.\n" in told
 
 
+@pytest.mark.parametrize("given_up", [False, True])
+def test_a_diagnosis_says_that_the_search_was_left(monkeypatch, given_up):
+    hidden, judged = ("load-inertia",), [("shaft-stiffness",)]
+    found = makings.diagnosis(monkeypatch, hidden, judged, given_up)
+    said = [text for text in found.to_json()["warnings"] if "the search was left" in text]
+    assert len(said) == given_up
+    assert all(any(text in line for line in found.summary()) for text in said)
+
+
 @pytest.mark.parametrize(
     ("hidden", "judged", "verdict", "said"),
     [

@@ -7,10 +7,12 @@ import pytest
 import synthetic
 import synthetic_search
 
-from analysis import search
+from analysis import contest, hunt, search
 from analysis.executor import LocalExecutor
 from analysis.observation import USUAL_NOISE_V
+from analysis.purse import Purse
 from sim.catalogue import CATALOGUE
+from sim.effort import spend
 
 ADSS = synthetic.ADSS
 
@@ -38,6 +40,42 @@ def test_three_causes_are_found_together(runs, seed):
 
 
 @pytest.mark.parametrize("seed", [1, 2])
+def test_a_search_that_has_spent_all_is_left_with_a_leader_that_explains_nothing(
+    runs, monkeypatch, seed
+):
+    """Three causes, two of which explain too little: the third is looked for no more.
+
+    What the first look takes counts: here it takes all.
+    """
+    simulate = hunt.simulate_groups
+
+    def spending(*given):
+        if not runs:
+            spend(1e9)
+        return simulate(*given)
+
+    monkeypatch.setattr(hunt, "simulate_groups", spending)
+    three = ("amplifier-lag", "load-inertia", "mesh1-damping")
+    found = synthetic_search.searched(three, [0.8, 0.3, 0.7], seed)
+    assert found.given_up
+    assert len(found.candidates[0].hypothesis.effects) == 2
+    assert max(map(len, runs)) == 2
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_search_that_has_spent_all_goes_on_with_a_leader_that_explains(runs, monkeypatch, seed):
+    whole = synthetic_search.searched(("load-inertia",), [0.8], seed)
+    made = dict(runs)
+    runs.clear()
+    monkeypatch.setattr(Purse, "is_spent", True)
+    found = synthetic_search.searched(("load-inertia",), [0.8], seed)
+    assert not whole.given_up
+    assert not found.given_up
+    assert found.candidates[0].hypothesis.effects == ("load-inertia",)
+    assert dict(runs) == made
+
+
+@pytest.mark.parametrize("seed", [1, 2])
 def test_a_second_cause_is_found_behind_one_that_nobody_doubts(runs, monkeypatch, seed):
     monkeypatch.setattr(search, "is_doubtful", lambda candidate, *_: candidate.hypothesis.d == 1)
     pair = ("amplifier-lag", "load-inertia")
@@ -61,7 +99,7 @@ def test_a_part_that_was_looked_at_elsewhere_is_weighed_where_the_pair_has_it(ru
     looking.settle([pair], 4)
     assert looking.best.hypothesis.effects == pair
     behind = looking.best.best.log_likelihood - looking.found[part].best.log_likelihood
-    search._weigh_parts(looking)
+    contest.weigh_parts(looking)
     assert len(looking.found[part].population) >= len(looking.found[pair].population)
     assert looking.found[part].best.place == pytest.approx([0.4, 0.8], abs=0.1)
     left = looking.found[pair].best.log_likelihood - looking.found[part].best.log_likelihood
@@ -73,11 +111,11 @@ def test_nothing_more_is_simulated_where_no_pair_leads_or_its_parts_have_runs_en
     looking = synthetic_search.hunted([0.8], 1)
     looking.start({part: np.array([0.4, 0.8]) for part in parts}, 8)
     runs.clear()
-    search._weigh_parts(looking)
+    contest.weigh_parts(looking)
     assert not runs
     looking.start({pair: np.array([0.4, 0.0, 0.8])}, 2)
     runs.clear()
-    search._weigh_parts(looking)
+    contest.weigh_parts(looking)
     assert not runs
 
 
@@ -111,7 +149,7 @@ def test_what_is_left_out_of_the_catalogue_is_not_looked_at(runs, monkeypatch):
 def test_every_candidate_is_held_against_the_same_noise(runs):
     observed = synthetic_search.observed(("load-inertia",), [0.8], np.random.default_rng(6))
     loud = replace(observed.with_noise(4.0 * USUAL_NOISE_V), loudest_v=4.0 * USUAL_NOISE_V)
-    found = search.search_causes(ADSS, loud, seed=6)
+    found = search.search_causes(ADSS, loud, seed=6).candidates
     heard = {one.surface.observation.noise_v for one in found}
     assert len(heard) == 1
     assert USUAL_NOISE_V <= heard.pop() <= 4.0 * USUAL_NOISE_V

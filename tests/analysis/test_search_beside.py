@@ -105,7 +105,7 @@ def test_a_payload_is_held_against_two_causes_at_the_load_that_it_may_stand_for(
         unit=ADSS, observation=SimpleNamespace(frequency_hz=None), found=found, among=list
     )
     fine = Beside(found[key])
-    monkeypatch.setattr(search, "_compare", lambda *_: taken.extend(fine.found))
+    monkeypatch.setattr(search, "compare", lambda *_: taken.extend(fine.found))
     felt = {pair: Place(None, 100.0 - behind)}
     monkeypatch.setattr(search, "screen_singles", lambda *_: {key: Place(None, 100.0)})
     monkeypatch.setattr(search, "add_causes", lambda *_: SimpleNamespace(felt=felt))
@@ -153,7 +153,7 @@ def test_all_are_compared_anew_where_a_pair_takes_the_lead_behind_a_cause(
     monkeypatch.setattr(search, "screen_pairs", lambda *_: {pair: Place(None, 100.0)})
     monkeypatch.setattr(search, "_narrow", lambda *_: [pair])
     monkeypatch.setattr(search, "hold_out", lambda *_: SimpleNamespace(rms_sigma=missed))
-    monkeypatch.setattr(search, "_compare", lambda *_: compared.append(fine.best))
+    monkeypatch.setattr(search, "compare", lambda *_: compared.append(fine.best))
     search._look_beside(rough, fine, {leader: None}, None)
     assert compared == ([found[pair]] if compared_anew else [])
     assert (pair in fine.found) == stays

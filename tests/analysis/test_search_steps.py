@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import synthetic
 
-from analysis import search
+from analysis import contest, search
 from analysis.causes import Hypothesis
+from analysis.purse import Purse
 
 ADSS = synthetic.ADSS
 
@@ -94,7 +95,7 @@ def test_a_part_with_no_more_runs_than_a_pair_is_weighed_where_the_pair_has_it(
         settle=lambda chosen, groups: started.append(chosen),
         hear=lambda: None,
     )
-    search._weigh_parts(fine)
+    contest.weigh_parts(fine)
     assert len(started) == (2 if weighed else 0)
     if weighed:
         assert list(started[0]) == [part]
@@ -135,7 +136,7 @@ def test_two_of_three_causes_are_weighed_where_the_three_lead(monkeypatch):
     monkeypatch.setattr(
         search, "screen_further", lambda *_: {three.effects: standing(three.effects, 1.0).best}
     )
-    monkeypatch.setattr(search, "_compare", lambda *_: True)
+    monkeypatch.setattr(search, "compare", lambda *_: True)
     search._search_triples(rough, fine, {}, None)
     assert looked == [{pair, ("amplifier-lag", third), ("load-inertia", third)}]
 
@@ -171,8 +172,8 @@ def test_a_leader_that_predicts_badly_gets_more_runs(monkeypatch, causes, missed
         settle=lambda chosen, groups: settled.append(chosen),
         hear=lambda: None,
     )
-    monkeypatch.setattr(search, "hold_out", lambda *_: SimpleNamespace(rms_sigma=next(left)))
-    search._see_it_predict(fine)
+    monkeypatch.setattr(contest, "hold_out", lambda *_: SimpleNamespace(rms_sigma=next(left)))
+    contest.see_it_predict(fine)
     assert settled == [[leader]] * rounds
 
 
@@ -184,12 +185,12 @@ def test_a_pair_is_compared_with_its_parts_in_every_round(monkeypatch, gap, roun
     def leading(most, behind):
         return [key for key in list(standing)[:most] if standing[key] >= 300.0 - behind]
 
-    fine = SimpleNamespace(found=standing, leading=leading, hear=lambda: None)
-    monkeypatch.setattr(search, "is_nothing_missing", lambda *_: False)
-    monkeypatch.setattr(search, "is_pressed", lambda _: False)
-    monkeypatch.setattr(search, "is_felt_alike", lambda *_: False)
-    monkeypatch.setattr(search, "_settle", lambda _, chosen: settled.append(chosen))
-    assert search._compare(fine, None)
+    fine = SimpleNamespace(found=standing, leading=leading, hear=lambda: None, purse=Purse())
+    monkeypatch.setattr(contest, "is_nothing_missing", lambda *_: False)
+    monkeypatch.setattr(contest, "is_pressed", lambda _: False)
+    monkeypatch.setattr(contest, "is_felt_alike", lambda *_: False)
+    monkeypatch.setattr(contest, "settle", lambda _, chosen: settled.append(chosen))
+    assert contest.compare(fine, None)
     assert settled == ([[pair, part]] if gap < 200.0 else [[pair]]) * rounds
 
 
@@ -204,12 +205,14 @@ def test_who_is_no_rival_is_left_aside_after_two_rounds(monkeypatch, pressed, al
     """Who wants a size that no bench has, unless all do, or says the same as the leader."""
     leader, near, settled = ("load-inertia",), ("payload-flexibility",), []
     found = {leader: "leader", near: "near"}
-    fine = SimpleNamespace(found=found, leading=lambda *_: list(found), hear=lambda: None)
-    monkeypatch.setattr(search, "is_nothing_missing", lambda *_: False)
-    monkeypatch.setattr(search, "is_pressed", lambda candidate: candidate in pressed)
-    monkeypatch.setattr(search, "is_felt_alike", lambda one, simpler: simpler == alike)
-    monkeypatch.setattr(search, "_settle", lambda _, chosen: settled.append(chosen))
-    assert search._compare(fine, None)
+    fine = SimpleNamespace(
+        found=found, leading=lambda *_: list(found), hear=lambda: None, purse=Purse()
+    )
+    monkeypatch.setattr(contest, "is_nothing_missing", lambda *_: False)
+    monkeypatch.setattr(contest, "is_pressed", lambda candidate: candidate in pressed)
+    monkeypatch.setattr(contest, "is_felt_alike", lambda one, simpler: simpler == alike)
+    monkeypatch.setattr(contest, "settle", lambda _, chosen: settled.append(chosen))
+    assert contest.compare(fine, None)
     assert settled == [[leader, near]] * rounds
 
 
@@ -241,7 +244,7 @@ def test_a_newcomer_that_is_close_gets_as_many_runs_as_the_leader(of_leader, beh
             for key in chosen:
                 runs[key] += 40
 
-    search._catch_up(Fine(), [pair], leader)
+    contest.catch_up(Fine(), [pair], leader)
     assert settled == [[pair]] * rounds
     assert runs == {leader: of_leader, pair: left, other: 40}
 
@@ -253,8 +256,8 @@ def test_who_has_runs_enough_gets_no_more_to_be_compared_by():
         enough: SimpleNamespace(population=range(320)),
     }
     fine = SimpleNamespace(found=found, settle=lambda chosen, groups: settled.append(chosen))
-    search._settle(fine, [few, enough])
-    search._settle(fine, [enough])
+    contest.settle(fine, [few, enough])
+    contest.settle(fine, [enough])
     assert settled == [[few]]
 
 
@@ -292,9 +295,9 @@ def test_a_leader_that_may_leave_structure_gets_more_runs_with_who_is_close(
         hear=lambda: more.append("hear"),
     )
     monkeypatch.setattr(
-        search, "judge_adequacy", lambda *_: SimpleNamespace(structure=structures.pop(0))
+        contest, "judge_adequacy", lambda *_: SimpleNamespace(structure=structures.pop(0))
     )
-    search._settle_doubt(fine, None)
+    contest.settle_doubt(fine, None)
     few = [leader, close]
     assert more == [("along", few, 2), ("settle", few, 2), "hear"] * rounds
     assert not structures

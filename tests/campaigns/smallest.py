@@ -102,7 +102,8 @@ def is_named(effect: str, setting: EffectSetting, rng: np.random.Generator) -> b
     machine, ratio = off_datasheet(UNIT, rng), float(rng.uniform(0.05, 0.95))
     seed = int(rng.integers(2**31))
     swept = simulate(machine, ratio, PLAN, effects=(setting,), seed=seed)
-    candidates = search_causes(UNIT, observe(reading(swept, rng)), cache=CACHE, seed=seed)
+    seen = observe(reading(swept, rng))
+    candidates = search_causes(UNIT, seen, cache=CACHE, seed=seed).candidates
     verdict = judge_candidates(candidates, candidates[0].surface.observation, rng)
     return verdict.word in ("explained", "ambiguous") and verdict.best.effects == (effect,)
 

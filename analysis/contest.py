@@ -1,0 +1,180 @@
+"""The contest on all rows: more runs for whoever leads a search, and who is close to it.
+
+Owns when a comparison is fair and when a leader has runs enough to be judged:
+few runs rank by chance, predict badly and leave a shape of their own.
+It tries no hypothesis that the search did not bring, and passes no verdict.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from analysis.adequacy import judge_adequacy
+from analysis.candidate import Candidate, Effects
+from analysis.doubt import is_given_up, is_nothing_missing
+from analysis.holdout import hold_out
+from analysis.hunt import Hunt
+from analysis.likeness import is_felt_alike
+from analysis.parts import parts_of, places_of_parts
+from analysis.plausibility import is_pressed
+
+__all__ = [
+    "CLOSE",
+    "HOPELESS",
+    "LAST_GROUPS",
+    "TOO_FAR",
+    "catch_up",
+    "compare",
+    "give_chances",
+    "see_it_predict",
+    "settle",
+    "settle_doubt",
+    "weigh_parts",
+]
+
+_NEAR, CLOSE = 120.0, 30.0
+_LAST_ROUNDS, LAST_GROUPS = ((4, _NEAR), (3, 60.0), (3, CLOSE), (3, CLOSE)), 4
+"""Rounds in which the leader and those as close behind it as that log-likelihood are looked at
+once more: at most so many, the parts of a leading pair and the baseline, in so many groups each.
+Where none is close all but the first are spared.
+"""
+
+_IN_EARNEST = 2
+"""Rounds after which it is believed that a set wants a size which no bench has; fewer runs may
+only seem to say so."""
+
+_ENOUGH = 320
+"""Runs of a hypothesis from which on it gets no more to be compared by."""
+
+_CHANCES = 4
+"""Hypotheses that are looked at once more where none fits yet."""
+
+TOO_FAR, HOPELESS = 200.0, 300.0
+"""Log-likelihood behind the leader from which the second and the third round leave one out, and the
+last ones its parts, and from which there is no second chance."""
+
+_PREDICTED, _NOT_PREDICTED, _MORE_ROUNDS, _ROUNDS_ALONE = (1.3, 1.0), 2.5, 3, 7
+"""What a leader of one cause, or of several, misses of levels not fitted, in standard deviations,
+from which it gets more runs (several are refused for less, `analysis.verdict`) and up to which
+that may help; how many times, and how many where it leaves all others far behind: a pair with four
+parameters took six rounds to be seen as the truth that it was."""
+
+_OPEN, _ROUNDS_OPEN = (1.0, 8.0), 4
+"""Structure between which a leader gets more runs, and how many times. What the runs of a true
+cause leave beside a sharp resonance goes with more of them, what a false one leaves stays or grows:
+an amplifier's gain that was withheld left 1.9 as a motor's constant in 80 runs, in 240 2.0 to 4.1.
+Of 28 true ones two left more than the first; what leaves more than the second is settled."""
+
+
+def compare(fine: Hunt, rng: np.random.Generator) -> bool:
+    """Give whoever is compared with the leader as many runs: more runs fit better.
+
+    Returns whether something is missing from the plain model.
+    """
+    missing = True
+    for done, (most, behind) in enumerate(_LAST_ROUNDS):
+        missing = not is_nothing_missing(fine, rng)
+        if not missing:
+            break
+        leader, *near = fine.leading(most, behind)
+        # The parts of a pair count in every round, even where others lie before them: with few runs
+        # a true cause of several parameters has been beaten by itself and another.
+        parts = set(parts_of(leader, fine.found))
+        near += sorted(parts & set(fine.leading(len(fine.found), TOO_FAR)))
+        if done >= _IN_EARNEST:
+            # Who wants a size that no bench has is no explanation, however well it fits.
+            plausible = [key for key in [leader, *near] if not is_pressed(fine.found[key])]
+            leader, *near = plausible or [leader, *near]
+            # Nor is it a question who leads of two that say the same.
+            near = [key for key in near if not _say_the_same(fine.found[leader], fine.found[key])]
+        if done and not near or is_given_up(fine, rng):
+            break
+        near += [key for key in fine.leading(len(fine.found), behind) if not key]
+        settle(fine, list(dict.fromkeys([leader, *near])))
+    fine.hear()
+    return missing
+
+
+def catch_up(fine: Hunt, newcomers: Collection[Effects], leader: Effects) -> None:
+    """Give those that come close to a leader as many runs as it has, while they stay close.
+
+    All others were compared with it before.
+    """
+    enough = min(len(fine.found[leader].population), _ENOUGH)
+    near = set(newcomers)
+    while near := near & set(fine.leading(len(fine.found), CLOSE)):
+        near = {key for key in near if len(fine.found[key].population) < enough}
+        settle(fine, sorted(near))
+
+
+def settle(fine: Hunt, chosen: Sequence[Effects]) -> None:
+    """Give those of some hypotheses that have few runs more of them."""
+    few = [key for key in chosen if len(fine.found[key].population) < _ENOUGH]
+    if few:
+        fine.settle(few, LAST_GROUPS)
+
+
+def give_chances(fine: Hunt) -> None:
+    """Give those that lead more runs where none fits yet.
+
+    Parameters trade off in ways that evenly placed runs miss.
+    """
+    leading = [key for key in fine.leading(len(fine.found), HOPELESS) if key]
+    settle(fine, leading[:_CHANCES])
+
+
+def see_it_predict(fine: Hunt) -> None:
+    """Give a leader, and who is close to it, more runs where it predicts badly: few runs do."""
+    for done in range(_ROUNDS_ALONE):
+        missed = hold_out(fine.best, fine.observation).rms_sigma
+        causes = len(fine.best.hypothesis.effects)
+        if not causes or not _PREDICTED[causes > 1] < missed < _NOT_PREDICTED:
+            break
+        if len(fine.leading(2, TOO_FAR)) == 1:
+            fine.settle([fine.best.hypothesis.effects], LAST_GROUPS)
+        elif done < _MORE_ROUNDS:
+            settle(fine, [key for key in fine.leading(_CHANCES, CLOSE) if key])
+        else:
+            break
+        fine.hear()
+
+
+def settle_doubt(fine: Hunt, rng: np.random.Generator) -> None:
+    """Give a leader that may or may not leave structure more runs, and who is close to it."""
+    least, most = _OPEN
+    for _ in range(_ROUNDS_OPEN):
+        leader, *near = fine.leading(_CHANCES, CLOSE)
+        few = [k for k in (leader, *near) if len(fine.found[k].population) < _ENOUGH]
+        if leader not in few or not least < judge_adequacy(fine.best, rng).structure < most:
+            break
+        # Half where they agree, half about what is learned: either alone stays where its runs are.
+        fine.look_closer(few, LAST_GROUPS // 2)
+        fine.settle(few, LAST_GROUPS // 2)
+        fine.hear()
+
+
+def weigh_parts(fine: Hunt) -> None:
+    """See what the causes of a leading pair do alone where it has them, with runs enough.
+
+    A resonance that had been looked at elsewhere lay 300 behind itself and a brake it has not, and
+    friction that another sort of friction stood for was not looked at alone at all.
+    """
+    leader = fine.best
+    if len(leader.hypothesis.effects) < 2:
+        return
+    places = {
+        part: place
+        for part, place in places_of_parts(leader).items()
+        if part not in fine.found or len(fine.found[part].population) <= len(leader.population)
+    }
+    if places:
+        fine.start(places, LAST_GROUPS)
+        hopeful = fine.leading(len(fine.found), HOPELESS)
+        fine.settle([key for key in hopeful if key in places], LAST_GROUPS)
+        fine.hear()
+
+
+def _say_the_same(one: Candidate, other: Candidate) -> bool:
+    return is_felt_alike(one, other) or is_felt_alike(other, one)
