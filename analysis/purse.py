@@ -9,13 +9,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from analysis.observation import Observation
 from sim.effort import Effort
 
 __all__ = ["Purse"]
 
-_PER_ROW_S = 1600.0
-"""Seconds of motion per row of a measurement. For three levels of 61 points these are 290,000 s,
-three and a half minutes of one core; of 16 pairs that were hidden one took more before it led."""
+_SWEEPS, _LEAST_S = 1900, 290_000.0
+"""Machines that may be taken through a sweep, and what any measurement may take: about as much as
+the usual sweep of an EDSS, three levels of 61 points, or three and a half minutes of one core. What
+has few rows is looked at on all of them from the beginning, and needs no fewer machines. A load
+with a payload, hidden there, took 326,000 s in all, and led from 222,000 on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,9 +29,10 @@ class Purse:
     allowed_s: float = math.inf
 
     @classmethod
-    def for_rows(cls, rows: int, effort: Effort) -> Purse:
-        """The purse of a measurement with so many rows, out of what `effort` will count."""
-        return cls(effort, effort.simulated_s + _PER_ROW_S * rows)
+    def for_observation(cls, observation: Observation, effort: Effort) -> Purse:
+        """The purse of a measurement, out of what `effort` counts from now on."""
+        sweep_s = sum(plan.duration_s for plan, _ in observation.plans)
+        return cls(effort, effort.simulated_s + max(_SWEEPS * sweep_s, _LEAST_S))
 
     @property
     def is_spent(self) -> bool:

@@ -132,7 +132,7 @@ def search_causes(
     rng = np.random.default_rng(seed)
     # What an atlas takes is simulated once for a plan, and is not held against a measurement.
     with counting() as effort:
-        purse = Purse.for_rows(len(observation), effort)
+        purse = Purse.for_observation(observation, effort)
         rough = Hunt(unit, coarse, rng, executor, part_of(progress, 0.4, 0.6, "narrowing down"))
         doubted = _look_at_few(rough, atlas, rng)
         fine = Hunt(

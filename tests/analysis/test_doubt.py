@@ -73,20 +73,26 @@ def test_a_leader_that_may_explain_is_looked_at_whatever_was_spent(
     monkeypatch.setattr(doubt, "hold_out", lambda *_: SimpleNamespace(rms_sigma=missed))
     best = SimpleNamespace(surface=SimpleNamespace(observation=None))
     effort = Effort()
-    fine = SimpleNamespace(best=best, purse=Purse.for_rows(183, effort))
+    fine = SimpleNamespace(best=best, purse=Purse.for_observation(swept(1.0), effort))
     effort.add(fine.purse.allowed_s)
     assert not doubt.is_given_up(fine, None)
     effort.add(1.0)
     assert doubt.is_given_up(fine, None) is hopeless
 
 
-def test_a_purse_grows_with_what_was_measured_and_holds_what_comes_after_it():
+def swept(duration_s):
+    """An observation of two levels that take so long together."""
+    plans = [(SimpleNamespace(duration_s=share * duration_s), None) for share in (0.25, 0.75)]
+    return SimpleNamespace(plans=plans)
+
+
+def test_a_purse_grows_with_the_sweep_and_holds_what_comes_after_it():
     with counting() as effort:
         spend(5e5)
-        small, large = Purse.for_rows(61, effort), Purse.for_rows(183, effort)
-        assert large.allowed_s - 5e5 == pytest.approx(3.0 * (small.allowed_s - 5e5))
-        assert not small.is_spent
-        spend(small.allowed_s - 5e5 + 1.0)
-        assert small.is_spent
-        assert not large.is_spent
+        quick, usual, slow = (Purse.for_observation(swept(s), effort) for s in (1.0, 70.0, 700.0))
+        assert quick.allowed_s == usual.allowed_s > 5e5 + 1900 * 70.0
+        assert slow.allowed_s == pytest.approx(5e5 + 1900 * 700.0)
+        spend(usual.allowed_s - 5e5 + 1.0)
+        assert usual.is_spent
+        assert not slow.is_spent
     assert not Purse().is_spent
