@@ -37,7 +37,7 @@ _CLOSER_LOOKS = 2
 _TOO_FAR, _GROUPS = 200.0, 4
 """Log-likelihood by which it is far ahead, and in how many groups of runs each of these is."""
 
-_HOPELESS = 4.0
+_REFUSED = 4.0
 """Misfit or structure of a leader that is refused (`analysis.verdict`), not only doubted."""
 
 _COMMON = 0.2
@@ -96,4 +96,4 @@ def is_given_up(fine: Hunt, rng: np.random.Generator) -> bool:
 
     One that may be is looked at for as long as it takes: it might be named.
     """
-    return fine.purse.is_spent and is_doubtful(fine.best, rng, unlike=_HOPELESS)
+    return fine.purse.is_spent and is_doubtful(fine.best, rng, unlike=_REFUSED)

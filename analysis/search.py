@@ -144,19 +144,25 @@ def search_causes(
             rough.observation.noise_v,
             purse,
         )
-        if _look_at_all(rough, fine, atlas, rng, doubted) and not is_given_up(fine, rng):
-            see_it_predict(fine)
-            weigh_parts(fine)
-            pair = len(fine.best.hypothesis.effects) == 2
-            if pair and is_doubtful(fine.best, rng, _LEAST_SURE) and not is_given_up(fine, rng):
-                _search_triples(rough, fine, atlas, rng)
-                see_it_predict(fine)
-            settle_doubt(fine, rng)
-            if not is_given_up(fine, rng):
+        given_up = False
+        if _look_at_all(rough, fine, atlas, rng, doubted):
+
+            def hold_rare() -> None:
                 rare = make_atlas(unit, coarse, cache, executor, fine.report(), rare=True)
                 _hold_rare(rough, fine, _without(without, rare), rng)
-        candidates = sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
-        return Searched(candidates, is_given_up(fine, rng))
+
+            for step in (
+                lambda: see_it_predict(fine),
+                lambda: weigh_parts(fine),
+                lambda: _look_for_third(rough, fine, atlas, rng),
+                lambda: settle_doubt(fine, rng),
+                hold_rare,
+            ):
+                given_up = is_given_up(fine, rng)
+                if given_up:
+                    break
+                step()
+    return Searched(sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood), given_up)
 
 
 def _without(effects: Collection[str], atlas: Atlas) -> Atlas:
@@ -232,6 +238,13 @@ def _look_beside(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator
             fine.leave_out([k for k, lead in beside.items() if 0.0 < lead < _CALLED_FOR])
         if fine.best.hypothesis.effects != leader:
             compare(fine, rng)
+
+
+def _look_for_third(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator) -> None:
+    """Look for a third cause where a pair leads that is doubted."""
+    if len(fine.best.hypothesis.effects) == 2 and is_doubtful(fine.best, rng, _LEAST_SURE):
+        _search_triples(rough, fine, atlas, rng)
+        see_it_predict(fine)
 
 
 def _search_triples(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator) -> None:
