@@ -261,7 +261,7 @@ def test_a_second_cause_is_not_named_where_one_does(seed):
         (TRUE + WRONG, 1.6, 1.0, False), (THREE, 0.9, 0.0, True), (THREE, 1.1, 1.0, False),
     ],
 )  # fmt: skip
-def test_what_misses_other_levels_must_have_own_runs_that_do(
+def test_what_misses_other_levels_or_fits_worse_must_have_own_runs_that_do(
     effects, missed, share, adequate, monkeypatch
 ):
     monkeypatch.setattr(rules, "misses_alike", lambda one, held, least, rng: share > least)
@@ -272,7 +272,10 @@ def test_what_misses_other_levels_must_have_own_runs_that_do(
     held_out = SimpleNamespace(rms_sigma=missed)
     against = "" if adequate else "does not predict the other levels"
     assert rules._find_objection(candidate, held_out, FITS, rng) == against
-    unlike = rules._find_objection(candidate, held_out, replace(FITS, sigma=4.1), rng)
+    limit = 2.0 if effects == THREE else 3.0
+    alike = rules._find_objection(candidate, held_out, replace(FITS, sigma=limit - 0.1), rng)
+    assert alike == against
+    unlike = rules._find_objection(candidate, held_out, replace(FITS, sigma=limit + 0.1), rng)
     assert unlike == "does not look like its own runs"
     shaped = rules._find_objection(candidate, held_out, replace(FITS, structure=2.6), rng)
     assert shaped == "leaves structure that its own runs do not"
