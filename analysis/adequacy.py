@@ -49,7 +49,7 @@ def judge_adequacy(candidate: Candidate, rng: np.random.Generator) -> Adequacy:
     surface, best = candidate.surface, candidate.best
     own = [fit.log_likelihood for fit in fits]
     sigma = _worse([best.log_likelihood, *own])
-    lowest, *others = surface.observation.blocks
+    lowest, *others = surface.observation.levels
     if others:
         above = [np.sum(fit.density[:, lowest.stop :]) for fit in [best, *fits]]
         sigma = credited(sigma, _worse(above))

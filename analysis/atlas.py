@@ -12,8 +12,9 @@ import hashlib
 import json
 import os
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -62,16 +63,35 @@ def make_atlas(
     *,
     rare: bool = False,
 ) -> Atlas:
-    """The atlas of a unit for the plan of a thinned observation.
+    """The atlas of a unit for the plans of a thinned observation.
 
-    Read where it was kept, in `cache` or among those that come with lashbench; else simulated,
-    and kept in `cache`.
+    That of each plan is read where it was kept, in `cache` or among those that come with
+    lashbench; else simulated, and kept in `cache`. All hold the same machines.
 
     Raises
     ------
     AnalysisError
         If a motion grew without bound.
     """
+    parts = list(coarse.by_plan())
+    made, rows = [], []
+    for number, (part, theirs) in enumerate(parts):
+        tell = _part_of(progress, number, len(parts))
+        made.append(_find_or_make(unit, part, cache, executor, tell, rare))
+        rows.append(theirs)
+    # Where each row of the observation stands among those of all plans, one after the other.
+    places = np.argsort(np.concatenate(rows))
+    return {key: _side_by_side([atlas[key] for atlas in made], places) for key in made[0]}
+
+
+def _find_or_make(
+    unit: Unit,
+    coarse: Observation,
+    cache: Path | None,
+    executor: Executor | None,
+    progress: Callable[[float], None] | None,
+    rare: bool,
+) -> Atlas:
     name = atlas_name(unit, coarse, rare)
     for folder in (cache, atlas_folder()):
         if folder is not None and (known := _read(folder / name)) is not None:
@@ -80,6 +100,23 @@ def make_atlas(
     if cache is not None:
         write_atlas(cache / name, atlas)
     return atlas
+
+
+def _part_of(
+    progress: Callable[[float], None] | None, number: int, count: int
+) -> Callable[[float], None] | None:
+    if progress is None:
+        return None
+    return lambda share: progress((number + share) / count)
+
+
+def _side_by_side(parts: Sequence[Population], places: NDArray[np.int64]) -> Population:
+    """Runs of the same machines through several plans, as rows in the order of places."""
+    return replace(
+        parts[0],
+        mean=np.concatenate([part.mean for part in parts], axis=1)[:, places],
+        variance=np.concatenate([part.variance for part in parts], axis=1)[:, places],
+    )
 
 
 def simulate_atlas(

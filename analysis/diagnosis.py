@@ -9,7 +9,7 @@ elsewhere; this module puts them together and words them.
 from __future__ import annotations
 
 import time
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ from analysis.search import search_causes
 from analysis.sharpening import sharpen_candidate
 from analysis.sizing import size_candidate
 from analysis.verdict import Judged, Verdict, judge_candidates
-from daq.errors import AnalysisError
+from daq.errors import AnalysisError, InputError
 from daq.frf import FrequencyResponse
 from sim.catalogue import CATALOGUE
 from sim.effort import counting
@@ -189,6 +189,7 @@ class Diagnosis:
                 f"({proposal.expected_sigma:.1f} sigma expected):"
             )
             lines.append(f"    {proposal.command}")
+            lines.append("    and then diagnose the files of both measurements together")
         lines.append(f"  motion simulated for this: {self.simulated_s:.0f} s")
         lines += [f"  warning: {text}" for text in self.warnings]
         return lines
@@ -201,18 +202,21 @@ def diagnose_response(
     response: FrequencyResponse,
     unit: Unit,
     *,
+    further: Sequence[FrequencyResponse] = (),
     without: Collection[str] = (),
     cache: Path | None = None,
     seed: int = 0,
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Diagnosis:
-    """Diagnose a measured response.
+    """Diagnose a measured response, or several of one unit together.
 
     Parameters
     ----------
     response
         Measured, one level or more; phase and errors may be missing.
+    further
+        Other sweeps of the same unit, such as the one that a first diagnosis proposed.
     unit
         The unit under test, as its datasheet says.
     without
@@ -229,8 +233,12 @@ def diagnose_response(
     Raises
     ------
     AnalysisError
-        If no usable point is left, a motion grew without bound, or the unit has one stage.
+        If a response has no usable point, a motion grew without bound, or the unit has one stage.
+    InputError
+        If the responses are said to be of different units, or of different specimens.
     """
+    responses = (response, *further)
+    _check_same_unit(responses)
     if unit.stages == 1:
         raise AnalysisError(
             f"unit {unit.name} has one gear stage, and the search shares the backlash out between "
@@ -238,10 +246,10 @@ def diagnose_response(
         )
     started = time.perf_counter()
     with counting() as effort:
-        found = _diagnose(observe(response), unit, without, cache, seed, executor, progress)
+        found = _diagnose(observe(*responses), unit, without, cache, seed, executor, progress)
     return replace(
         found,
-        warnings=_warnings(response, found),
+        warnings=_warnings(found),
         elapsed_s=time.perf_counter() - started,
         simulated_s=effort.simulated_s,
     )
@@ -334,7 +342,21 @@ def _proposal(
     )  # fmt: skip
 
 
-def _warnings(response: FrequencyResponse, diagnosis: Diagnosis) -> tuple[str, ...]:
+def _check_same_unit(responses: Sequence[FrequencyResponse]) -> None:
+    """Refuse sweeps of different machines: what differs between them is no cause of either."""
+    for what, said in (
+        ("units", [one.unit for one in responses]),
+        ("specimens", [str(one.provenance.get("serial") or "") for one in responses]),
+    ):
+        different = sorted({one for one in said if one})
+        if len({one.lower() for one in different}) > 1:
+            raise InputError(
+                f"the responses are of different {what}, {' and '.join(different)}; "
+                "diagnose them one by one"
+            )
+
+
+def _warnings(diagnosis: Diagnosis) -> tuple[str, ...]:
     found, observation = [], diagnosis.observation
     if diagnosis.given_up:
         found.append(

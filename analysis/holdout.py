@@ -2,8 +2,8 @@
 
 Owns the split: each source level in turn is kept away from the fit and then
 predicted. Neighbouring frequencies are near-duplicates and are never split;
-only where a response holds a single level are the halves of its band taken
-instead. What the other levels leave open is not fixed at their best fit: every
+where all sweeps are of a single level each sweep takes its turn, and where there is but
+one the halves of its band. What the other levels leave open is not fixed at their best fit: every
 place that they allow predicts, as much as it is believed. It draws no conclusion.
 """
 
@@ -84,8 +84,8 @@ def hold_out_surface(
 
 
 def _folds(observation: Observation) -> list[slice]:
-    blocks = observation.blocks
-    if len(blocks) > 1:
-        return list(blocks)
+    for folds in (observation.levels, observation.blocks):
+        if len(folds) > 1:
+            return list(folds)
     middle = len(observation) // 2
     return [slice(0, middle), slice(middle, len(observation))]

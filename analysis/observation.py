@@ -7,6 +7,7 @@ little damping silences them. It simulates nothing.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -45,15 +46,16 @@ Digits beyond, which a simulated file has, tell no machines apart that a bench c
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observation:
-    """A response as channels, rows ordered by level, then ascending frequency.
+    """A response, or several of one unit, as channels.
+
+    Rows are ordered by level, then sweep, then ascending frequency.
 
     `values` (3, rows): the channels; NaN where the response does not hold one.
     `source_vpk`, `frequency_hz` (rows,). `noise_v`: the reading's own noise
     per component at the input of the analyser, V. `noise` (rows,): the same
     relative to the response. `loudest_v`: what the quietest points show, V; it
     can be no more. `plans`: the sweep that a simulation must take, one for each
-    set of levels that share their frequencies, with their rows. `blocks`: the
-    rows of each level.
+    set of levels that share their frequencies, with their rows.
     """
 
     values: NDArray[np.float64]
@@ -66,10 +68,21 @@ class Observation:
 
     @property
     def blocks(self) -> tuple[slice, ...]:
-        """Rows of each level as slices, in order."""
-        starts = np.flatnonzero(np.diff(self.source_vpk, prepend=np.nan) != 0)
-        ends = [*starts[1:], len(self)]
-        return tuple(slice(int(a), int(b)) for a, b in zip(starts, ends, strict=True))
+        """Rows of each level of each sweep as slices, the lowest level first."""
+        sweep = np.empty(len(self))
+        for number, (_, rows) in enumerate(self.plans):
+            sweep[rows] = number
+        return _stretches(self.source_vpk, sweep)
+
+    @property
+    def levels(self) -> tuple[slice, ...]:
+        """Rows of each level, in whatever sweeps, as slices, the lowest first."""
+        return _stretches(self.source_vpk)
+
+    def by_plan(self) -> Iterator[tuple[Observation, NDArray[np.int64]]]:
+        """What each plan swept, as if it were all, and the rows that it is here."""
+        for _, rows in self.plans:
+            yield self._taking(rows), rows
 
     def sweeps(self) -> list[tuple[dict[str, Any], list[int]]]:
         """Plans and their rows as JSON, by which a sweep is known again.
@@ -95,6 +108,8 @@ class Observation:
         plans = []
         for plan, rows in self.plans:
             left = np.flatnonzero(np.isin(kept, rows))
+            if not len(left):
+                continue
             grid = tuple(np.unique(self.frequency_hz[kept[left]]).tolist())
             plans.append((replace(plan, frequencies_hz=grid), left))
         return replace(
@@ -110,35 +125,24 @@ class Observation:
         return len(self.frequency_hz)
 
 
-def observe(response: FrequencyResponse) -> Observation:
-    """Bring a response into the form in which it is compared.
+def observe(*responses: FrequencyResponse) -> Observation:
+    """Bring a response, or several of one unit, into the form in which they are compared.
 
     Raises
     ------
     AnalysisError
-        If no usable point is left, or a source level is not known.
+        If one holds no usable point, or does not know a source level.
+    InputError
+        If one states a DC offset that is no voltage.
     """
-    if np.any(np.isnan(response.source_vpk)):
-        raise AnalysisError(
-            "the response does not say at which source level it was swept, and a servo with play "
-            "answers differently at each; write the level into it (docs/how-to/foreign-files.md)"
-        )
-    usable = ((response.flags & (PointFlag.SPOILT | PointFlag.OVERLOAD)) == 0) & (
-        np.abs(response.gain) > 0
-    )
-    if not np.any(usable):
-        raise AnalysisError("the response holds no usable point; measure it again")
-    kept = response.take(usable)
-    parts = [kept.at_level(level) for level in kept.levels_vpk]
-    gain = np.concatenate([part.gain for part in parts])
-    known = np.concatenate([part.phase_known for part in parts])
-    level = np.concatenate([part.source_vpk for part in parts])
-    frequency = np.concatenate([part.frequency_hz for part in parts])
-    scatter = np.concatenate([part.gain_std_db for part in parts]) / DB_PER_NEPER
-    scatter = scatter * np.sqrt(2.0 / _components(response))
+    swept = [level for number, one in enumerate(responses) for level in _levels(number, one)]
+    # Levels that are alike keep their order: sweeps stay as they were given.
+    swept.sort(key=lambda one: one.source_vpk)
+    gain = np.concatenate([one.readings.gain for one in swept])
+    known = np.concatenate([one.readings.phase_known for one in swept])
+    level = np.concatenate([one.readings.source_vpk for one in swept])
+    scatter = np.concatenate([one.scatter for one in swept])
     volts = np.abs(gain) * level
-    least = np.sqrt(2.0) * LEAST_NOISE * np.max(volts) / volts
-    scatter = np.where(scatter > 0, np.maximum(scatter, least), scatter)
     noise_v = _reading_noise(scatter * volts)
     log_gain = np.log(gain)
     with np.errstate(divide="ignore"):
@@ -146,11 +150,11 @@ def observe(response: FrequencyResponse) -> Observation:
     return Observation(
         values=np.stack([log_gain.real, np.where(known, log_gain.imag, np.nan), log_scatter]),
         source_vpk=level,
-        frequency_hz=frequency,
+        frequency_hz=np.concatenate([one.readings.frequency_hz for one in swept]),
         noise_v=noise_v,
         noise=noise_v / volts,
         loudest_v=noise_v,
-        plans=_plans(response, level, frequency),
+        plans=_plans(swept),
     )
 
 
@@ -173,6 +177,37 @@ def unread(plan: SweepPlan, noise_v: float) -> Observation:
     )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Level:
+    """One level of the response of a number: its readings, and their relative scatter."""
+
+    number: int
+    source_vpk: float
+    readings: FrequencyResponse
+    scatter: NDArray[np.float64]
+
+
+def _levels(number: int, response: FrequencyResponse) -> Iterator[_Level]:
+    if np.any(np.isnan(response.source_vpk)):
+        raise AnalysisError(
+            "the response does not say at which source level it was swept, and a servo with play "
+            "answers differently at each; write the level into it (docs/how-to/foreign-files.md)"
+        )
+    usable = ((response.flags & (PointFlag.SPOILT | PointFlag.OVERLOAD)) == 0) & (
+        np.abs(response.gain) > 0
+    )
+    if not np.any(usable):
+        raise AnalysisError("the response holds no usable point; measure it again")
+    kept = response.take(usable)
+    least_v = np.sqrt(2.0) * LEAST_NOISE * np.max(np.abs(kept.gain) * kept.source_vpk)
+    for source_vpk in kept.levels_vpk:
+        readings = kept.at_level(source_vpk)
+        scatter = readings.gain_std_db / DB_PER_NEPER * np.sqrt(2.0 / _components(response))
+        least = least_v / (np.abs(readings.gain) * readings.source_vpk)
+        scatter = np.where(scatter > 0, np.maximum(scatter, least), scatter)
+        yield _Level(number, float(source_vpk), readings, scatter)
+
+
 def _components(response: FrequencyResponse) -> int:
     """Over how many components of the reading its stated error counts the scatter.
 
@@ -193,28 +228,37 @@ def _reading_noise(volts: NDArray[np.float64]) -> float:
     return float(np.quantile(known, _QUIET_SHARE) / np.sqrt(2.0))
 
 
-def _plans(
-    response: FrequencyResponse, level: NDArray[np.float64], frequency: NDArray[np.float64]
-) -> tuple[tuple[SweepPlan, NDArray[np.int64]], ...]:
-    grids: dict[tuple[float, ...], list[float]] = {}
-    for v in np.unique(level):
-        grids.setdefault(tuple(frequency[level == v].tolist()), []).append(float(v))
-    settle = response.settle_cycles
-    integrate = response.integrate_cycles
-    return tuple(
-        (
-            SweepPlan(
-                grid,
-                tuple(levels),
-                direction=response.direction or "up",
-                settle_cycles=SETTLE_CYCLES if settle is None else settle,
-                integrate_cycles=INTEGRATE_CYCLES if integrate is None else integrate,
-                from_rest=bool(response.from_rest),
-            ),
-            np.flatnonzero(np.isin(level, levels)),
+def _plans(swept: Sequence[_Level]) -> tuple[tuple[SweepPlan, NDArray[np.int64]], ...]:
+    """What was swept at the same frequencies in one response, with its rows."""
+    alike: dict[tuple[int, tuple[float, ...]], list[int]] = {}
+    for place, one in enumerate(swept):
+        grid = tuple(one.readings.frequency_hz.tolist())
+        alike.setdefault((one.number, grid), []).append(place)
+    first = np.cumsum([0, *(len(one.readings) for one in swept)])
+    plans = []
+    for (_, grid), places in alike.items():
+        response = swept[places[0]].readings
+        settle, integrate = response.settle_cycles, response.integrate_cycles
+        plan = SweepPlan(
+            grid,
+            tuple(swept[place].source_vpk for place in places),
+            direction=response.direction or "up",
+            settle_cycles=SETTLE_CYCLES if settle is None else settle,
+            integrate_cycles=INTEGRATE_CYCLES if integrate is None else integrate,
+            from_rest=bool(response.from_rest),
+            dc_offset_v=response.dc_offset_v,
         )
-        for grid, levels in grids.items()
-    )
+        rows = [np.arange(first[place], first[place + 1]) for place in places]
+        plans.append((plan, np.concatenate(rows)))
+    return tuple(plans)
+
+
+def _stretches(*columns: NDArray[np.float64]) -> tuple[slice, ...]:
+    """Slices over which no column (rows,) changes."""
+    changes = np.any([np.diff(column, prepend=np.nan) != 0 for column in columns], axis=0)
+    starts = np.flatnonzero(changes)
+    ends = [*starts[1:], len(changes)]
+    return tuple(slice(int(a), int(b)) for a, b in zip(starts, ends, strict=True))
 
 
 def readings_of_cycles(

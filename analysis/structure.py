@@ -26,7 +26,7 @@ true cable of a practice set left 3 to 6 and fitted up to 5 worse, at other leve
 false causes leave they leave at other levels, too; beyond this the lowest counts by itself."""
 
 _BANDS = 6
-"""Into which the frequencies of a level are parted."""
+"""Into which the frequencies of a level of a sweep are parted."""
 
 _FAR = 5.0
 """Standard deviations at which a residual is cut off: a single point makes no band."""
@@ -62,10 +62,12 @@ def judge_structure(
     """
     if len(own) < _FEW:
         return 0.0
-    by_level = _structure_by_level([seen, *own], observation.blocks)
-    left = _more_than_others(by_level.mean(axis=1))
-    if by_level.shape[1] > 1:
-        left = credited(left, _more_than_others(by_level[:, 1:].mean(axis=1)))
+    fits, blocks = [seen, *own], observation.blocks
+    by_block = np.stack([_structure(fits, block) for block in blocks], axis=1)
+    left = _more_than_others(by_block.mean(axis=1))
+    above = [block.start >= observation.levels[0].stop for block in blocks]
+    if any(above):
+        left = credited(left, _more_than_others(by_block[:, above].mean(axis=1)))
     if not len(sigmas):
         return left
     off = np.sum((seen.deviations[: len(sigmas)] / sigmas) ** 2)
@@ -85,28 +87,21 @@ def _more_than_others(sums: NDArray[np.float64]) -> float:
     return float((seen - centre) / max(1.4826 * np.median(abs(own - centre)), 1e-9))
 
 
-def _structure_by_level(fits: Sequence[Fit], levels: Sequence[slice]) -> NDArray[np.float64]:
-    """Mean over the bands of every level (fits, levels) of the squares, in units of own runs'."""
-    squares = _means_by_band(fits, levels) ** 2
+def _structure(fits: Sequence[Fit], block: slice) -> NDArray[np.float64]:
+    """Mean over the bands of a block (fits,) of the squares, in units of own runs'."""
+    squares = _means_by_band(fits, block) ** 2
     own = squares[1:]
     total = np.sum(own, axis=0)
     # Each run is held against the others, as the observation is.
     usual = np.vstack([total / len(own), (total - own) / (len(own) - 1)])
-    relative = squares / (usual + _LEAST**2)
-    parts = np.array_split(relative, len(levels), axis=1)
-    return np.stack([part.mean(axis=1) for part in parts], axis=1)
+    return np.asarray(np.mean(squares / (usual + _LEAST**2), axis=1))
 
 
-def _means_by_band(fits: Sequence[Fit], levels: Sequence[slice]) -> NDArray[np.float64]:
+def _means_by_band(fits: Sequence[Fit], block: slice) -> NDArray[np.float64]:
     """Mean residual of gain and phase in every band (fits, means), of what was observed."""
-    left = np.stack([fit.residual[:2] / fit.std[:2] for fit in fits])
+    left = np.stack([fit.residual[:2, block] / fit.std[:2, block] for fit in fits])
     left = np.clip(left, -_FAR, _FAR)
-    bands = [
-        band
-        for level in levels
-        for band in np.array_split(left[..., level], _BANDS, axis=2)
-        if band.shape[2]
-    ]
+    bands = [band for band in np.array_split(left, _BANDS, axis=2) if band.shape[2]]
     counts = [np.maximum(np.count_nonzero(~np.isnan(band), axis=2), 1) for band in bands]
     means = [np.nansum(band, axis=2) / count for band, count in zip(bands, counts, strict=True)]
     return np.concatenate(means, axis=1)

@@ -182,6 +182,23 @@ class FrequencyResponse:
         """The distinct source levels, ascending, V peak."""
         return np.unique(self.source_vpk)
 
+    @property
+    def dc_offset_v(self) -> float:
+        """Constant voltage that was added to the source, V; 0 where nothing says so.
+
+        Raises
+        ------
+        InputError
+            If the provenance states one that is no voltage.
+        """
+        stated = self.provenance.get("dc_offset_v", 0.0)
+        number = isinstance(stated, int | float) and not isinstance(stated, bool)
+        if not (number and np.isfinite(stated)):
+            raise InputError(
+                f"frequency response: dc_offset_v {stated!r} is no voltage; give it in V, or none"
+            )
+        return float(stated)
+
     def take(self, rows: Any) -> FrequencyResponse:
         """The response at some rows only (an index or boolean array over rows)."""
         picked = {name: getattr(self, name)[rows] for name in _ARRAYS}

@@ -111,6 +111,7 @@ def reading(response: FrequencyResponse, rng: np.random.Generator) -> FrequencyR
         direction=response.direction,
         settle_cycles=response.settle_cycles,
         integrate_cycles=response.integrate_cycles,
+        provenance={"dc_offset_v": response.dc_offset_v},
     )
 
 

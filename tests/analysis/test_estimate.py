@@ -61,6 +61,18 @@ def test_a_short_sweep_tells_the_ratio_of_a_machine_off_its_datasheet(ratio, cac
     assert (found.b_t_deg.value, found.b_t_deg.std) == (b_t, 0.0)
 
 
+def test_a_dc_offset_that_was_driven_is_not_taken_for_backlash():
+    """It leans the gears on one side: taken for none, the ratio came out at 0.64 for 0.4."""
+    unit, leaning = load_unit("adss"), replace(SHORT, dc_offset_v=1.0)
+    measured = on_a_bench(simulate(unit, 0.4, leaning, seed=3), seed=4)
+    assert measured.dc_offset_v == 1.0
+    found = estimate_response(measured, unit)
+    assert within(found.contribution_ratio, 0.4, 4.0)
+    assert not found.warnings
+    stripped = replace(measured, provenance={})
+    assert estimate_response(stripped, unit).warnings
+
+
 def test_without_phase_and_errors_it_still_answers_and_is_not_surer(cache):
     unit = load_unit("adss")
     measured = on_a_bench(simulate(unit, 0.5, SHORT, seed=5), seed=2)

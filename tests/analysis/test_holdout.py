@@ -7,6 +7,7 @@ import pytest
 import synthetic
 from synthetic import ROWS, candidate, observation, read
 
+import analysis.holdout as module
 from analysis.holdout import hold_out
 from analysis.likelihood import HEAT
 from analysis.surface import Surface
@@ -65,3 +66,22 @@ def test_what_no_place_predicts_is_a_miss(seed):
     honest = observation(read((), np.array([0.5]), np.random.default_rng(seed)))
     assert hold_out(found, observed).rms_sigma > 2.0
     assert hold_out(candidate(honest, seed=seed), honest).rms_sigma < 1.3
+
+
+@pytest.mark.parametrize(
+    ("levels", "blocks", "folds"),
+    [
+        # Two sweeps of one level are near-duplicates where there is another level.
+        ([(0, 8), (8, 12)], [(0, 4), (4, 8), (8, 12)], [(0, 8), (8, 12)]),
+        ([(0, 12)], [(0, 8), (8, 12)], [(0, 8), (8, 12)]),
+        ([(0, 12)], [(0, 12)], [(0, 6), (6, 12)]),
+    ],
+)
+def test_what_is_kept_away_is_a_level_else_a_sweep_else_half_a_band(levels, blocks, folds):
+    class Swept:
+        def __len__(self):
+            return 12
+
+    swept = Swept()
+    swept.levels, swept.blocks = ([slice(*ends) for ends in some] for some in (levels, blocks))
+    assert module._folds(swept) == [slice(*ends) for ends in folds]

@@ -9,7 +9,7 @@ from analysis.observation import (
     observe,
     readings_of_cycles,
 )
-from daq.errors import AnalysisError
+from daq.errors import AnalysisError, InputError
 from daq.frf import DB_PER_NEPER, FrequencyResponse, PointFlag
 
 
@@ -64,6 +64,49 @@ def test_levels_on_different_grids_are_simulated_apart():
         ((1.5,), 3, [0, 1, 2]),
         ((2.5,), 2, [3, 4]),
     ]
+
+
+def test_a_dc_offset_that_was_driven_is_one_that_is_simulated():
+    ((plan, _),) = observe(response(provenance={"dc_offset_v": -0.5})).plans
+    assert plan.dc_offset_v == -0.5
+
+
+@pytest.mark.parametrize("stated", ["1 V", True, float("nan"), [1.0]])
+def test_a_dc_offset_that_is_no_voltage_is_refused(stated):
+    with pytest.raises(InputError, match="is no voltage; give it in V"):
+        observe(response(provenance={"dc_offset_v": stated}))
+
+
+def test_sweeps_of_one_unit_stand_together_by_level_each_with_its_own_plan():
+    high, low = (100.0, 105.0, 115.0, 120.0), (100.0, 120.0)
+    first = response()
+    second = response((2.5,), high, direction="up", provenance={"dc_offset_v": 1.0})
+    third = response((1.5,), low, gain=0.3, integrate_cycles=None)
+    seen = observe(first, second, third)
+    assert list(seen.source_vpk) == [1.5] * 5 + [2.5] * 7
+    assert [(b.start, b.stop) for b in seen.blocks] == [(0, 3), (3, 5), (5, 8), (8, 12)]
+    assert [(b.start, b.stop) for b in seen.levels] == [(0, 5), (5, 12)]
+    plans = [(p.levels_vpk, p.direction, p.dc_offset_v, p.integrate_cycles) for p, _ in seen.plans]
+    # A response that does not say how long it averaged is taken to have done so for 30 cycles.
+    assert plans == [
+        ((1.5, 2.5), "down", 0.0, 9), ((1.5,), "down", 0.0, 30), ((2.5,), "up", 1.0, 9)
+    ]  # fmt: skip
+    for one in (first, second, third):
+        alone = observe(one)
+        for sweep, rows in seen.by_plan():
+            if sweep.sweeps() == alone.sweeps():
+                np.testing.assert_array_equal(sweep.values, alone.values)
+                np.testing.assert_array_equal(seen.values[:, rows], alone.values)
+                break
+        else:
+            pytest.fail("a sweep is none of those that are together")
+
+
+def test_what_is_thinned_keeps_every_sweep_apart():
+    seen = observe(response(), response((2.5,), (101.0, 111.0, 121.0), direction="up")).thinned(2)
+    assert list(seen.frequency_hz) == [100.0, 120.0, 100.0, 120.0, 101.0, 121.0]
+    assert [list(rows) for _, rows in seen.plans] == [[0, 1, 2, 3], [4, 5]]
+    assert [(b.start, b.stop) for b in seen.blocks] == [(0, 2), (2, 4), (4, 6)]
 
 
 def test_what_is_unknown_stays_unknown():

@@ -1,5 +1,7 @@
 """The atlases that come with lashbench: found, whole, and what this engine would make of them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from atlases import BITS, FOLDER, agreement, coarse_sweep, rounded
@@ -9,7 +11,9 @@ import analysis.atlas as module
 from analysis.atlas import atlas_name, make_atlas
 from analysis.causes import Hypothesis
 from analysis.family import Family, read_family
+from analysis.observation import unread
 from analysis.population import DEVIATING
+from daq.plan import SweepPlan
 from sim.unit import load_unit
 
 MACHINES = 10
@@ -109,3 +113,31 @@ def differences(unit, coarse, atlas, key, rng):
 def draw():
     """A generator seeded by chance, for every run of the tests anew."""
     return np.random.default_rng()
+
+
+def test_sweeps_together_share_the_atlas_of_each(monkeypatch, tmp_path):
+    """The same machines to the last bit as if both plans had been simulated in one go."""
+    unit = load_unit("adss")
+    few = [group for group in module._groups(unit, draw(), False) if not group.hypothesis.effects]
+    monkeypatch.setattr(module, "_groups", lambda *_: iter(few))
+    one = unread(SweepPlan((110.0, 130.0), (1.5, 4.0), settle_cycles=2, integrate_cycles=3), 1e-3)
+    other = SweepPlan((120.0, 140.0, 150.0), (2.5,), settle_cycles=2, integrate_cycles=3)
+    plans = ((one.plans[0][0], np.array([0, 1, 5, 6])), (other, np.array([2, 3, 4])))
+    both = replace(
+        one,
+        values=np.full((3, 7), np.nan),
+        source_vpk=np.array([1.5, 1.5, 2.5, 2.5, 2.5, 4.0, 4.0]),
+        frequency_hz=np.array([110.0, 130.0, 120.0, 140.0, 150.0, 110.0, 130.0]),
+        noise=np.full(7, 1e-3),
+        plans=plans,
+    )
+    (whole,) = module.simulate_atlas(unit, both).values()
+    make_atlas(unit, one, tmp_path)
+    kept = list(tmp_path.iterdir())
+    told = []
+    (joined,) = make_atlas(unit, both, tmp_path, progress=told.append).values()
+    assert len(list(tmp_path.iterdir())) == len(kept) + 1  # that of the first was there
+    for name in ("places", "deviations", "mean", "variance"):
+        np.testing.assert_array_equal(getattr(joined, name), getattr(whole, name))
+    assert told == sorted(told)
+    assert (told[0] > 0.5, told[-1]) == (True, 1.0)

@@ -11,7 +11,8 @@ from analysis.structure import credited, judge_structure
 from analysis.surface import Fit
 
 ROWS = 3 * 61
-SEEN = SimpleNamespace(blocks=(slice(0, 61), slice(61, 122), slice(122, 183)))
+BLOCKS = (slice(0, 61), slice(61, 122), slice(122, 183))
+SEEN = SimpleNamespace(blocks=BLOCKS, levels=BLOCKS)
 NONE = np.empty(0)
 SIGMAS = np.full(5, 0.01)
 
@@ -88,7 +89,7 @@ def test_a_late_jump_is_chance_at_the_lowest_level_and_nowhere_else():
 
 
 def test_the_only_level_has_no_credit_and_the_lowest_has_its_limits():
-    alone = SimpleNamespace(blocks=(slice(0, ROWS),))
+    alone = SimpleNamespace(blocks=(slice(0, ROWS),), levels=(slice(0, ROWS),))
     one, *own = noise(np.random.default_rng(6), 49)
     jumped = one.residual.copy()
     jumped[:2, 50:61] += 0.04

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from daq.configs import config_path
+from daq.formats import read_response
 from tui.cli import main
 
 PRACTICE = Path(__file__).parents[1] / "data" / "practice"
@@ -56,9 +57,10 @@ def calls(monkeypatch):
 
     made = []
 
-    def known(response, unit, *, cache, executor, progress):
+    def known(response, unit, *, further, cache, executor, progress):
         assert executor is None
         made.append((response, unit, cache))
+        made.extend((one, unit, cache) for one in further)
         return Told()
 
     monkeypatch.setattr(analysis.diagnosis, "diagnose_response", known)
@@ -130,3 +132,24 @@ def test_an_effect_hidden_behind_the_simulated_analyser_is_found(tmp_path, monke
     assert any("amplifier-saturation" in names for names in sets[:3])
     assert found["gain"]["held_out_rms_ratio"] < 0.8
     assert not list(tmp_path.rglob("atlas-*"))
+
+
+def test_further_sweeps_are_handed_on_together_and_none_if_one_is_bad(calls, capsys, tmp_path):
+    other = str(PRACTICE / "practice-05.csv")
+    assert main(["diagnose", SWEEP, other, "--unit", "adss"]) == 0
+    assert [response.provenance for response, _, _ in calls] == [
+        read_response(Path(file)).provenance for file in (SWEEP, other)
+    ]
+    calls.clear()
+    spoilt = tmp_path / "spoilt.csv"
+    spoilt.write_text(Path(other).read_text().replace("\n", ",\n", 1))
+    assert main(["diagnose", SWEEP, str(spoilt), "--unit", "adss"]) == 2
+    assert not calls
+    assert "spoilt.csv" in capsys.readouterr().err
+
+
+def test_sweeps_of_different_units_are_not_diagnosed_together(capsys):
+    other = str(PRACTICE / "practice-10.csv")
+    assert main(["diagnose", SWEEP, other, "--unit", "adss"]) == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert line.startswith("error: the responses are of different units, ADSS and EDSS;")

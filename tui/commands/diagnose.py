@@ -23,7 +23,7 @@ __all__ = ["diagnose"]
 def diagnose(
     file: Path | None = None,
     /,
-    *,
+    *further: Path,
     unit: UnitName,
     paper: bool = False,
     plots: Plots = None,
@@ -41,6 +41,8 @@ def diagnose(
     ----------
     file
         Response as csv, h5, uff, mat or the analyser's own sdf.
+    further
+        Other sweeps of the same unit, diagnosed together with the first.
     paper
         Diagnose the paper's own measured frequencies and gains in place of a file.
     """
@@ -59,13 +61,14 @@ def diagnose(
         return
     from daq.formats import read_response
 
-    response = read_response(file)
+    response, *others = (read_response(path) for path in (file, *further))
     from analysis.diagnosis import diagnose_response
 
     with executor_at(cluster) as executor:
         result = diagnose_response(
-            response, subject, cache=cache_folder(), executor=executor, progress=console.progress
-        )
+            response, subject, further=others, cache=cache_folder(), executor=executor,
+            progress=console.progress,
+        )  # fmt: skip
     if plots is not None:
         from analysis.diagnosis_figures import draw_diagnosis
 
