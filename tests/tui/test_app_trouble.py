@@ -8,7 +8,7 @@ import time
 import pytest
 from bench_server import gimbal_analyser, served
 from killed import killed_after
-from screen import DIAGNOSIS, operated, quick_analyses, run
+from screen import DIAGNOSIS, Diagnosed, operated, quick_analyses, run
 
 from daq.analyser import SourceState
 from daq.frf import PointFlag
@@ -164,11 +164,16 @@ def test_an_overload_is_marked_by_shape_and_in_words(tmp_path):
     assert sum(bool(f & PointFlag.OVERLOAD) for f in flags) == 1
 
 
-def test_measure_this_next_starts_the_proposed_sweep_by_one_key(tmp_path):
-    db = tmp_path / "bench.db"
+def test_measure_this_next_starts_the_proposed_sweep_by_one_key_and_both_are_diagnosed(tmp_path):
+    db, diagnosed = tmp_path / "bench.db", []
+
+    def diagnose(responses, unit, progress):
+        diagnosed.append([response.provenance["measurement_id"] for response in responses])
+        return Diagnosed({**DIAGNOSIS, "sweeps": [{}] * len(responses)})
 
     async def way(url):
-        async with operated(db, (120, 40)) as op:
+        analyses = quick_analyses(diagnose=diagnose)
+        async with operated(db, (120, 40), analyses=analyses) as op:
             await op.connects(url)
             await op.plans()
             await op.checks()
@@ -178,8 +183,11 @@ def test_measure_this_next_starts_the_proposed_sweep_by_one_key(tmp_path):
             await op.sees("MEASURE THIS NEXT", "shaft-stiffness", "3 from 120 to 140 Hz")
             await op.press("n")
             await op.sees("[4 Sweep]", "3 of 3 points stored; complete")
+            await op.press("ctrl+n", "ctrl+n", "d")
+            await op.sees("measurement 2", "of 2 sweeps together")
 
     run(lambda: way("sim:"))
+    assert diagnosed == [[1], [2, 1]]
     plan = begun(db).header.plan
     proposed = DIAGNOSIS["next_measurement"]["plan"]
     assert plan.levels_vpk == tuple(proposed["levels_vpk"])

@@ -153,3 +153,10 @@ def test_sweeps_of_different_units_are_not_diagnosed_together(capsys):
     assert main(["diagnose", SWEEP, other, "--unit", "adss"]) == 2
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert line.startswith("error: the responses are of different units, ADSS and EDSS;")
+
+
+def test_a_sweep_counts_once(capsys):
+    assert main(["diagnose", SWEEP, SWEEP, "--unit", "adss"]) == 2
+    assert capsys.readouterr().err == (
+        "error: a response was given twice; it says no more than once\n"
+    )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,11 +36,14 @@ def _estimate(response: FrequencyResponse, unit: Unit, progress: Progress) -> Ma
     return estimate_response(response, unit, cache=cache_folder(), progress=progress).to_json()
 
 
-def _diagnose(response: FrequencyResponse, unit: Unit, progress: Progress) -> Any:
+def _diagnose(responses: Sequence[FrequencyResponse], unit: Unit, progress: Progress) -> Any:
     from analysis.diagnosis import diagnose_response
     from tui.places import cache_folder
 
-    return diagnose_response(response, unit, cache=cache_folder(), progress=progress)
+    response, *further = responses
+    return diagnose_response(
+        response, unit, further=further, cache=cache_folder(), progress=progress
+    )
 
 
 def _report(task: Task, diagnosis: Any, path: Path) -> None:
@@ -61,13 +64,13 @@ class Analyses:
     estimate
         Gives the document of ``estimate --json``.
     diagnose
-        Gives something with ``to_json()`` and ``summary()``.
+        Gives something with ``to_json()`` and ``summary()``, of a response and those it follows.
     report
         Writes a file about a task's measurement, with its diagnosis or None.
     """
 
     estimate: Callable[[FrequencyResponse, Unit, Progress], Mapping[str, Any]] = _estimate
-    diagnose: Callable[[FrequencyResponse, Unit, Progress], Any] = _diagnose
+    diagnose: Callable[[Sequence[FrequencyResponse], Unit, Progress], Any] = _diagnose
     report: Callable[[Task, Any, Path], None] = _report
 
 
@@ -101,6 +104,14 @@ class Task:
 
         with Store(self.db, read_only=True) as store:
             return store.response(self.measurement)
+
+    def responses(self) -> list[FrequencyResponse]:
+        """The measurement's, and those that it follows."""
+        from daq.store import Store
+        from tui.followed import responses_together
+
+        with Store(self.db, read_only=True) as store:
+            return responses_together(store, self.measurement)
 
     def progress(self, job: Job) -> Progress:
         """Tells how far a job is, and ends it where nobody waits."""
@@ -153,7 +164,7 @@ def read_result(task: Task, analyses: Analyses) -> None:
 def diagnose(task: Task, analyses: Analyses) -> None:
     """What the model lacks, and why."""
     progress = task.progress("diagnosis")
-    task.run("diagnosis", lambda: analyses.diagnose(task.response(), task.unit, progress))
+    task.run("diagnosis", lambda: analyses.diagnose(task.responses(), task.unit, progress))
 
 
 def write_report(task: Task, analyses: Analyses, diagnosis: Any, path: Path) -> None:

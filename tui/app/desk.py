@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from daq.errors import ConfigurationError, InputError
 from tui.app.run_view import RunView
+from tui.followed import following
 from tui.measure_options import PlanOptions
 
 if TYPE_CHECKING:
@@ -75,6 +76,8 @@ class Desk:
     """What the operator says of the sweep; the rest is the recipe's."""
     given_plan: SweepPlan | None = None
     """A plan that came whole, from a diagnosis; it goes before `options`."""
+    follows: int | None = None
+    """The measurement whose diagnosis proposed `given_plan`, if that is where it came from."""
     resume: int | None = None
     run: RunView = field(default_factory=RunView)
     measurement: int | None = None
@@ -170,7 +173,10 @@ class Desk:
         )  # fmt: skip
         if fresh and self.given_plan is not None and request.header is not None:
             check_plan(self.given_plan, request.limits)
-            request = replace(request, header=replace(request.header, plan=self.given_plan))
+            header = replace(request.header, plan=self.given_plan)
+            if self.follows is not None:
+                header = following(header, self.follows)
+            request = replace(request, header=header)
         return request
 
     def plan(self) -> SweepPlan:

@@ -44,7 +44,7 @@ which takes a minute or two of both processors; the screen stays free meanwhile.
 Every cause is given with its probability. The residual is the distance of measurement and model
 on source levels that were held out, in standard errors and dB, before and after the cause was
 added. N starts the measurement that would tell rivals apart: checks first, as always, then the
-sweep itself.
+sweep itself. D then diagnoses both measurements together.
 """
     BINDINGS = [
         Binding("d", "diagnose", "Diagnose", id="diagnosis.run"),
@@ -102,6 +102,7 @@ sweep itself.
             return
         try:
             desk.given_plan, desk.resume = plan_of_document(plan), None
+            desk.follows = desk.measurement
         except LashbenchError as error:
             self.bench.show_error("The proposed measurement cannot be made", error)
             return
@@ -139,8 +140,10 @@ sweep itself.
 def diagnosis_lines(document: Mapping[str, Any]) -> list[str]:
     """A diagnosis for people: verdict, residual, causes with a sentence each, rivals, what next."""
     before, after = document["baseline"], document["extended"]
+    sweeps = len(document.get("sweeps", ()))
     lines = [
         f"VERDICT: {document['verdict'].upper()}. {_VERDICTS.get(document['verdict'], '')}",
+        *([f"of {sweeps} sweeps together"] if sweeps > 1 else []),
         "",
         f"residual before  {_residual(before)}",
         f"residual after   {_residual(after)}",
