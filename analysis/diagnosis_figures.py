@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.diagnosis import Diagnosis
+from analysis.observation import Observation
 from analysis.verdict import Judged
 from daq.formats.atomic import file_stem, replacing
 from daq.frf import DB_PER_NEPER
@@ -50,7 +51,7 @@ def residual_figure(diagnosis: Diagnosis) -> Figure:
     panels = figure.subplots(2, len(blocks), sharex=True, sharey="row", squeeze=False)
     extended = verdict.best if diagnosis.causes else None
     for column, block in enumerate(blocks):
-        panels[0, column].set_title(f"{observation.source_vpk[block.start]:g} V peak")
+        panels[0, column].set_title(_swept(observation, block))
         panels[1, column].set_xlabel("frequency (Hz)")
         for (channel, factor, _), axes in zip(_CHANNELS, panels[:, column], strict=True):
             axes.axhline(0.0, color=_INK, linewidth=0.7)
@@ -65,6 +66,19 @@ def residual_figure(diagnosis: Diagnosis) -> Figure:
     names = " + ".join(cause.effect for cause in diagnosis.causes) or "nothing named"
     figure.suptitle(f"{diagnosis.unit}: {verdict.word}, {names}", fontsize=11)
     return figure
+
+
+def _swept(observation: Observation, block: slice) -> str:
+    """Level of a block, and how it was swept where others were swept in another way."""
+    ways = [(plan.direction, plan.dc_offset_v) for plan, _ in observation.plans]
+    (here,) = (i for i, (_, rows) in enumerate(observation.plans) if block.start in rows)
+    direction, offset_v = ways[here]
+    words = [f"{observation.source_vpk[block.start]:g} V peak"]
+    if len({way[0] for way in ways}) > 1:
+        words.append(direction)
+    if offset_v:
+        words.append(f"offset {offset_v:g} V")
+    return ", ".join(words)
 
 
 def _draw(

@@ -27,7 +27,7 @@ from daq.frf import FrequencyResponse
 from sim.effort import counting
 from sim.unit import Unit
 
-__all__ = ["Estimate", "Uncertain", "estimate_features", "estimate_response"]
+__all__ = ["Estimate", "Uncertain", "estimate_features", "estimate_response", "free_axes"]
 
 _WIDE_RESIDUAL = 1.35
 """Robust residual, in standard deviations, from which the model is said to lack something."""
@@ -137,12 +137,7 @@ def estimate_response(
     AnalysisError
         If no usable point is left, or nothing simulated comes near the response.
     """
-    observation = observe(response)
-    axes: tuple[Axis, ...] = (RATIO,)
-    if unit.stages == 1:
-        axes = (_play_axis(unit),)
-    elif total_backlash_unknown:
-        axes = (replace(RATIO, coarse=17, scale=0.12), _total_axis(unit))
+    observation, axes = observe(response), free_axes(unit, total_backlash_unknown)
     with counting() as effort:
         posterior = fit_posterior(
             unit, observation, axes, seed=seed, cache=cache, executor=executor, progress=progress
@@ -190,6 +185,15 @@ def estimate_features(
         tuple(warnings),
         effort.simulated_s,
     )
+
+
+def free_axes(unit: Unit, total_backlash_unknown: bool = False) -> tuple[Axis, ...]:
+    """What is free in an estimate of a unit (see `estimate_response`)."""
+    if unit.stages == 1:
+        return (_play_axis(unit),)
+    if total_backlash_unknown:
+        return replace(RATIO, coarse=17, scale=0.12), _total_axis(unit)
+    return (RATIO,)
 
 
 def _total_axis(unit: Unit) -> Axis:

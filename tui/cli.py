@@ -30,6 +30,7 @@ VERBS = {
     "diagnose": ("tui.commands.diagnose:diagnose", "Tell what the simulation gets wrong, and why."),
     "reproduce": ("tui.commands.reproduce:reproduce", "Compute the paper's tables and figures."),
     "measure": ("tui.commands.measure:measure", "Measure a unit on the bench."),
+    "prepare": ("tui.commands.prepare:prepare", "Simulate ahead what a sweep will need."),
     "history": ("tui.commands.history:history", "List a bench's measurements and their trend."),
     "export": ("tui.commands.export:export", "Write a stored measurement to a file."),
     "report": ("tui.commands.report:report", "Write a report that prints, as one HTML file."),

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from daq.store_records import Measurement
     from sim.unit import Unit
 
-__all__ = ["PlanOptions", "plan_of", "read_band", "session_request"]
+__all__ = ["PlanOptions", "plan_of", "read_band", "session_request", "swept_plan"]
 
 _TARGET_STD_HZ = 0.5
 _BUDGET = 2
@@ -122,7 +122,7 @@ def session_request(
     else:
         if remeasure is not None:
             raise InputError("--remeasure needs --resume ID: which measurement is it about?")
-        plan = _plan(options, way)
+        plan = swept_plan(options, way)
         refinement = _refinement(options, way, plan)
         texts = {"unit": config_path("units", unit_name), "bench": config_path("benches", bench)}
         if recipe is not None:
@@ -162,7 +162,14 @@ def plan_of(request: SessionRequest, db: Path) -> SweepPlan:
         return store.measurement(request.resume or 0).header.plan
 
 
-def _plan(options: PlanOptions, recipe: Recipe | None) -> SweepPlan:
+def swept_plan(options: PlanOptions, recipe: Recipe | None) -> SweepPlan:
+    """The sweep that options and recipe describe together; options go first.
+
+    Raises
+    ------
+    InputError
+        If something is missing, or is no sweep.
+    """
     from daq.plan import SweepPlan, spaced_frequencies
 
     values: dict[str, Any] = {"spacing": "lin"}

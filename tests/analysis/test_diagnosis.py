@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis import diagnose_response
-from analysis.diagnosis_figures import draw_diagnosis
+from analysis.diagnosis_figures import draw_diagnosis, residual_figure
 from daq.formats import read_response
 from daq.plan import SweepPlan, spaced_frequencies
 from sim.catalogue import CATALOGUE
@@ -206,3 +206,31 @@ def judge_practice(number, response, cache, folder):
 @pytest.fixture(scope="session")
 def practice_cache(tmp_path_factory):
     return tmp_path_factory.mktemp("practice-atlas")
+
+
+def test_a_sweep_with_an_offset_is_diagnosed_together_with_what_it_follows(cache):
+    """A cable of 900 N.m/rad at one level: each sweep alone is short, and leans or does not."""
+    text, few = "cable-stiffness:K_c=900", SHORT.frequencies_hz[::2]
+    rng = np.random.default_rng(4)
+    unit, ratio = hidden.off_datasheet(ADSS, rng), 0.4
+    first, second = (
+        hidden.reading(simulate(unit, ratio, plan, effects=[parse_effect(text)], seed=n), rng)
+        for n, plan in enumerate(
+            [SweepPlan(SHORT.frequencies_hz, (2.5,)), SweepPlan(few, (2.5,), dc_offset_v=1.0)]
+        )
+    )
+    others = set(CATALOGUE) - {"cable-stiffness", "load-inertia", "shaft-stiffness"}
+    found = diagnose_response(first, ADSS, further=[second], without=others, cache=cache)
+    document = found.to_json()
+    assert [(one["points"], one["dc_offset_v"]) for one in document["sweeps"]] == [
+        (24, 0.0), (12, 1.0)
+    ]  # fmt: skip
+    assert "cable-stiffness" in found.verdict.best.effects
+    assert found.verdict.word in ("explained", "ambiguous")
+    # Four of its error bars: missed by chance in one of some thousand machines.
+    assert abs(found.ratio_extended[0] - ratio) < 4.0 * found.ratio_extended[1]
+    assert not found.warnings
+    axes = residual_figure(found).axes[:2]
+    assert [one.get_title() for one in axes] == ["2.5 V peak", "2.5 V peak, offset 1 V"]
+    said = "\n".join(found.summary())
+    assert "swept: 12 points from 105 to 169.087 Hz up at 2.5 V, offset 1 V" in said

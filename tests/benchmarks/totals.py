@@ -147,16 +147,27 @@ def measure(folder: Path, only: list[str]) -> list[tuple[str, str, Cost]]:
     add("table2", "Table 2, exact engine, 100 cycles, one draw", "3 s", lambda: inside(TABLE2), 2)
     if only and not {"estimate", "diagnose"} & set(only):
         return rows
-    kept = {"XDG_CACHE_HOME": str(folder / "cache")}
+    kept, ahead = ({"XDG_CACHE_HOME": str(folder / name)} for name in ("cache", "ahead"))
     files = {levels: str(sweep(folder, levels)) for levels in (USUAL, OWN)}
+
+    def working(verb: str, levels: tuple[str, ...], place: dict[str, str]) -> Cost:
+        return run([COMMAND, verb, files[levels], "--unit", "adss", "--json"], **place)
+
+    what = "3 levels x 61 points"
+    row = f"prepare, another plan of {what}, once"
+    rows.append((row, "", working("prepare", OWN, ahead)))
     for verb, goal in (("estimate", "3 s"), ("diagnose", "30 s")):
-        for levels, name in (
-            (USUAL, "3 levels x 61 points, the usual sweep"),
-            (OWN, "3 levels x 61 points, first of another plan"),
-            (OWN, "another measurement of that plan"),
+        for levels, place, name in (
+            (USUAL, kept, f"{what}, the usual sweep"),
+            (OWN, ahead, f"{what}, first of another plan, prepared"),
+            (OWN, kept, f"{what}, first of another plan, not prepared"),
+            (OWN, kept, "another measurement of that plan"),
         ):
-            words = [COMMAND, verb, files[levels], "--unit", "adss", "--json"]
-            add(verb, f"{verb}, {name}", goal, lambda words=words: run(words, **kept))
+
+            def work(verb=verb, levels=levels, place=place) -> Cost:
+                return working(verb, levels, place)
+
+            add(verb, f"{verb}, {name}", goal, work)
     return rows
 
 

@@ -129,3 +129,11 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_work(tmp_path, cap
     (tmp_path / "folder.csv").mkdir()
     assert main([*SWEEP.split(), "--level", "1", "--out", f"{tmp_path}/{name}"]) == 2
     assert "simulating" not in capsys.readouterr().err
+
+
+def test_a_dc_offset_acts_and_is_written_down(tmp_path):
+    plain = simulated(tmp_path / "plain.csv")
+    leaning = simulated(tmp_path / "leaning.csv", "--level 2.5 --offset 1.5")
+    assert (plain.dc_offset_v, leaning.dc_offset_v) == (0.0, 1.5)
+    # The mean of the output follows the motor's, which turns one way now.
+    assert np.max(np.abs(leaning.gain - plain.gain)) > 0.01 * np.max(np.abs(plain.gain))

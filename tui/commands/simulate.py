@@ -36,6 +36,7 @@ def simulate(
     direction: Literal["up", "down"] = "up",
     settle_cycles: Whole = 20,
     integrate_cycles: Whole = 30,
+    offset: Real = 0.0,
     from_rest: bool = False,
     effect: list[str] | None = None,
     set_: Annotated[list[str] | None, Parameter(name="--set")] = None,
@@ -65,6 +66,8 @@ def simulate(
         Drive cycles waited at each point.
     integrate_cycles
         Drive cycles averaged at each point.
+    offset
+        Constant voltage added to the source, in V.
     from_rest
         Start every point from rest, as the paper does; without it the motion
         carries on from point to point as in a real sweep.
@@ -100,6 +103,7 @@ def simulate(
         settle_cycles=settle_cycles,
         integrate_cycles=integrate_cycles,
         from_rest=from_rest,
+        dc_offset_v=offset,
     )
     if plan.duration_s > _LONGEST_S:
         raise InputError(

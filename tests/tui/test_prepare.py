@@ -1,0 +1,101 @@
+"""The verb prepare: what is simulated ahead is what a measurement of that sweep is held against."""
+
+import json
+
+import pytest
+from measuring import QUICK, SHORT, measuring
+
+import analysis.preparation as module
+from analysis.atlas import coarse_stride, make_atlas
+from analysis.estimate import estimate_response
+from analysis.observation import USUAL_NOISE_V, observe, unread
+from daq.formats import read_response
+from daq.plan import SweepPlan
+from sim.unit import load_unit
+from tui.cli import main
+
+ADSS = load_unit("adss")
+TINY = unread(SweepPlan((130.0, 140.0), (2.5,), settle_cycles=1, integrate_cycles=2), USUAL_NOISE_V)
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache" / "lashbench"
+
+
+def test_a_sweep_that_was_prepared_is_estimated_and_searched_without_simulating(
+    run, cache, tmp_path
+):
+    words = ["--unit", "adss", *SHORT, *QUICK, "--offset", "0.5", "--json"]
+    code, out, _ = run("prepare", *words, history=False)
+    assert code == 0
+    said = json.loads(out)
+    assert (said["unit"], said["points"], said["kept_in"]) == ("ADSS", 5, str(cache))
+    assert said["simulated_s"] > 0.0
+    run(*measuring("--offset", "0.5"))
+    file = tmp_path / "swept.csv"
+    assert run("export", 1, "--out", file)[0] == 0
+    kept = sorted(cache.iterdir())
+    response = read_response(file)
+    assert estimate_response(response, ADSS, cache=cache).simulated_s == 0.0
+    seen = observe(response)
+    for rare in (False, True):
+        make_atlas(ADSS, seen.thinned(coarse_stride(seen)), cache, rare=rare)
+    assert sorted(cache.iterdir()) == kept
+    # A response says which sweep is meant, too, and nothing is left to be made of this one.
+    code, out, _ = run("prepare", file, "--unit", "adss", history=False)
+    assert (code, out) == (0, "ADSS: all of it was there already\n")
+
+
+def test_one_that_was_interrupted_goes_on(tmp_path, monkeypatch):
+    made, whole = [], module.run_families
+
+    def stopping(unit, families, *rest, **options):
+        if len(made) == 2:
+            raise KeyboardInterrupt
+        made.append(len(families))
+        return whole(unit, families, *rest, **options)
+
+    monkeypatch.setattr(module, "make_atlas", lambda *_, **__: {})
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "run_families", stopping)
+        with pytest.raises(KeyboardInterrupt):
+            module.prepare_sweep(ADSS, TINY, tmp_path)
+    assert len(list(tmp_path.iterdir())) == sum(made) == 16
+    told = []
+    left = module.prepare_sweep(ADSS, TINY, tmp_path, progress=lambda *said: told.append(said))
+    fresh = module.prepare_sweep(ADSS, TINY, tmp_path / "other")
+    count = len(list((tmp_path / "other").iterdir()))
+    assert left == pytest.approx(fresh * (count - 16) / count, rel=0.2)
+    assert [share for share, _ in told] == sorted(share for share, _ in told)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--unit", "adss"], "--level, --start, --stop, --points is missing"),
+        (["--unit", "adss", *SHORT[:-2]], "--points is missing"),
+        (["x.csv", "--unit", "adss", "--level", "2"], "not both"),
+        (["x.csv", "--unit", "adss"], "x.csv"),
+        (["--unit", "nosuch", *SHORT], "nosuch"),
+        (["--unit", "adss", "--recipe", "nosuch"], "nosuch"),
+    ],
+)
+def test_what_is_no_sweep_is_refused_in_one_line(words, said, capsys, cache, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["prepare", *words]) == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert said in line
+    assert not cache.exists()
+
+
+def test_a_cache_that_cannot_be_written_is_refused_before_anything_is_simulated(
+    capsys, cache, monkeypatch
+):
+    cache.parent.write_text("no folder")
+    monkeypatch.setattr(module, "run_families", None)
+    assert main(["prepare", "--unit", "adss", *SHORT]) == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert line.startswith(f"error: {cache}: cannot be written (")
+    assert line.endswith("set XDG_CACHE_HOME to a folder that can")
