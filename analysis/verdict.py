@@ -214,8 +214,13 @@ def judge_candidates(
         or best.score < baseline.score + _FALSE_ALARM
         or _may_be_chance(baseline, best, rng)
     ):
-        word: Word = "consistent" if baseline.adequate else "unexplained"
-        return Verdict(word, baseline, tuple(judged), baseline)
+        if baseline.adequate:
+            return Verdict("consistent", baseline, tuple(judged), baseline)
+        tie = Verdict("ambiguous", best, tuple(judged), baseline)
+        if best.effects and best.adequate and tie.rivals:
+            # Something is missing, too little of it to say which of several it is.
+            return tie
+        return Verdict("unexplained", baseline, tuple(judged), baseline)
     first, judged = judged[0], _put_behind(judged, best)
     if judged[0].effects != first.effects:
         # What led was no better than its part, and another leads now.

@@ -241,6 +241,29 @@ def test_where_a_pair_does_not_earn_its_second_cause_who_leads_its_first_is_name
     assert {one.effects: one.score for one in verdict.judged}[pair] == 180.0
 
 
+@pytest.mark.parametrize(
+    ("against", "second", "word", "named"),
+    [
+        ("", 5.0, "consistent", ()), ("it leaves structure", 5.0, "ambiguous", TRUE),
+        ("it leaves structure", -40.0, "unexplained", ()),
+    ],
+)  # fmt: skip
+def test_a_little_that_is_missing_is_a_tie_of_what_does_and_nothing_where_one_alone_does(
+    monkeypatch, against, second, word, named
+):
+    """The leader is ten ahead of the plain model, which is less than looking at many makes."""
+    score = {(): 100.0, TRUE: 110.0, WRONG: 100.0 + second}
+    monkeypatch.setattr(rules, "_score", lambda c, h: score[c.hypothesis.effects])
+    monkeypatch.setattr(rules, "judge_adequacy", lambda c, rng: FITS)
+    monkeypatch.setattr(
+        rules, "_find_objection", lambda c, *_: "" if c.hypothesis.effects else against
+    )
+    verdict = judge(seen(TRUE, 1), tuple(score), 1)
+    assert (verdict.word, verdict.best.effects) == (word, named)
+    if word == "ambiguous":
+        assert [one.effects for one in verdict.rivals] == [WRONG]
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_a_second_cause_is_not_named_where_one_does(seed):
     pair = tuple(sorted((*TRUE, *WRONG)))
