@@ -86,7 +86,7 @@ def _readings(
     """Channels of the runs with what a bench adds: reading noise and the tachometer's spread."""
     noises = draw_noises(observation, len(runs), rng)[:, None]
     noise = observation.noise * (noises / observation.noise_v)
-    values = channels_of_readings(runs.mean, runs.variance, noise)
+    values = channels_of_readings(runs.mean, runs.variance, noise, observation.floor)
     values[:, 0] += rng.normal(0.0, GAIN_TOLERANCE, (len(values), 1))
     values[:, :2] += rng.standard_normal(values[:, :2].shape) * noise[:, None]
     return values

@@ -62,7 +62,7 @@ class Draws:
 
     def channels(self, observation: Observation) -> NDArray[np.float64]:
         """Channels (draws, 3, rows) as the bench of an observation would read them."""
-        return channels_of_readings(self.mean, self.variance, observation.noise)
+        return channels_of_readings(self.mean, self.variance, observation.noise, observation.floor)
 
     def joined(self, other: Draws) -> Draws:
         """Both sets of draws."""

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from analysis.candidate import Candidate
 from analysis.executor import Executor
 from analysis.likelihood import HEAT
-from analysis.observation import Observation, channels_of_readings, unread
+from analysis.observation import Observation, channels_of_readings, noise_and_floor, unread
 from analysis.placement import groups_along
 from analysis.population import Group, Population, simulate_groups
 from daq.plan import SweepPlan, spaced_frequencies
@@ -170,10 +170,13 @@ def _separation(
 def _moments(
     population: Population, level_vpk: float, noise_v: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    noise = noise_v / (level_vpk * np.median(np.abs(population.mean), axis=0))
-    channels = channels_of_readings(population.mean, population.variance, noise)
+    gain = np.median(np.abs(population.mean), axis=0)
+    noise, floor = noise_and_floor(gain, level_vpk, noise_v)
+    channels = channels_of_readings(population.mean, population.variance, noise, floor)
     turn = np.angle(np.mean(np.exp(1j * channels[:, 1]), axis=0))
     channels[:, 1] = turn + np.angle(np.exp(1j * (channels[:, 1] - turn)))
     variance = channels.var(axis=0)
     variance[:2] += noise**2
+    # Of a point that drowned in noise the gain alone says something: that it did.
+    variance[1:, floor > 0.0] = np.inf
     return channels.mean(axis=0), variance

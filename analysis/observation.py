@@ -2,7 +2,8 @@
 
 Owns the channels of comparison: log gain, phase, and the logarithm of the
 cycle-to-cycle scatter. The scatter is data too: undamped meshes chatter, and a
-little damping silences them. It simulates nothing.
+little damping silences them. Of a point that drowns in noise, where friction
+holds the servo, it keeps that there is next to nothing. It simulates nothing.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ __all__ = [
     "USUAL_NOISE_V",
     "Observation",
     "channels_of_readings",
+    "noise_and_floor",
     "observe",
     "readings_of_cycles",
     "unread",
@@ -39,6 +41,11 @@ _QUIET_SHARE = 0.02
 USUAL_NOISE_V = 5e-4
 """What a bench adds to each component of a reading, where nothing else is known, V."""
 
+_DROWNED, _FLOOR = 0.25, 2.0
+"""Noise per component, as a share of the response, from which on a point has drowned: its phase is
+chance, and its gain that of noise, which is compared above so many times the noise alone. There a
+servo that friction holds, whose simulation moves by nothing, reads as what it is."""
+
 LEAST_NOISE = 3e-5
 """What any analyser adds, as a share of the largest voltage that it reads: 90 dB below its range.
 Digits beyond, which a simulated file has, tell no machines apart that a bench could."""
@@ -54,7 +61,8 @@ class Observation:
     `source_vpk`, `frequency_hz` (rows,). `noise_v`: the reading's own noise
     per component at the input of the analyser, V. `noise` (rows,): the same
     relative to the response. `loudest_v`: what the quietest points show, V; it
-    can be no more. `plans`: the sweep that a simulation must take, one for each
+    can be no more. `floor` (rows,): gain below which a point that drowned says nothing, 0
+    elsewhere. `plans`: the sweep that a simulation must take, one for each
     set of levels that share their frequencies, with their rows.
     """
 
@@ -64,6 +72,7 @@ class Observation:
     noise_v: float
     noise: NDArray[np.float64]
     loudest_v: float
+    floor: NDArray[np.float64]
     plans: tuple[tuple[SweepPlan, NDArray[np.int64]], ...]
 
     @property
@@ -118,6 +127,7 @@ class Observation:
             source_vpk=self.source_vpk[kept],
             frequency_hz=self.frequency_hz[kept],
             noise=self.noise[kept],
+            floor=self.floor[kept],
             plans=tuple(plans),
         )
 
@@ -144,16 +154,22 @@ def observe(*responses: FrequencyResponse) -> Observation:
     scatter = np.concatenate([one.scatter for one in swept])
     volts = np.abs(gain) * level
     noise_v = _reading_noise(scatter * volts)
+    noise, floor = noise_and_floor(np.abs(gain), level, noise_v)
+    drowned = floor > 0.0
     log_gain = np.log(gain)
     with np.errstate(divide="ignore"):
         log_scatter = np.where(scatter > 0, np.log(scatter), np.nan)
+    values = np.stack([log_gain.real, np.where(known, log_gain.imag, np.nan), log_scatter])
+    values[0, drowned] = _log_above(np.abs(gain), floor)[drowned]
+    values[1:, drowned] = np.nan
     return Observation(
-        values=np.stack([log_gain.real, np.where(known, log_gain.imag, np.nan), log_scatter]),
+        values=values,
         source_vpk=level,
         frequency_hz=np.concatenate([one.readings.frequency_hz for one in swept]),
         noise_v=noise_v,
-        noise=noise_v / volts,
+        noise=noise,
         loudest_v=noise_v,
+        floor=floor,
         plans=_plans(swept),
     )
 
@@ -173,6 +189,7 @@ def unread(plan: SweepPlan, noise_v: float) -> Observation:
         noise_v=noise_v,
         noise=noise_v / level,
         loudest_v=noise_v,
+        floor=np.zeros(len(level)),
         plans=((replace(plan, levels_vpk=tuple(sorted(plan.levels_vpk))), rows),),
     )
 
@@ -261,6 +278,19 @@ def _stretches(*columns: NDArray[np.float64]) -> tuple[slice, ...]:
     return tuple(slice(int(a), int(b)) for a, b in zip(starts, ends, strict=True))
 
 
+def noise_and_floor(
+    gain: NDArray[np.float64], source_vpk: NDArray[np.float64] | float, noise_v: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Relative noise (rows,) of gains at source levels, V, and their floors: 0 where none drowned.
+
+    `noise_v` is that of each component of the reading, V.
+    """
+    volts = gain * source_vpk
+    drowned = volts < noise_v / _DROWNED
+    share = np.where(drowned, _DROWNED, noise_v / np.maximum(volts, 1e-300))
+    return share, np.where(drowned, _FLOOR * noise_v / source_vpk, 0.0)
+
+
 def readings_of_cycles(
     coefficients: NDArray[np.complex128],
 ) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
@@ -276,9 +306,21 @@ def readings_of_cycles(
 
 
 def channels_of_readings(
-    mean: NDArray[np.complex128], variance: NDArray[np.float64], noise: NDArray[np.float64]
+    mean: NDArray[np.complex128],
+    variance: NDArray[np.float64],
+    noise: NDArray[np.float64],
+    floor: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Channels (..., 3, rows) of readings (..., rows) with reading noise (..., rows)."""
+    """Channels (..., 3, rows) of readings (..., rows) with reading noise (..., rows).
+
+    `floor` (rows,) is that of the observation that they are compared with.
+    """
     scatter = 0.5 * np.log(variance + 2.0 * noise**2)
     log_gain = np.log(mean)
-    return np.stack([log_gain.real, log_gain.imag, scatter], axis=-2)
+    above = np.where(floor > 0.0, _log_above(np.abs(mean), floor), log_gain.real)
+    return np.stack([above, log_gain.imag, scatter], axis=-2)
+
+
+def _log_above(gain: NDArray[np.float64], floor: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Log of a gain, levelling out at that of the floor."""
+    return np.asarray(0.5 * np.log(gain**2 + floor**2))

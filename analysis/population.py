@@ -64,7 +64,7 @@ class Population:
 
     def channels(self, observation: Observation) -> NDArray[np.float64]:
         """Channels (n, 3, rows) as the bench of an observation would read them."""
-        return channels_of_readings(self.mean, self.variance, observation.noise)
+        return channels_of_readings(self.mean, self.variance, observation.noise, observation.floor)
 
     def joined(self, other: Population) -> Population:
         """Both sets of runs."""

@@ -83,6 +83,7 @@ def observation(values) -> Observation:
         noise_v=1e-5,
         noise=np.full(ROWS, 1e-5),
         loudest_v=1e-5,
+        floor=np.zeros(ROWS),
         plans=((plan, np.arange(ROWS)),),
     )
 

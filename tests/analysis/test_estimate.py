@@ -73,6 +73,18 @@ def test_a_dc_offset_that_was_driven_is_not_taken_for_backlash():
     assert estimate_response(stripped, unit).warnings
 
 
+def test_a_level_at_which_friction_holds_the_servo_does_no_harm(cache):
+    """Its simulation moves by nothing, and what was read there is the noise of the reading."""
+    unit, both = load_unit("adss"), replace(SHORT, levels_vpk=(0.25, 2.5))
+    measured = on_a_bench(simulate(unit, 0.6, both, seed=9), seed=6)
+    assert np.max(np.abs(measured.at_level(0.25).gain)) < 0.01
+    alone = measured.take(measured.source_vpk == 2.5)
+    found, known = (estimate_response(one, unit, cache=cache) for one in (measured, alone))
+    assert within(found.contribution_ratio, 0.6, 4.0)
+    assert found.contribution_ratio.std < 1.5 * known.contribution_ratio.std
+    assert not found.warnings
+
+
 def test_without_phase_and_errors_it_still_answers_and_is_not_surer(cache):
     unit = load_unit("adss")
     measured = on_a_bench(simulate(unit, 0.5, SHORT, seed=5), seed=2)

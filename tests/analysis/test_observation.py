@@ -154,6 +154,35 @@ def test_a_file_without_noise_is_read_as_by_the_best_of_analysers():
     assert silent.noise_v == pytest.approx(LEAST_NOISE * 0.1 * 4.0)
 
 
+def test_a_point_that_drowned_in_noise_says_that_next_to_nothing_moved():
+    """500 readings of a servo that friction holds: what is left of their noise is of no weight."""
+    rng, noise_v, level = np.random.default_rng(5), 5e-4, 1.5
+    noise = noise_v / level
+    gain = np.full(500, 1e-7) + noise * (rng.standard_normal((2, 500)).T @ [1.0, 1j])
+    gain[0] = 5.0 * noise
+    one = FrequencyResponse.from_arrays(
+        np.linspace(100.0, 200.0, 500), level, gain, unit="ADSS",
+        gain_std_db=DB_PER_NEPER * np.sqrt(2.0) * noise / np.abs(gain),
+    )  # fmt: skip
+    seen = observe(one)
+    assert seen.noise_v == pytest.approx(noise_v)
+    held = slice(1, None)
+    np.testing.assert_allclose(seen.floor[held], 2.0 * noise)
+    np.testing.assert_allclose(seen.noise[held], 0.25)
+    assert np.all(np.isnan(seen.values[1:, held]))
+    shown = channels_of_readings(np.full(500, 1e-7 + 0j), np.zeros(500), seen.noise, seen.floor)
+    off = (seen.values[0] - shown[0])[held]
+    # By the exponential distribution of a squared noise: 0.18 above the floor, scattered by 0.16.
+    assert np.mean(off) == pytest.approx(0.18, abs=0.03)
+    assert np.std(off) == pytest.approx(0.16, abs=0.03)
+    # One that moves after all is told from it by ten of these.
+    moving = channels_of_readings(np.full(500, 0.05 + 0j), np.zeros(500), seen.noise, seen.floor)
+    assert np.all(moving[0, held] - seen.values[0, held] > 10 * 0.25)
+    # What has not drowned is as it was read.
+    assert (seen.floor[0], seen.noise[0]) == (0.0, pytest.approx(0.2))
+    assert seen.values[0, 0] == np.log(gain[0]).real
+
+
 def test_simulated_channels_show_mean_scatter_and_noise():
     rng = np.random.default_rng(2)
     truth = np.array([0.2 * np.exp(0.7j), 0.05 * np.exp(-2.0j)])
@@ -161,7 +190,7 @@ def test_simulated_channels_show_mean_scatter_and_noise():
     cycles = 4000
     spread = rng.standard_normal((2, cycles)) + 1j * rng.standard_normal((2, cycles))
     readings = readings_of_cycles(truth[:, None] * (1 + 0.3 * spread))
-    channels = channels_of_readings(*readings, noise)
+    channels = channels_of_readings(*readings, noise, np.zeros(2))
     np.testing.assert_allclose(channels[0], np.log(np.abs(truth)), atol=0.02)
     np.testing.assert_allclose(channels[1], np.angle(truth), atol=0.02)
     expected = np.sqrt(2 * 0.3**2 / cycles + 2 * noise**2)

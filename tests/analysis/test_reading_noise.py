@@ -44,7 +44,7 @@ def scatter_likelihood(chatter_v, read):
     def likelihood(observation):
         variance = np.full((1, ROWS), 2.0 * chatter_v**2)
         mean = np.ones((1, ROWS), dtype=complex)
-        expected = channels_of_readings(mean, variance, observation.noise)[0, 2]
+        expected = channels_of_readings(mean, variance, observation.noise, observation.floor)[0, 2]
         return float(-0.5 * np.sum(((read - expected) / 0.1) ** 2))
 
     return likelihood
