@@ -74,14 +74,11 @@ runs of its own."""
 _RIVAL = 2.0 * HEAT
 """Within so much of the best, a set is a rival."""
 
-_UNLIKE, _THREE_UNLIKE = 3.0, 2.0
+_UNLIKE, _THREE_UNLIKE = 4.0, 2.0
 """A fit worse than own runs' by more standard deviations than this is no explanation, nor is that
 of more than `_FEW` causes by more than the second: three lags and gains of the chain make up nearly
-any filter. Of 147 sets of one cause or two that were named the worst was worse by 2.0, of 26 units
-with nothing hidden by 1.3; both threes that were named for what was not there by 2.5."""
-
-_UNLIKE_ANY = 4.0
-"""A fit worse than own runs' by more than this is like none of them."""
+any filter. Both threes that were named for what was not there were worse by 2.5; of 147 sets of one
+cause or two that were named one was worse by more than 2."""
 
 _STRUCTURED = 2.5
 """Nor is one whose fit leaves more structure than own runs' by so many: of past sets' leaders
@@ -258,7 +255,7 @@ def _find_objection(
 
 def _may_be_chance(simpler: Judged, best: Judged, rng: np.random.Generator) -> bool:
     # Own runs say nothing about an observation that is unlike all of them.
-    if simpler.misfit > _UNLIKE_ANY:
+    if simpler.misfit > _UNLIKE:
         return False
     return judge_chance(simpler.candidate, best.candidate, rng) > _BY_CHANCE
 

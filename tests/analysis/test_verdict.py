@@ -295,7 +295,7 @@ def test_what_misses_other_levels_or_fits_worse_must_have_own_runs_that_do(
     held_out = SimpleNamespace(rms_sigma=missed)
     against = "" if adequate else "does not predict the other levels"
     assert rules._find_objection(candidate, held_out, FITS, rng) == against
-    limit = 2.0 if effects == THREE else 3.0
+    limit = 2.0 if effects == THREE else 4.0
     alike = rules._find_objection(candidate, held_out, replace(FITS, sigma=limit - 0.1), rng)
     assert alike == against
     unlike = rules._find_objection(candidate, held_out, replace(FITS, sigma=limit + 0.1), rng)
