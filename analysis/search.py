@@ -26,6 +26,7 @@ from analysis.contest import (
     catch_up,
     compare,
     give_chances,
+    look_at_every_ratio,
     see_it_predict,
     settle_doubt,
     weigh_parts,
@@ -152,6 +153,7 @@ def search_causes(
                 _hold_rare(rough, fine, _without(without, rare), rng)
 
             for step in (
+                lambda: look_at_every_ratio(fine),
                 lambda: see_it_predict(fine),
                 lambda: weigh_parts(fine),
                 lambda: _look_for_third(rough, fine, atlas, rng),

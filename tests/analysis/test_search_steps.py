@@ -8,6 +8,7 @@ import synthetic
 
 from analysis import contest, search
 from analysis.causes import Hypothesis
+from analysis.placement import groups_about
 from analysis.purse import Purse
 
 ADSS = synthetic.ADSS
@@ -175,6 +176,44 @@ def test_a_leader_that_predicts_badly_gets_more_runs(monkeypatch, causes, missed
     monkeypatch.setattr(contest, "hold_out", lambda *_: SimpleNamespace(rms_sigma=next(left)))
     contest.see_it_predict(fine)
     assert settled == [[leader]] * rounds
+
+
+@pytest.mark.parametrize(
+    ("leader", "missed", "moved", "looked", "settled"),
+    [
+        (("load-inertia",), 1.1, 0.11, 1, 1), (("load-inertia",), 1.1, -0.09, 1, 0),
+        (("load-inertia",), 1.0, 0.5, 0, 0), ((), 2.0, 0.5, 0, 0),
+    ],
+)  # fmt: skip
+def test_a_leader_that_predicts_worse_than_true_causes_is_looked_at_over_all_ratios(
+    monkeypatch, leader, missed, moved, looked, settled
+):
+    calls, place = [], np.array([0.6, 0.5])[: 1 + len(leader)]
+
+    def standing(ratio):
+        best = SimpleNamespace(place=np.array([ratio, *place[1:]]))
+        return SimpleNamespace(hypothesis=Hypothesis(ADSS, leader), best=best)
+
+    def start(places, groups, reach):
+        ((key, at),) = places.items()
+        np.testing.assert_array_equal(at, place)
+        told = Hypothesis(ADSS, key), at, groups, np.random.default_rng(0), reach
+        ratios = np.concatenate([group.ratios for group in groups_about(*told)])
+        # The whole range, whatever it was found at.
+        assert (ratios.min() < 0.1, ratios.max() > 0.9) == (True, True)
+        fine.found[key] = standing(0.6 + moved)
+        calls.append("start")
+
+    fine = SimpleNamespace(
+        best=standing(0.6),
+        found={leader: standing(0.6)},
+        observation=None,
+        start=start,
+        settle=lambda chosen, groups: calls.append("settle"),
+    )
+    monkeypatch.setattr(contest, "hold_out", lambda *_: SimpleNamespace(rms_sigma=missed))
+    contest.look_at_every_ratio(fine)
+    assert calls == ["start"] * looked + ["settle"] * settled
 
 
 @pytest.mark.parametrize(("gap", "rounds"), [(50.0, 4), (199.0, 4), (201.0, 1)])
