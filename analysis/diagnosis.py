@@ -185,7 +185,7 @@ def _check_together(responses: Sequence[FrequencyResponse]) -> None:
         ("units", [one.unit for one in responses]),
         ("specimens", [str(one.provenance.get("serial") or "") for one in responses]),
     ):
-        different = sorted({one for one in said if one})
+        different = sorted(set(said) - {"", "unknown"})
         if len({one.lower() for one in different}) > 1:
             raise InputError(
                 f"the responses are of different {what}, {' and '.join(different)}; "

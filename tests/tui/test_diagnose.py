@@ -1,11 +1,13 @@
 """The verb diagnose: what it refuses, what it hands on, and a cause hidden behind the analyser."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from daq.configs import config_path
+from daq.errors import InputError
 from daq.formats import read_response
 from tui.cli import main
 
@@ -153,6 +155,20 @@ def test_sweeps_of_different_units_are_not_diagnosed_together(capsys):
     assert main(["diagnose", SWEEP, other, "--unit", "adss"]) == 2
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert line.startswith("error: the responses are of different units, ADSS and EDSS;")
+
+
+def test_a_foreign_file_that_names_no_unit_goes_with_any():
+    from analysis.diagnosis import _check_together
+
+    first, other = (read_response(PRACTICE / f"practice-{n}.csv") for n in ("09", "05"))
+    _check_together([first, replace(other, unit="unknown")])
+    with pytest.raises(InputError, match="different specimens, SN 7 and SN 8"):
+        _check_together(
+            [
+                replace(one, provenance={"serial": s})
+                for one, s in ((first, "SN 7"), (other, "SN 8"))
+            ]
+        )
 
 
 def test_a_sweep_counts_once(capsys):
