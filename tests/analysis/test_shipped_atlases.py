@@ -129,6 +129,7 @@ def test_sweeps_together_share_the_atlas_of_each(monkeypatch, tmp_path):
         source_vpk=np.array([1.5, 1.5, 2.5, 2.5, 2.5, 4.0, 4.0]),
         frequency_hz=np.array([110.0, 130.0, 120.0, 140.0, 150.0, 110.0, 130.0]),
         noise=np.full(7, 1e-3),
+        floor=np.zeros(7),
         plans=plans,
     )
     (whole,) = module.simulate_atlas(unit, both).values()
