@@ -56,18 +56,33 @@ def calibrate(
     runs: Population,
     width: NDArray[np.float64],
     rng: np.random.Generator,
+    *,
+    sampled: float = 0.0,
+    within: float = 0.0,
 ) -> Calibrated:
     """Estimate the place of an observation among runs.
 
     Kernel ridge regression from squashed channels to places, its ridge chosen by what it gets
     wrong about machines left out, first among all runs, then among the nearest. `width` (d,):
     distance over which the response changes smoothly.
+
+    Parameters
+    ----------
+    sampled
+        What a stated error that is the reading's own is off by, of 30 cycles: runs differ in it,
+        too. Where all of a motion repeats itself the scatter says nothing else.
+    within
+        Runs that lie so many standard deviations about the first answer are all among the nearest:
+        one that is hardly known would seem to be known as well as they lie close together.
     """
-    readings = _readings(observation, runs, rng)
+    readings = _readings(observation, runs, rng, sampled)
     kin = _kin(runs.deviations)
     first = _regress(observation, readings, runs.places, kin)
     distance = np.abs((runs.places - first.mean) / width).max(axis=1)
-    near = np.sort(np.argsort(distance, kind="stable")[:_NEAREST])
+    std = np.sqrt(np.diag(first.covariance))
+    open_ = np.all(np.abs(runs.places - first.mean) <= within * std, axis=1)
+    count = max(_NEAREST, np.count_nonzero(open_))
+    near = np.sort(np.argsort(distance, kind="stable")[:count])
     return _regress(observation, readings[near], runs.places[near], kin[near])
 
 
@@ -81,12 +96,21 @@ def _kin(deviations: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def _readings(
-    observation: Observation, runs: Population, rng: np.random.Generator
+    observation: Observation, runs: Population, rng: np.random.Generator, sampled: float
 ) -> NDArray[np.float64]:
-    """Channels of the runs with what a bench adds: reading noise and the tachometer's spread."""
+    """Channels of the runs with what a bench adds: reading noise and the tachometer's spread.
+
+    And what its stated errors are off by, where they are those of the reading and not of a motion
+    whose cycles were counted: each by its own, and all of them as the least ones tell the noise.
+    """
     noises = draw_noises(observation, len(runs), rng)[:, None]
+    if sampled:
+        noises = noises * np.exp(sampled * rng.standard_normal(noises.shape))
     noise = observation.noise * (noises / observation.noise_v)
     values = channels_of_readings(runs.mean, runs.variance, noise, observation.floor)
+    if sampled:
+        share = 2.0 * noise**2 / (runs.variance + 2.0 * noise**2)
+        values[:, 2] += sampled * share * rng.standard_normal(share.shape)
     values[:, 0] += rng.normal(0.0, GAIN_TOLERANCE, (len(values), 1))
     values[:, :2] += rng.standard_normal(values[:, :2].shape) * noise[:, None]
     return values

@@ -73,6 +73,22 @@ def test_a_dc_offset_that_was_driven_is_not_taken_for_backlash():
     assert estimate_response(stripped, unit).warnings
 
 
+@pytest.mark.parametrize(("level_vpk", "seed"), [(0.25, 1), (0.5, 2), (0.5, 3)])
+def test_a_sweep_that_says_nothing_of_the_ratio_leaves_all_of_it_open(level_vpk, seed, cache):
+    """The motor is held by friction, or moves within its play: every ratio shows the same.
+
+    It said 0.06 +- 0.04 for 0.4.
+    """
+    unit, gentle = load_unit("adss"), replace(SHORT, levels_vpk=(level_vpk,))
+    measured = on_a_bench(simulate(unit, 0.4, gentle, seed=seed), seed=seed)
+    found = estimate_response(measured, unit, seed=seed)
+    # Evenly over 0 to 1 has a standard deviation of 0.29.
+    assert found.contribution_ratio.std > 0.2
+    low, high = found.contribution_ratio.interval95
+    assert low < 0.2
+    assert high > 0.8
+
+
 def test_a_level_at_which_friction_holds_the_servo_does_no_harm(cache):
     """Its simulation moves by nothing, and what was read there is the noise of the reading."""
     unit, both = load_unit("adss"), replace(SHORT, levels_vpk=(0.25, 2.5))
