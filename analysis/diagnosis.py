@@ -25,7 +25,7 @@ from analysis.observation import Observation, observe
 from analysis.progress import Progress, part_of
 from analysis.search import search_causes
 from analysis.sharpening import sharpen_candidate
-from analysis.sizing import size_candidate
+from analysis.sizing import size_candidate, widen_if_open
 from analysis.verdict import Judged, Verdict, judge_candidates
 from daq.errors import AnalysisError, InputError
 from daq.frf import FrequencyResponse
@@ -119,6 +119,7 @@ def _diagnose(
     if verdict.word != "unexplained":
         late = part_of(progress, 0.8, 0.9, "sizing it")
         best = sharpen_candidate(unit, verdict.best.candidate, observation, rng, executor, late)
+    base = widen_if_open(base, verdict.baseline.candidate, observation, rng)
     departures = find_departures(verdict.baseline.candidate, observation)
     proposal = _proposal(unit, verdict, observation, seed, executor, progress)
     if progress is not None:

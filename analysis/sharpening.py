@@ -18,7 +18,7 @@ from analysis.executor import Executor
 from analysis.observation import Observation
 from analysis.placement import groups_around
 from analysis.population import simulate_groups
-from analysis.sizing import size_candidate
+from analysis.sizing import size_candidate, widen_if_open
 from sim.unit import Unit
 
 __all__ = ["sharpen_candidate"]
@@ -74,4 +74,4 @@ def sharpen_candidate(
         found = size_candidate(candidate, observation, rng)
         if progress is not None:
             progress((done + 1) / (_ROUNDS + _ROUNDS_MORE))
-    return found
+    return widen_if_open(found, candidate, observation, rng)

@@ -9,21 +9,44 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from analysis.calibration import Calibrated, calibrate
+from analysis.calibration import CAUTION, Calibrated, calibrate
 from analysis.candidate import Candidate
 from analysis.observation import Observation
 
-__all__ = ["size_candidate"]
+__all__ = ["size_candidate", "widen_if_open"]
+
+_OPEN = 1.5
+"""So many times the standard deviation of the ratio is much more; chance makes it a tenth more or
+less."""
 
 
 def size_candidate(
     candidate: Candidate, observation: Observation, rng: np.random.Generator
 ) -> Calibrated:
     """Mean (d,) and covariance (d, d) of the coordinates, from runs left out in turn."""
-    runs, surface = candidate.population, candidate.surface
+    return _clipped(calibrate(observation, candidate.population, _width(candidate), rng))
+
+
+def widen_if_open(
+    found: Calibrated, candidate: Candidate, observation: Observation, rng: np.random.Generator
+) -> Calibrated:
+    """What was found of a candidate, or what is with more caution where that leaves much more open.
+
+    A search places runs ever closer about an answer; where the data say nothing, it seems known.
+    """
+    open_ = calibrate(observation, candidate.population, _width(candidate), rng, **CAUTION)
+    wider = np.sqrt(np.diag(open_.covariance) / np.diag(found.covariance))
+    return _clipped(open_) if wider[0] > _OPEN else found
+
+
+def _width(candidate: Candidate) -> NDArray[np.float64]:
+    surface = candidate.surface
     bent = surface.chart is not None and surface.chart.bent.any()
     # The widths of a chart are not those of the places.
-    width = runs.places.std(axis=0) + 1e-6 if bent else surface.width
-    found = calibrate(observation, runs, width, rng)
+    return candidate.population.places.std(axis=0) + 1e-6 if bent else surface.width
+
+
+def _clipped(found: Calibrated) -> Calibrated:
     return replace(found, mean=np.clip(found.mean, 0.0, 1.0))
