@@ -21,7 +21,7 @@ from analysis.observation import Observation, channels_of_readings
 from analysis.population import Population
 from analysis.reading_noise import draw_noises
 
-__all__ = ["CAUTION", "Calibrated", "calibrate"]
+__all__ = ["Calibrated", "calibrate"]
 
 _RIDGES = (0.003, 0.01, 0.03, 0.1, 0.3)
 _FLOOR = 0.03
@@ -36,9 +36,8 @@ _NEAREST = 180
 """Runs that take part: the answer is learned where it lies."""
 
 
-CAUTION = {"sampled": 0.13, "within": 3.0}
-"""What a sweep that tells little must not make up for (see `calibrate`): a stated error of 30
-cycles is known to 13 %, and an answer that is hardly known lies anywhere."""
+_WITHIN = 3.0
+"""Runs that lie so many standard deviations about the first answer all take part with caution."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,8 +61,7 @@ def calibrate(
     width: NDArray[np.float64],
     rng: np.random.Generator,
     *,
-    sampled: float = 0.0,
-    within: float = 0.0,
+    cautious: bool = False,
 ) -> Calibrated:
     """Estimate the place of an observation among runs.
 
@@ -73,20 +71,21 @@ def calibrate(
 
     Parameters
     ----------
-    sampled
-        What a stated error that is the reading's own is off by, of 30 cycles: runs differ in it,
-        too. Where all of a motion repeats itself the scatter says nothing else.
-    within
-        Runs that lie so many standard deviations about the first answer are all among the nearest:
-        one that is hardly known would seem to be known as well as they lie close together.
+    cautious
+        Allow for a sweep that tells little. Runs then differ in what a stated error is itself off
+        by, as the scatter says nothing else where all of a motion repeats itself; and all runs
+        that may be the answer count among the nearest, as one that is hardly known would seem to
+        be known as well as those lie close together.
     """
-    readings = _readings(observation, runs, rng, sampled)
+    readings = _readings(observation, runs, rng, _sampling(observation) if cautious else 0.0)
     kin = _kin(runs.deviations)
     first = _regress(observation, readings, runs.places, kin)
     distance = np.abs((runs.places - first.mean) / width).max(axis=1)
-    std = np.sqrt(np.diag(first.covariance))
-    open_ = np.all(np.abs(runs.places - first.mean) <= within * std, axis=1)
-    count = max(_NEAREST, np.count_nonzero(open_))
+    count = _NEAREST
+    if cautious:
+        reach = _WITHIN * np.sqrt(np.diag(first.covariance))
+        possible = np.all(np.abs(runs.places - first.mean) <= reach, axis=1)
+        count = max(count, int(np.count_nonzero(possible)))
     near = np.sort(np.argsort(distance, kind="stable")[:count])
     return _regress(observation, readings[near], runs.places[near], kin[near])
 
@@ -98,6 +97,12 @@ def _kin(deviations: NDArray[np.float64]) -> NDArray[np.int64]:
     alone = ~np.any(deviations != 0.0, axis=1)
     label[alone] = label.max(initial=0) + 1 + np.arange(np.count_nonzero(alone))
     return label
+
+
+def _sampling(observation: Observation) -> float:
+    """Relative standard deviation of a standard error along one component, by its cycles."""
+    cycles = min(plan.integrate_cycles for plan, _ in observation.plans)
+    return float(1.0 / np.sqrt(2.0 * max(cycles - 1, 1)))
 
 
 def _readings(

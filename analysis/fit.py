@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.calibration import CAUTION, calibrate
+from analysis.calibration import calibrate
 from analysis.emulator import Emulator
 from analysis.ensemble import TOLERANCES, Draws, Machine
 from analysis.executor import Executor
@@ -82,12 +82,12 @@ def fit_posterior(
     scales = np.array([axis.scale for axis in axes])
     wide = wide_families(axes, observation, seed)
     draws = runs(wide, 0.0, 0.5, "simulating the range")
-    found = calibrate(observation, _population(axes, draws), scales, rng, **CAUTION)
+    found = calibrate(observation, _population(axes, draws), scales, rng, cautious=True)
     std = np.sqrt(np.diag(found.covariance))
     near = near_families(axes, found.mean, std, observation, seed)
     draws = draws.joined(runs(near, 0.5, 0.95, "simulating near the answer"))
     population, width = _population(axes, draws), 0.6 * scales
-    calibrated = calibrate(observation, population, width, rng, **CAUTION)
+    calibrated = calibrate(observation, population, width, rng, cautious=True)
     weight = calibrated.density(_grid(axes))
     best = np.clip(calibrated.mean, [axis.low for axis in axes], [axis.high for axis in axes])
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.calibration import CAUTION, Calibrated, calibrate
+from analysis.calibration import Calibrated, calibrate
 from analysis.candidate import Candidate
 from analysis.observation import Observation
 
@@ -36,7 +36,7 @@ def widen_if_open(
 
     A search places runs ever closer about an answer; where the data say nothing, it seems known.
     """
-    open_ = calibrate(observation, candidate.population, _width(candidate), rng, **CAUTION)
+    open_ = calibrate(observation, candidate.population, _width(candidate), rng, cautious=True)
     wider = np.sqrt(np.diag(open_.covariance) / np.diag(found.covariance))
     return _clipped(open_) if wider[0] > _OPEN else found
 

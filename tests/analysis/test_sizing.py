@@ -7,7 +7,7 @@ import pytest
 from synthetic import candidate, observation, read
 
 import analysis.sizing as module
-from analysis.calibration import CAUTION, Calibrated
+from analysis.calibration import Calibrated
 from analysis.sizing import size_candidate, widen_if_open
 
 TRUE = ("load-inertia",)
@@ -25,7 +25,7 @@ def test_what_is_hardly_known_with_caution_is_told_with_it(monkeypatch, wider, t
     one = SimpleNamespace(population=None, surface=SimpleNamespace(chart=None, width=None))
     found = Calibrated(np.array([0.3]), np.array([[0.05**2]]))
     assert widen_if_open(found, one, None, None).mean[0] == told
-    assert asked == [CAUTION]
+    assert asked == [{"cautious": True}]
 
 
 @pytest.mark.parametrize("seed", range(3))
