@@ -11,7 +11,7 @@ from __future__ import annotations
 from importlib import import_module
 from pathlib import Path
 
-from daq.errors import InputError
+from daq.errors import FileFormatError, InputError
 from daq.frf import FrequencyResponse
 
 __all__ = ["READABLE", "WRITABLE", "check_writable", "read_response", "write_response"]
@@ -43,6 +43,10 @@ def read_response(path: str | Path) -> FrequencyResponse:
         If the suffix is not that of a format that can be read.
     """
     response: FrequencyResponse = import_module(_module(path, READABLE, "read")).read(Path(path))
+    try:
+        _ = response.dc_offset_v
+    except InputError as error:
+        raise FileFormatError(f"{path}: {error}") from error
     return response
 
 

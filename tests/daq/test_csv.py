@@ -327,3 +327,10 @@ def test_spoilt_readings_are_listed_and_not_passed_off_as_data(tmp_path):
     assert read.flags.tolist() == [0, 0, PointFlag.OVERLOAD]
     write_response(read, path)
     assert_same(read_response(path), read)
+
+
+def test_an_offset_that_is_no_voltage_is_refused_with_the_file_that_states_it(tmp_path):
+    path = tmp_path / "odd.csv"
+    path.write_text('# dc_offset_v = "half"\n' + PRACTICE[0].read_text())
+    with pytest.raises(FileFormatError, match=r"odd\.csv: .*dc_offset_v 'half' is no voltage"):
+        read_response(path)
