@@ -247,13 +247,12 @@ def _assemble(
     simulated_s: float,
 ) -> Estimate:
     """Equations (15) and (20) applied to every place of the posterior."""
-    known = bool(np.ptp(total_deg) == 0.0)
     return Estimate(
         unit=unit.name,
         contribution_ratio=_uncertain(ratios, weight),
         b1_deg=_uncertain(ratios * total_deg * unit.output_ratio, weight),
         b2_deg=_uncertain((1.0 - ratios) * total_deg, weight),
-        b_t_deg=Uncertain(float(total_deg[0]), 0.0) if known else _uncertain(total_deg, weight),
+        b_t_deg=_uncertain(total_deg, weight),
         curve=curve,
         warnings=warnings,
         simulated_s=simulated_s,
@@ -261,7 +260,13 @@ def _assemble(
 
 
 def _uncertain(values: NDArray[np.float64], weight: NDArray[np.float64]) -> Uncertain:
-    """Mean, standard deviation and central 95 % interval of a weighted grid."""
+    """Mean, standard deviation and central 95 % interval of a weighted grid.
+
+    A number that is the same everywhere is known: no interval, and no rounding
+    of weights that add up to one but for the last digit.
+    """
+    if np.ptp(values) == 0.0:
+        return Uncertain(float(values[0]), 0.0)
     mean = float(weight @ values)
     std = float(np.sqrt(weight @ (values - mean) ** 2))
     order = np.argsort(values, kind="stable")
