@@ -11,8 +11,8 @@ from typing import Any
 from analysis.misfit import Departure
 from analysis.next_measurement import NextMeasurement
 from analysis.observation import Observation
+from analysis.swept import sweep_document, sweep_lines
 from analysis.verdict import Verdict
-from daq.plan import SweepPlan
 from sim.catalogue import CATALOGUE
 
 __all__ = ["Cause", "Diagnosis", "Size"]
@@ -120,7 +120,7 @@ class Diagnosis:
             "residual": [one.to_json() for one in self.departures],
             "residual_after": [one.to_json() for one in self.left],
             "shape": self.shape,
-            "sweeps": [_swept(plan) for plan, _ in self.observation.plans],
+            "sweeps": self._swept(),
             "misfit_sigma": {
                 "baseline": self.verdict.baseline.misfit,
                 "extended": self.verdict.best.misfit,
@@ -135,6 +135,9 @@ class Diagnosis:
             "simulated_s": self.simulated_s,
         }
 
+    def _swept(self) -> list[dict[str, Any]]:
+        return [sweep_document(plan) for plan, _ in self.observation.plans]
+
     def summary(self) -> list[str]:
         """Lines of text for a person."""
         lines = [f"{self.unit}: {self.verdict.word}. {_sentence(self)}"]
@@ -144,8 +147,7 @@ class Diagnosis:
             lines.append(f"  {cause.effect} ({_WHERE[effect.site]}): {sizes}")
             lines.append(f"    {effect.meaning} On the bench: {effect.bench_cause}.")
             lines.append(f"    To make sure: {effect.check}.")
-        if len(self.observation.plans) > 1:
-            lines += [f"  swept: {_plan_words(plan)}" for plan, _ in self.observation.plans]
+        lines += [f"  {text}" for text in sweep_lines(self._swept())]
         base, extended = self.ratio_baseline, self.ratio_extended
         lines.append(f"  contribution ratio, plain model      {base[0]:.3f} +- {base[1]:.3f}")
         if self.causes:
@@ -206,24 +208,6 @@ def _proposed(proposal: NextMeasurement) -> str:
             f"({proposal.expected_sigma:.1f} sigma expected):"
         )
     return f"to tell {one} from {other} ({proposal.expected_sigma:.1f} sigma expected):"
-
-
-def _swept(plan: SweepPlan) -> dict[str, Any]:
-    f = plan.frequencies_hz
-    return {
-        "levels_vpk": list(plan.levels_vpk),
-        "start_hz": f[0],
-        "stop_hz": f[-1],
-        "points": len(f),
-        "direction": plan.direction,
-        "dc_offset_v": plan.dc_offset_v,
-    }
-
-
-def _plan_words(plan: SweepPlan) -> str:
-    f, levels = plan.frequencies_hz, ", ".join(f"{level:g}" for level in plan.levels_vpk)
-    offset = f", offset {plan.dc_offset_v:g} V" if plan.dc_offset_v else ""
-    return f"{len(f)} points from {f[0]:g} to {f[-1]:g} Hz {plan.direction} at {levels} V{offset}"
 
 
 def _uncertain(pair: tuple[float, float]) -> dict[str, float]:

@@ -28,10 +28,11 @@ _NEAR = 60
 
 @dataclass(frozen=True, slots=True)
 class Departure:
-    """One band of one level in which measured minus simulated is not chance.
+    """One band of one level of one sweep in which measured minus simulated is not chance.
 
     `mean` in dB (gain) or degrees (phase); `sigma`: in standard deviations of
-    what single runs and the reading scatter there.
+    what single runs and the reading scatter there. `sweep`: which of several,
+    from 0; None where there is one.
     """
 
     low_hz: float
@@ -40,10 +41,12 @@ class Departure:
     quantity: Literal["gain", "phase"]
     mean: float
     sigma: float
+    sweep: int | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """One entry of ``residual``."""
+        """One entry of ``residual``; the sweep only where there are several."""
         return {
+            **({} if self.sweep is None else {"sweep": self.sweep}),
             "band_hz": [self.low_hz, self.high_hz],
             "source_vpk": self.source_vpk,
             "quantity": self.quantity,
@@ -74,6 +77,7 @@ def find_departures(candidate: Candidate, observation: Observation) -> tuple[Dep
                         quantity,  # type: ignore[arg-type]
                         factor * mean,
                         sigma,
+                        _sweep_of(int(band[0]), observation),
                     )
                 )
                 chance.append(2.0 * stats.t.sf(abs(sigma), len(runs) - 1))
@@ -82,6 +86,13 @@ def find_departures(candidate: Candidate, observation: Observation) -> tuple[Dep
     kept = stats.false_discovery_control(chance) <= _FALSE_DISCOVERIES
     real = [one for one, keep in zip(found, kept, strict=True) if keep]
     return tuple(sorted(real, key=lambda one: -abs(one.sigma)))
+
+
+def _sweep_of(row: int, observation: Observation) -> int | None:
+    """Which sweep a row belongs to, where there are several."""
+    if len(observation.plans) == 1:
+        return None
+    return next(n for n, (_, rows) in enumerate(observation.plans) if row in rows)
 
 
 def _scatter_of_runs(candidate: Candidate) -> NDArray[np.float64]:
@@ -115,8 +126,9 @@ def describe_departures(departures: tuple[Departure, ...], observation: Observat
         else:
             level = ", at all source levels alike"
     unit = "dB" if worst.quantity == "gain" else "deg"
+    where = "" if worst.sweep is None else f" of sweep {worst.sweep + 1}"
     return (
         f"{what} depart in {len(departures)} bands{level}; most at {worst.low_hz:g} to "
-        f"{worst.high_hz:g} Hz and {worst.source_vpk:g} V, where the {worst.quantity} is "
+        f"{worst.high_hz:g} Hz and {worst.source_vpk:g} V{where}, where the {worst.quantity} is "
         f"{worst.mean:+.2g} {unit} off ({abs(worst.sigma):.0f} sigma)"
     )

@@ -11,6 +11,7 @@ from typing import Any
 
 from analysis.features import with_error
 from analysis.markup import Markup, element, joined, table
+from analysis.swept import sweep_lines
 
 __all__ = [
     "diagnosis_section",
@@ -146,11 +147,12 @@ def diagnosis_section(data: Data, pictures: Sequence[tuple[Markup, str]]) -> Mar
     diagnosis = data["diagnosis"]
     if diagnosis is None:
         return _section("Diagnosis", element("p", _why(data, "diagnosis")))
-    word = diagnosis["verdict"]
+    word, swept = diagnosis["verdict"], sweep_lines(diagnosis.get("sweeps", ()))
     return _section(
         "Diagnosis",
         element("p", element("b", f"{word.capitalize()}. "), _VERDICTS.get(word, "")),
         _causes(diagnosis),
+        [element("p", f"Taken together: {'; '.join(swept)}.")] if swept else Markup(""),
         _gain(diagnosis),
         [
             element("figure", svg, element("figcaption", caption), class_="half")
@@ -316,9 +318,11 @@ def _number(value: float | None, form: str) -> str:
 def _residuals(title: str, bands: Sequence[Data]) -> Markup:
     if not bands:
         return element("p", f"{title}: none beyond chance.")
+    several = "sweep" in bands[0]
     rows = [
         (
             f"{band['band_hz'][0]:g} to {band['band_hz'][1]:g}",
+            *([f"{band['sweep'] + 1}"] if several else []),
             f"{band['source_vpk']:g}",
             band["quantity"],
             f"{band['mean']:+.2f} {'dB' if band['quantity'] == 'gain' else 'deg'}",
@@ -328,7 +332,8 @@ def _residuals(title: str, bands: Sequence[Data]) -> Markup:
     ]
     more = len(bands) - len(rows)
     heading = f"{title}, strongest first" + (f" ({more} more in the data)" if more else "")
-    head = ("band / Hz", "V peak", "quantity", "measured - model", "sigma")
+    head = ("band / Hz", *(["sweep"] if several else []), "V peak", "quantity")
+    head += ("measured - model", "sigma")
     return joined(element("h3", heading), table(rows, head))
 
 

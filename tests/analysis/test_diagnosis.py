@@ -233,4 +233,4 @@ def test_a_sweep_with_an_offset_is_diagnosed_together_with_what_it_follows(cache
     axes = residual_figure(found).axes[:2]
     assert [one.get_title() for one in axes] == ["2.5 V peak", "2.5 V peak, offset 1 V"]
     said = "\n".join(found.summary())
-    assert "swept: 12 points from 105 to 169.087 Hz up at 2.5 V, offset 1 V" in said
+    assert "sweep 2: 12 points from 105 to 169.087 Hz up at 2.5 V, offset 1 V" in said

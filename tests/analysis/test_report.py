@@ -4,6 +4,7 @@ import hashlib
 import json
 import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from datetime import UTC, datetime
 from html.parser import HTMLParser
 
@@ -17,6 +18,7 @@ from hypothesis import strategies as st
 from analysis.markup import Markup, data_block, element
 from analysis.report import file_origin, write_report
 from analysis.report_data import Origin
+from analysis.swept import sweep_lines
 from daq.errors import AnalysisError, InputError
 from sim.catalogue import CATALOGUE
 from sim.unit import load_unit, unit_from_mapping
@@ -139,6 +141,25 @@ def test_the_diagnosis_has_its_causes_gain_and_pictures(report, explained):
     told = "\n".join(explained.summary())
     assert f"kg.m^2 (datasheet {ADSS.load.J_L:.4g} kg.m^2)\n" in told
     assert f"    To make sure: {cause['check']}.\n" in told
+
+
+def test_sweeps_that_were_taken_together_are_listed_and_departures_say_of_which(report, explained):
+    (plan, rows), alone = explained.observation.plans[0], report(diagnosis=explained)[1]
+    assert "Taken together" not in alone.text
+    first, second = np.array_split(rows, 2)
+    later = replace(plan, levels_vpk=(4.0,), dc_offset_v=0.5, direction="down")
+    observation = replace(explained.observation, plans=((plan, first), (later, second)))
+    departures = [replace(explained.departures[0], sweep=1)]
+    together = replace(explained, observation=observation, departures=tuple(departures))
+    _, page = report(diagnosis=together)
+    lines = sweep_lines(together.to_json()["sweeps"])
+    assert len(lines) == 2
+    assert lines[1].endswith("Hz down at 4 V, offset 0.5 V")
+    assert f"Taken together: {'; '.join(lines)}." in page.text
+    low, high = departures[0].low_hz, departures[0].high_hz
+    assert f"{low:g} to {high:g} 2 {departures[0].source_vpk:g} " in page.text
+    assert "band / Hz sweep V peak quantity" in page.text
+    assert f"  {lines[1]}" in together.summary()
 
 
 @pytest.mark.parametrize("given_up", [False, True])

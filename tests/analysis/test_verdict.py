@@ -376,6 +376,21 @@ def test_departures_are_found_where_they_are_and_nowhere_else():
     assert found[0].mean == pytest.approx(0.2 * 8.686, rel=0.25)
     assert f"{found[0].low_hz:g} to {found[0].high_hz:g} Hz" in describe_departures(found, loud)
     assert describe_departures((), loud) == "nothing departs by more than chance"
+    assert "sweep" not in found[0].to_json()
+
+    # The same rows as two sweeps, of which the second departs.
+    (plan, rows), half = loud.plans[0], ROWS // 2
+    sweeps = tuple(
+        (replace(plan, levels_vpk=(level,)), rows[part])
+        for level, part in zip(LEVELS, (slice(half), slice(half, None)), strict=True)
+    )
+    apart = replace(loud, plans=sweeps)
+    again = find_departures(candidate(apart), apart)
+    assert [(one.low_hz, one.source_vpk) for one in again] == [
+        (one.low_hz, one.source_vpk) for one in found
+    ]
+    assert again[0].to_json()["sweep"] == 1
+    assert f"{LEVELS[1]:g} V of sweep 2, where the gain" in describe_departures(again, apart)
 
 
 def test_the_world_of_these_tests_is_not_flat():

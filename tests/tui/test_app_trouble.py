@@ -10,8 +10,10 @@ from bench_server import gimbal_analyser, served
 from killed import killed_after
 from screen import DIAGNOSIS, Diagnosed, operated, quick_analyses, run
 
+from analysis.swept import sweep_document
 from daq.analyser import SourceState
 from daq.frf import PointFlag
+from daq.plan import SweepPlan
 from daq.store import Store
 from tui.app.dialogs import ErrorDialog
 
@@ -169,7 +171,8 @@ def test_measure_this_next_starts_the_proposed_sweep_by_one_key_and_both_are_dia
 
     def diagnose(responses, unit, progress):
         diagnosed.append([response.provenance["measurement_id"] for response in responses])
-        return Diagnosed({**DIAGNOSIS, "sweeps": [{}] * len(responses)})
+        swept = [sweep_document(SweepPlan((120.0, 140.0), (r.levels_vpk[0],))) for r in responses]
+        return Diagnosed({**DIAGNOSIS, "sweeps": swept})
 
     async def way(url):
         analyses = quick_analyses(diagnose=diagnose)
@@ -184,7 +187,7 @@ def test_measure_this_next_starts_the_proposed_sweep_by_one_key_and_both_are_dia
             await op.press("n")
             await op.sees("[4 Sweep]", "3 of 3 points stored; complete")
             await op.press("ctrl+n", "ctrl+n", "d")
-            await op.sees("measurement 2", "of 2 sweeps together")
+            await op.sees("measurement 2", "sweep 2: 2 points from 120 to 140 Hz up")
 
     run(lambda: way("sim:"))
     assert diagnosed == [[1], [2, 1]]

@@ -14,6 +14,7 @@ from textual.binding import Binding
 from textual.containers import VerticalScroll
 from textual.widgets import ProgressBar, Static
 
+from analysis.swept import sweep_lines
 from daq.errors import LashbenchError
 from tui.app.desk import plan_of_document
 from tui.app.step_screen import StepScreen
@@ -140,10 +141,9 @@ sweep itself. D then diagnoses both measurements together.
 def diagnosis_lines(document: Mapping[str, Any]) -> list[str]:
     """A diagnosis for people: verdict, residual, causes with a sentence each, rivals, what next."""
     before, after = document["baseline"], document["extended"]
-    sweeps = len(document.get("sweeps", ()))
     lines = [
         f"VERDICT: {document['verdict'].upper()}. {_VERDICTS.get(document['verdict'], '')}",
-        *([f"of {sweeps} sweeps together"] if sweeps > 1 else []),
+        *sweep_lines(document.get("sweeps", ())),
         "",
         f"residual before  {_residual(before)}",
         f"residual after   {_residual(after)}",
@@ -203,9 +203,10 @@ def _parameters(parameters: Mapping[str, Any]) -> str:
 
 def _departure(part: Mapping[str, Any]) -> str:
     low, high = part["band_hz"]
+    sweep = f" of sweep {part['sweep'] + 1}" if "sweep" in part else ""
     return (
         f"{part['quantity']} {part['mean']:+.2g} from {low:.0f} to {high:.0f} Hz at "
-        f"{part['source_vpk']:g} V ({abs(part['sigma']):.1f} standard errors)"
+        f"{part['source_vpk']:g} V{sweep} ({abs(part['sigma']):.1f} standard errors)"
     )
 
 
