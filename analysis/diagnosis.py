@@ -11,7 +11,6 @@ from __future__ import annotations
 import time
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -26,8 +25,9 @@ from analysis.progress import Progress, part_of
 from analysis.search import search_causes
 from analysis.sharpening import sharpen_candidate
 from analysis.sizing import size_candidate, widen_if_open
+from analysis.swept import check_together
 from analysis.verdict import Judged, Verdict, judge_candidates
-from daq.errors import AnalysisError, InputError
+from daq.errors import AnalysisError
 from daq.frf import FrequencyResponse
 from sim.effort import counting
 from sim.unit import Unit
@@ -75,7 +75,7 @@ def diagnose_response(
         If the responses are said to be of different units or specimens, or one is there twice.
     """
     responses = (response, *further)
-    _check_together(responses)
+    check_together(responses)
     if unit.stages == 1:
         raise AnalysisError(
             f"unit {unit.name} has one gear stage, and the search shares the backlash out between "
@@ -178,23 +178,6 @@ def _proposal(
         unit, verdict.best.candidate, rival.candidate, observation,
         seed=seed, executor=executor, progress=late,
     )  # fmt: skip
-
-
-def _check_together(responses: Sequence[FrequencyResponse]) -> None:
-    """Refuse sweeps of different machines, whose difference is no cause of either, and copies."""
-    for what, said in (
-        ("units", [one.unit for one in responses]),
-        ("specimens", [str(one.provenance.get("serial") or "") for one in responses]),
-    ):
-        different = sorted(set(said) - {"", "unknown"})
-        if len({one.lower() for one in different}) > 1:
-            raise InputError(
-                f"the responses are of different {what}, {' and '.join(different)}; "
-                "diagnose them one by one"
-            )
-    for one, other in combinations(responses, 2):
-        if np.array_equal(one.gain, other.gain):
-            raise InputError("a response was given twice; it says no more than once")
 
 
 def _warnings(diagnosis: Diagnosis) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ posterior of the contribution ratio; neither looks for causes of a misfit
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from analysis.lattice import RATIO, Axis
 from analysis.observation import observe
 from analysis.paper_estimate import IndexCurve, index_curve_of_response
 from analysis.progress import Progress
+from analysis.swept import check_together, sweep_document, sweep_lines
 from daq.errors import InputError
 from daq.frf import FrequencyResponse
 from sim.effort import counting
@@ -55,7 +57,7 @@ class Estimate:
 
     `curve` is the paper's error index over the ratio, None where the response
     shows no pair of features. `simulated_s` says how many seconds of motion
-    were simulated for it.
+    were simulated for it; `sweeps` what was swept, where it was a response.
     """
 
     unit: str
@@ -66,6 +68,7 @@ class Estimate:
     curve: IndexCurve | None
     warnings: tuple[str, ...]
     simulated_s: float
+    sweeps: tuple[dict[str, Any], ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The document of ``estimate --json``."""
@@ -76,6 +79,7 @@ class Estimate:
             "b2_deg": self.b2_deg.to_json(),
             "b_t_deg": self.b_t_deg.to_json(),
             "error_index": None if self.curve is None else self.curve.to_json(),
+            "sweeps": list(self.sweeps),
             "warnings": list(self.warnings),
             "simulated_s": self.simulated_s,
         }
@@ -95,6 +99,7 @@ class Estimate:
                 low, high = number.interval95
                 line += f"  (95 %: {low:.{digits}f} to {high:.{digits}f})"
             lines.append(line.rstrip())
+        lines += [f"  {text}" for text in sweep_lines(self.sweeps)]
         if self.curve is not None:
             lines.append(self.curve.summary())
         lines.append(f"  motion simulated for this: {self.simulated_s:.0f} s")
@@ -110,13 +115,16 @@ def estimate_response(
     seed: int = 0,
     cache: Path | None = None,
     executor: Executor | None = None,
+    further: Sequence[FrequencyResponse] = (),
 ) -> Estimate:
-    """Estimate from a whole response at all its source levels.
+    """Estimate from a whole response at all its source levels, or from several together.
 
     Parameters
     ----------
     response
         Measured or simulated, one level or more; phase and errors may be missing.
+    further
+        Other sweeps of the same unit. The error index is that of the first.
     unit
         The unit under test.
     total_backlash_unknown
@@ -136,8 +144,12 @@ def estimate_response(
     ------
     AnalysisError
         If no usable point is left, or nothing simulated comes near the response.
+    InputError
+        If the responses are said to be of different units or specimens, or one is there twice.
     """
-    observation, axes = observe(response), free_axes(unit, total_backlash_unknown)
+    responses = (response, *further)
+    check_together(responses)
+    observation, axes = observe(*responses), free_axes(unit, total_backlash_unknown)
     with counting() as effort:
         posterior = fit_posterior(
             unit, observation, axes, seed=seed, cache=cache, executor=executor, progress=progress
@@ -150,7 +162,8 @@ def estimate_response(
             f"the model leaves {misfit:.1f} standard deviations of the response unexplained; "
             "run diagnose before trusting the ratio"
         )
-    return _from_posterior(unit, posterior, curve, tuple(warnings), effort.simulated_s)
+    found = _from_posterior(unit, posterior, curve, tuple(warnings), effort.simulated_s)
+    return replace(found, sweeps=tuple(sweep_document(plan) for plan, _ in observation.plans))
 
 
 def estimate_features(

@@ -253,7 +253,8 @@ def _plans(swept: Sequence[_Level]) -> tuple[tuple[SweepPlan, NDArray[np.int64]]
         alike.setdefault((one.number, grid), []).append(place)
     first = np.cumsum([0, *(len(one.readings) for one in swept)])
     plans = []
-    for (_, grid), places in alike.items():
+    # In the order in which the responses were given, by which a person knows them.
+    for (_, grid), places in sorted(alike.items(), key=lambda one: one[0][0]):
         response = swept[places[0]].readings
         settle, integrate = response.settle_cycles, response.integrate_cycles
         plan = SweepPlan(

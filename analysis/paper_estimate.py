@@ -105,13 +105,18 @@ def index_curve_of_response(
     """The error index of a measured response against the draws made for its fit.
 
     Taken at the source level nearest to the paper's. None where the
-    measurement or the simulations show no pair of features.
+    measurement or the simulations show no pair of features. Of an observation
+    of several responses it is the first.
     """
     level = min(response.levels_vpk, key=lambda v: abs(v - PAPER_LEVEL_VPK))
     (measured,) = extract(response.at_level(level))
     if measured.arf is None or measured.rf is None:
         return None
-    rows = observation.source_vpk == level
+    rows = next(
+        rows[observation.source_vpk[rows] == level]
+        for plan, rows in observation.plans
+        if level in plan.levels_vpk
+    )
     plain = [i for i, m in enumerate(draws.machines) if not m.deviations and m.b_t_deg is None]
     picked = plain[:: max(len(plain) // _MOST_READ, 1)]
     if not picked:

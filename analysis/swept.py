@@ -1,17 +1,45 @@
-"""Sweeps that were diagnosed together: as a document, and in words for a person.
+"""Sweeps that are taken together: which may be, and how they are told.
 
-Owns how a sweep is told in a diagnosis. It imports nothing heavy, so that a
-screen may say it.
+Owns what is refused, and a sweep as a document and in words for a person. It
+imports nothing heavy, so that a screen may say it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import combinations
 from typing import Any
 
+import numpy as np
+
+from daq.errors import InputError
+from daq.frf import FrequencyResponse
 from daq.plan import SweepPlan
 
-__all__ = ["sweep_document", "sweep_lines"]
+__all__ = ["check_together", "sweep_document", "sweep_lines"]
+
+
+def check_together(responses: Sequence[FrequencyResponse]) -> None:
+    """Refuse sweeps of different machines, whose difference is no cause of either, and copies.
+
+    Raises
+    ------
+    InputError
+        If the responses are said to be of different units or specimens, or one is there twice.
+    """
+    for what, said in (
+        ("units", [one.unit for one in responses]),
+        ("specimens", [str(one.provenance.get("serial") or "") for one in responses]),
+    ):
+        different = sorted(set(said) - {"", "unknown"})
+        if len({one.lower() for one in different}) > 1:
+            raise InputError(
+                f"the responses are of different {what}, {' and '.join(different)}; "
+                "take them one by one"
+            )
+    for one, other in combinations(responses, 2):
+        if np.array_equal(one.gain, other.gain):
+            raise InputError("a response was given twice; it says no more than once")
 
 
 def sweep_document(plan: SweepPlan) -> dict[str, Any]:
@@ -28,7 +56,7 @@ def sweep_document(plan: SweepPlan) -> dict[str, Any]:
 
 
 def sweep_lines(sweeps: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Sweeps that were diagnosed together, a line each, from ``sweeps``; nothing of one alone."""
+    """Sweeps that were taken together, a line each, from ``sweeps``; nothing of one alone."""
     if len(sweeps) < 2:
         return []
     return [f"sweep {n}: {_words(one)}" for n, one in enumerate(sweeps, start=1)]

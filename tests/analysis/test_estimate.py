@@ -7,8 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from analysis.ensemble import Machine
 from analysis.estimate import Estimate, estimate_features, estimate_response
-from analysis.paper_estimate import fit_features
+from analysis.library import run_families
+from analysis.observation import observe
+from analysis.paper_estimate import fit_features, index_curve_of_response
 from daq.errors import InputError
 from daq.formats import read_response
 from daq.frf import DB_PER_NEPER, FrequencyResponse
@@ -59,6 +62,50 @@ def test_a_short_sweep_tells_the_ratio_of_a_machine_off_its_datasheet(ratio, cac
     assert found.b1_deg.value == pytest.approx(r * b_t * unit.stage2.N)
     assert found.b2_deg.value == pytest.approx((1.0 - r) * b_t)
     assert (found.b_t_deg.value, found.b_t_deg.std) == (b_t, 0.0)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_two_sweeps_of_one_machine_are_estimated_from_together(seed, cache):
+    """Other levels, band and direction."""
+    unit = load_unit("adss")
+    lower = replace(SHORT, frequencies_hz=SHORT.frequencies_hz[:13])
+    plans = (SHORT, replace(lower, levels_vpk=(4.0, 2.5), direction="down"))
+    first, second = (
+        on_a_bench(simulate(unit, 0.35, plan, seed=20 + n), seed=n)
+        for n, plan in enumerate(plans, start=2 * seed)
+    )
+    alone = [estimate_response(one, unit, cache=cache) for one in (first, second)]
+    found = estimate_response(first, unit, further=[second], cache=cache)
+    assert within(found.contribution_ratio, 0.35, 4.0)
+    # Sweeps that lean apart by chance leave a wider answer than two that agree.
+    assert found.contribution_ratio.std < 1.25 * min(one.contribution_ratio.std for one in alone)
+    swept = found.to_json()["sweeps"]
+    assert [(one["levels_vpk"], one["direction"]) for one in swept] == [
+        ([2.5], "up"), ([2.5, 4.0], "down")
+    ]  # fmt: skip
+    assert "  sweep 2: 13 points from" in "\n".join(found.summary())
+    assert "sweep 1" not in "\n".join(alone[0].summary())
+    with pytest.raises(InputError, match="given twice"):
+        estimate_response(first, unit, further=[first])
+
+
+def test_the_error_index_of_several_sweeps_is_that_of_the_first():
+    """From the same runs, read with the same noise, though the second holds the same level."""
+    unit = load_unit("adss")
+    plan = replace(SHORT, frequencies_hz=spaced_frequencies(110.0, 170.0, 31))
+    first, second = (
+        on_a_bench(simulate(unit, 0.35, one, seed=n), seed=n)
+        for n, one in enumerate((plan, replace(plan, levels_vpk=(2.5, 2.0), direction="down")))
+    )
+    machines = [tuple(Machine(r, seed=i) for i, r in enumerate(np.linspace(0.0, 1.0, 11)))]
+
+    def curve(*responses):
+        seen = observe(*responses).with_noise(observe(first).noise_v)
+        return index_curve_of_response(responses[0], seen, run_families(unit, machines, seen))
+
+    alone, together, other = curve(first), curve(first, second), curve(second, first)
+    assert np.max(np.abs(together.hz - alone.hz)) < 1e-3
+    assert np.max(np.abs(other.hz - alone.hz)) > 0.1
 
 
 def test_a_dc_offset_that_was_driven_is_not_taken_for_backlash():

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from analysis.swept import check_together
 from daq.configs import config_path
 from daq.errors import InputError
 from daq.formats import read_response
@@ -158,12 +159,10 @@ def test_sweeps_of_different_units_are_not_diagnosed_together(capsys):
 
 
 def test_a_foreign_file_that_names_no_unit_goes_with_any():
-    from analysis.diagnosis import _check_together
-
     first, other = (read_response(PRACTICE / f"practice-{n}.csv") for n in ("09", "05"))
-    _check_together([first, replace(other, unit="unknown")])
+    check_together([first, replace(other, unit="unknown")])
     with pytest.raises(InputError, match="different specimens, SN 7 and SN 8"):
-        _check_together(
+        check_together(
             [
                 replace(one, provenance={"serial": s})
                 for one, s in ((first, "SN 7"), (other, "SN 8"))

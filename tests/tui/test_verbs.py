@@ -113,6 +113,16 @@ def test_estimate_hands_the_whole_response_on(calls, capsys):
     assert options["executor"] is None
 
 
+def test_estimate_hands_several_responses_on_together(calls, capsys, tmp_path):
+    other = tmp_path / "other.csv"
+    other.write_text(Path(SWEEP).read_text().replace('unit = "ADSS"', 'unit = "OTHER"'))
+    result = document(["estimate", SWEEP, str(other), "--unit", "adss"], capsys)
+    (((response, _, _), options),) = calls
+    assert response.unit == "ADSS"
+    assert [one.unit for one in options["further"]] == ["OTHER"]
+    assert result["warnings"] == ["the response is of unit OTHER, not of ADSS", "a warning"]
+
+
 def test_estimate_is_told_that_the_total_is_unknown(calls, capsys):
     document(["estimate", SWEEP, "--unit", "adss", "--total-backlash-unknown"], capsys)
     assert calls[0][0][2] is True

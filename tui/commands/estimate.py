@@ -6,6 +6,7 @@ its uncertainty are the analysis's.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,7 +26,7 @@ __all__ = ["estimate"]
 def estimate(
     file: Path | None = None,
     /,
-    *,
+    *further: Path,
     unit: UnitName,
     arf_hz: Real | None = None,
     rf_hz: Real | None = None,
@@ -36,12 +37,14 @@ def estimate(
 ) -> None:
     """Estimate the contribution of stage 1 to the total backlash.
 
-    Give either a response or the two frequencies read from one.
+    Give either a response, or several of one unit, or the two frequencies read from one.
 
     Parameters
     ----------
     file
         Response as csv, h5, uff, mat or the analyser's own sdf.
+    further
+        Other sweeps of the same unit, estimated from together with the first.
     arf_hz
         Anti-resonance in Hz, in place of a file.
     rf_hz
@@ -69,15 +72,15 @@ def estimate(
     else:
         if arf_hz is not None or rf_hz is not None:
             raise InputError(f"{file}: give either a response or --arf-hz and --rf-hz, not both")
-        subject, response = _unit(unit), _response(file)
+        subject, responses = _unit(unit), [_response(path) for path in (file, *further)]
         from analysis.estimate import estimate_response
 
         with executor_at(cluster) as executor:
             result = estimate_response(
-                response, subject, total_backlash_unknown, progress=console.progress,
-                cache=cache_folder(), executor=executor,
+                responses[0], subject, total_backlash_unknown, progress=console.progress,
+                cache=cache_folder(), executor=executor, further=responses[1:],
             )  # fmt: skip
-        warnings = _doubts(response, subject)
+        warnings = _doubts(responses, subject)
     if json:
         document = result.to_json()
         console.document(document | {"warnings": warnings + document["warnings"]})
@@ -97,7 +100,6 @@ def _response(file: Path) -> FrequencyResponse:
     return read_response(file)
 
 
-def _doubts(response: FrequencyResponse, unit: Unit) -> list[str]:
-    if response.unit.lower() == unit.name.lower():
-        return []
-    return [f"the response is of unit {response.unit}, not of {unit.name}"]
+def _doubts(responses: Sequence[FrequencyResponse], unit: Unit) -> list[str]:
+    others = {one.unit for one in responses if one.unit.lower() != unit.name.lower()}
+    return [f"the response is of unit {other}, not of {unit.name}" for other in sorted(others)]
