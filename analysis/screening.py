@@ -12,7 +12,7 @@ cause is added to what runs of a pair showed. It simulates nothing itself.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -67,16 +67,25 @@ _FELT_PAIR_COUNTS = (10, 8, 8)
 """Places looked at along each coordinate of two causes of one size each, both at the load."""
 
 _NEAR = 80.0
-"""Log-likelihood within which hypotheses seen by what the load is felt as are worth a look. True
-pairs lay up to 45 behind another such pair (thirteen drawn), and 8 behind a payload (eight)."""
+"""Log-likelihood within which hypotheses seen by what the load is felt as are worth a look, and a
+pair at another ratio. True pairs lay up to 45 behind another such pair (thirteen drawn), 8 behind a
+payload (eight), and 38 behind themselves at a ratio 0.7 off."""
+
+_APART = 0.25
+"""By how much more another ratio differs: closer ones are reached by the same runs."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Place:
-    """The best place of a hypothesis in the coarse look and its log-likelihood."""
+    """The best place of a hypothesis in the coarse look and its log-likelihood.
+
+    `other`: one at another ratio that is hardly worse, where there is one: what two causes do
+    together is not the sum of what each does, which decides between them by chance.
+    """
 
     place: NDArray[np.float64]
     log_likelihood: float
+    other: NDArray[np.float64] | None = None
 
 
 def ranked(places: Mapping[Effects, Place]) -> list[Effects]:
@@ -209,16 +218,28 @@ def _added(surface: Surface, plain: NDArray[np.float64]) -> _Added:
 
 
 def _best_pair(plain: NDArray[np.float64], first: _Added, second: _Added) -> Place:
-    top, where = -np.inf, np.empty(0)
+    places = []
     for at, ratio in enumerate(ratios_of_pairs()):
         likelihood = total_densities(
             plain[at].ravel(), first.shift[at], second.shift[at], first.std[at], second.std[at]
         )
         one, other = np.unravel_index(np.argmax(likelihood), likelihood.shape)
-        if likelihood[one, other] > top:
-            top = float(likelihood[one, other])
-            where = np.array([ratio, *first.sizes[one], *second.sizes[other]])
-    return Place(where, top)
+        where = np.array([ratio, *first.sizes[one], *second.sizes[other]])
+        places.append(Place(where, float(likelihood[one, other])))
+    best = max(places, key=lambda one: one.log_likelihood)
+    return replace(best, other=_other(places, best))
+
+
+def _other(places: Sequence[Place], best: Place) -> NDArray[np.float64] | None:
+    """The best of places, in order of their ratio, that stands out far from the very best."""
+    likelihood = np.array([one.log_likelihood for one in places])
+    around = np.concatenate([[-np.inf], likelihood, [-np.inf]])
+    stands_out = (likelihood >= around[:-2]) & (likelihood >= around[2:])
+    far = np.abs([one.place[0] - best.place[0] for one in places]) > _APART
+    worth = stands_out & far & (likelihood > best.log_likelihood - _NEAR)
+    if not worth.any():
+        return None
+    return places[int(np.argmax(np.where(worth, likelihood, -np.inf)))].place
 
 
 def _felt_pairs(unit: Unit, coarse: Observation, atlas: Atlas) -> dict[Effects, Surface]:

@@ -196,6 +196,21 @@ def test_pairs_that_add_up_exactly_are_looked_at_whatever_is_favoured(monkeypatc
     assert felt in closer[2]
 
 
+def test_a_pair_is_glanced_at_at_both_of_its_ratios(monkeypatch):
+    one, other = ("a", "b"), ("a", "c")
+    places = {one: Place("low", 0.0, other="high"), other: Place("middle", 1.0)}
+    started = []
+    few = SimpleNamespace(
+        start=lambda starts, groups: started.append((dict(starts), groups)),
+        found={one: "found one", other: "found other"},
+        leading=lambda most: [other, one][:most],
+    )
+    rough = SimpleNamespace(observation=None, thinned=lambda stride: few)
+    monkeypatch.setattr(pairs, "coarse_stride", lambda *_: 2)
+    assert pairs._glance(rough, places, 10) == ["found other", "found one"]
+    assert started == [({one: "low", other: "middle"}, 2), ({one: "high"}, 2)]
+
+
 def test_nothing_to_glance_at_is_no_trouble(runs):
     rough = synthetic_search.hunted([0.8], 1)
     rough.take_over(pairs._glance(rough, {}, 10), 2)

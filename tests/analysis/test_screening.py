@@ -13,7 +13,14 @@ from analysis.candidate import form_candidates
 from analysis.causes import Hypothesis
 from analysis.chart import reflections
 from analysis.placement import _FAR
-from analysis.screening import add_causes, rows_of, screen_further, screen_pairs, screen_singles
+from analysis.screening import (
+    Place,
+    add_causes,
+    rows_of,
+    screen_further,
+    screen_pairs,
+    screen_singles,
+)
 from daq.plan import SweepPlan
 from sim.catalogue import CATALOGUE
 
@@ -65,6 +72,53 @@ def test_a_pair_does_not_ask_its_parts_to_lead_alone(atlas, sizes, stands_in):
     best = max(found, key=lambda key: found[key].log_likelihood)
     assert best == tuple(sizes)
     assert found[best].log_likelihood > singles[alone].log_likelihood + 200.0
+
+
+def profile(likelihood):
+    """Places over the ratio, in its order, as likely as that."""
+    ratios = screening.ratios_of_pairs()
+    return [Place(np.array([r, 0.5]), float(v)) for r, v in zip(ratios, likelihood, strict=True)]
+
+
+@pytest.mark.parametrize(
+    ("peaks", "best", "other"),
+    [
+        ({1: 42.0, 11: 4.0}, 1, 11),
+        ({11: 42.0, 1: 4.0}, 11, 1),
+        ({0: 0.0, 14: -79.0}, 0, 14),
+        ({2: 42.0, 8: -30.0, 13: 10.0}, 2, 13),
+        ({1: 42.0, 11: -39.0}, 1, None),  # further behind than counts
+        ({5: 42.0, 7: 41.0}, 5, None),  # reached by the same runs
+        ({5: 42.0}, 5, None),
+    ],
+)
+def test_a_pair_that_may_have_another_ratio_is_given_both(peaks, best, other):
+    # Between the peaks it falls by ten a step: a slope that is near enough is no other place.
+    at = np.arange(15)
+    likelihood = np.max([top - 10.0 * abs(at - peak) for peak, top in peaks.items()], axis=0)
+    places = profile(likelihood)
+    top = max(places, key=lambda one: one.log_likelihood)
+    assert top is places[best]
+    found = screening._other(places, top)
+    assert found is (None if other is None else places[other].place)
+
+
+def test_both_ratios_of_a_pair_come_out_of_the_screening(atlas):
+    """A plain model that shows the same at two ratios; what causes add is the same at all."""
+    additions = add_causes(
+        ADSS, seen({"amplifier-lag": 0.8, "shaft-stiffness": 0.8}, 0.3, 3), atlas
+    )
+    pair = ("amplifier-lag", "shaft-stiffness")
+    assert screen_pairs(additions)[pair].other is None
+    plain, twin = additions.plain.copy(), 12
+    at = int(
+        np.argmin(np.abs(screening.ratios_of_pairs() - screen_pairs(additions)[pair].place[0]))
+    )
+    plain[twin] = plain[at]
+    found = screen_pairs(replace(additions, plain=plain))[pair]
+    ratios = {round(float(one[0]), 6) for one in (found.place, found.other)}
+    assert ratios == {round(float(screening.ratios_of_pairs()[i]), 6) for i in (at, twin)}
+    assert found.other[1:] == pytest.approx(found.place[1:], abs=0.1)
 
 
 def test_pairs_beside_a_cause_are_those_that_hold_it(atlas):
