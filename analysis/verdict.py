@@ -154,7 +154,8 @@ class Verdict:
 
         Among them that nothing is hidden, which has a wider margin. A set that would be no
         explanation if it led is none as a rival, nor is one that says the same with more sizes:
-        what is believed of that counts for the best.
+        what is believed of that counts for the best. One that is refused though it leads is: the
+        best is then likeliest only among what is left.
         """
         said = [self.best.score, *(one.score for one in self.judged if self._says_the_same(one))]
         believed = HEAT * float(np.logaddexp.reduce(np.array(said) / HEAT))
@@ -169,11 +170,17 @@ class Verdict:
     def _says_the_same(self, one: Judged) -> bool:
         return one.adequate and is_felt_alike(one.candidate, self.best.candidate)
 
+    def _is_led_by(self, one: Judged) -> bool:
+        """Whether a refused set does better by little, so that the best stands in its place."""
+        return one.refused and self.best.score < one.score < self.best.score + _TIE
+
     def _is_rival(self, one: Judged, believed: float) -> bool:
         behind, best = believed - one.score, set(self.best.effects)
         if not one.effects:
             return bool(best) and one.adequate and self.best.score - one.score < _SURE
         other = not set(one.effects) <= best and not set(one.effects) >= best
+        if self._is_led_by(one):
+            return other and not is_felt_alike(one.candidate, self.best.candidate)
         rarer = one.candidate.hypothesis.rare - self.best.candidate.hypothesis.rare
         if not other or not one.adequate or behind - _RARE * max(rarer, 0) >= _RIVAL:
             return False
@@ -214,7 +221,7 @@ def judge_candidates(
         if baseline.adequate:
             return Verdict("consistent", baseline, tuple(judged), baseline)
         tie = Verdict("ambiguous", best, tuple(judged), baseline)
-        if best.effects and best.adequate and tie.rivals:
+        if best.effects and best.adequate and any(one.adequate for one in tie.rivals):
             # Something is missing, too little of it to say which of several it is.
             return tie
         return Verdict("unexplained", baseline, tuple(judged), baseline)

@@ -150,6 +150,37 @@ def test_another_set_is_a_rival_while_it_has_a_seventh_and_explains(behind, adeq
     assert [one.effects for one in verdict.rivals] == rivals
 
 
+@pytest.mark.parametrize(
+    ("lead", "objection", "alike", "word"),
+    [
+        (10.0, "wants a size that no bench has", False, "ambiguous"),
+        (10.0, "wants a size that no bench has", True, "explained"),
+        (-1.0, "wants a size that no bench has", False, "explained"),
+        # Further ahead it is the best itself, and nothing is named.
+        (21.0, "wants a size that no bench has", False, "unexplained"),
+        (-40.0, rules._NOT_ASKED, False, "explained"),
+    ],
+)
+def test_what_stands_in_for_a_refused_leader_is_not_named_alone(
+    lead, objection, alike, word, monkeypatch
+):
+    """A shaft that hardens, withheld, was told to be a light load: a stiff shaft led it."""
+    observed = seen(TRUE, 1)
+    found = [candidate(observed, effects, 1 + i) for i, effects in enumerate(((), TRUE, WRONG))]
+    scores = {(): 0.0, TRUE: 500.0, WRONG: 500.0 + lead}
+    monkeypatch.setattr(rules, "_score", lambda c, _: scores[c.hypothesis.effects])
+    monkeypatch.setattr(rules, "judge_chance", lambda *_: 0.0)
+    monkeypatch.setattr(
+        rules, "_find_objection", lambda c, *_: objection if c.hypothesis.effects == WRONG else ""
+    )
+    monkeypatch.setattr(rules, "is_felt_alike", lambda *_: alike)
+    verdict = rules.judge_candidates(found, observed, np.random.default_rng(0))
+    assert verdict.word == word
+    assert verdict.best.effects == (WRONG if word == "unexplained" else TRUE)
+    if word != "unexplained":
+        assert [one.effects for one in verdict.rivals] == ([WRONG] if word == "ambiguous" else [])
+
+
 @pytest.mark.parametrize(("alike", "rivals"), [(True, []), (False, ["same", "other"])])
 def test_what_says_the_same_counts_for_the_best(alike, rivals, monkeypatch):
     found = judge(seen(TRUE, 1), ((), TRUE, WRONG), 1)
