@@ -260,12 +260,14 @@ def _assemble(
     simulated_s: float,
 ) -> Estimate:
     """Equations (15) and (20) applied to every place of the posterior."""
+    b_t = _uncertain(total_deg, weight)
     return Estimate(
         unit=unit.name,
         contribution_ratio=_uncertain(ratios, weight),
         b1_deg=_uncertain(ratios * total_deg * unit.output_ratio, weight),
         b2_deg=_uncertain((1.0 - ratios) * total_deg, weight),
-        b_t_deg=_uncertain(total_deg, weight),
+        # A total that was taken from the unit's file has no interval to be told.
+        b_t_deg=b_t if b_t.std else replace(b_t, interval95=None),
         curve=curve,
         warnings=warnings,
         simulated_s=simulated_s,
@@ -275,11 +277,12 @@ def _assemble(
 def _uncertain(values: NDArray[np.float64], weight: NDArray[np.float64]) -> Uncertain:
     """Mean, standard deviation and central 95 % interval of a weighted grid.
 
-    A number that is the same everywhere is known: no interval, and no rounding
-    of weights that add up to one but for the last digit.
+    A number that is the same everywhere is known, without the rounding of weights
+    that add up to one but for the last digit.
     """
     if np.ptp(values) == 0.0:
-        return Uncertain(float(values[0]), 0.0)
+        value = float(values[0])
+        return Uncertain(value, 0.0, (value, value))
     mean = float(weight @ values)
     std = float(np.sqrt(weight @ (values - mean) ** 2))
     order = np.argsort(values, kind="stable")

@@ -23,7 +23,7 @@ from analysis.screening import (
     screen_pairs,
 )
 
-__all__ = ["look_at_felt", "search_pairs", "start_at"]
+__all__ = ["look_at_felt", "search_pairs"]
 
 _PAIRS, _PARTNERS, _GLANCE_FREQUENCIES, _GLANCE_GROUPS = 20, 10, 10, 2
 _CLOSER, _AFTER, _GROUPS = 10, 5, (2, 3)
@@ -78,7 +78,7 @@ def look_at_felt(rough: Hunt, places: Mapping[Effects, Place]) -> None:
         rough.look_closer(list(places), groups)
 
 
-def start_at(hunt: Hunt, places: Mapping[Effects, Place], groups: int) -> None:
+def _start_at(hunt: Hunt, places: Mapping[Effects, Place], groups: int) -> None:
     """Simulate hypotheses at their places, and at another ratio where that may be as good."""
     hunt.start({key: one.place for key, one in places.items()}, groups)
     hunt.start({k: one.other for k, one in places.items() if one.other is not None}, groups)
@@ -136,5 +136,5 @@ def _look_beside(rough: Hunt, additions: Additions, kept: Starts) -> set[Effects
 def _glance(rough: Hunt, places: dict[Effects, Place], most: int) -> list[Candidate]:
     """The most likely of some pairs by a few runs at few frequencies."""
     few = rough.thinned(coarse_stride(rough.observation, _GLANCE_FREQUENCIES))
-    start_at(few, places, _GLANCE_GROUPS)
+    _start_at(few, places, _GLANCE_GROUPS)
     return [few.found[key] for key in few.leading(most)]

@@ -28,6 +28,7 @@ def test_the_play_is_found_though_the_file_says_another(measured):
     assert b_t["std"] < 0.03
     assert found["b1_deg"] == b_t
     assert (found["b2_deg"]["value"], found["contribution_ratio"]["value"]) == (0.0, 1.0)
+    assert found["contribution_ratio"]["interval95"] == [1.0, 1.0]
     assert stage_to_adjust(found).startswith("There is one gear stage")
     assert len(limit_lines(found, ONE)) == 1
     assert "No limits are set" in stage_actions(found, ONE)[0]
