@@ -88,8 +88,9 @@ def test_sweeps_of_one_unit_stand_together_by_level_each_with_its_own_plan():
     assert [(b.start, b.stop) for b in seen.levels] == [(0, 5), (5, 12)]
     plans = [(p.levels_vpk, p.direction, p.dc_offset_v, p.integrate_cycles) for p, _ in seen.plans]
     # A response that does not say how long it averaged is taken to have done so for 30 cycles.
+    # They stand as they were given, though their rows do not.
     assert plans == [
-        ((1.5, 2.5), "down", 0.0, 9), ((1.5,), "down", 0.0, 30), ((2.5,), "up", 1.0, 9)
+        ((1.5, 2.5), "down", 0.0, 9), ((2.5,), "up", 1.0, 9), ((1.5,), "down", 0.0, 30)
     ]  # fmt: skip
     for one in (first, second, third):
         alone = observe(one)
