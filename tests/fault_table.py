@@ -117,11 +117,14 @@ def rows(outcomes: dict[tuple[str, str], Outcome]) -> list[str]:
         "| fault | what it is | on raw TCP | through an adapter | ends within |",
         "| --- | --- | --- | --- | --- |",
     ]
-    for name, kind in CATALOGUE.items():
-        cells = [str(outcomes[name, wire]) for wire in WIRES]
-        bound = DEADLINES_S.get(name, DEADLINE_S)
-        lines.append(f"| `{name}` | {kind.does} | {' | '.join(cells)} | {bound} s |")
-    return lines
+    return [*lines, *(row_of(name, outcomes) for name in CATALOGUE)]
+
+
+def row_of(name: str, outcomes: dict[tuple[str, str], Outcome]) -> str:
+    """The row of one fault."""
+    cells = [str(outcomes[name, wire]) for wire in WIRES]
+    bound = DEADLINES_S.get(name, DEADLINE_S)
+    return f"| `{name}` | {CATALOGUE[name].does} | {' | '.join(cells)} | {bound} s |"
 
 
 def written_rows() -> list[str]:
