@@ -78,12 +78,6 @@ def look_at_felt(rough: Hunt, places: Mapping[Effects, Place]) -> None:
         rough.look_closer(list(places), groups)
 
 
-def _start_at(hunt: Hunt, places: Mapping[Effects, Place], groups: int) -> None:
-    """Simulate hypotheses at their places, and at another ratio where that may be as good."""
-    hunt.start({key: one.place for key, one in places.items()}, groups)
-    hunt.start({k: one.other for k, one in places.items() if one.other is not None}, groups)
-
-
 def _hold_against_neighbours(
     rough: Hunt, atlas: Atlas, additions: Additions, looked_at: set[Effects]
 ) -> None:
@@ -136,5 +130,8 @@ def _look_beside(rough: Hunt, additions: Additions, kept: Starts) -> set[Effects
 def _glance(rough: Hunt, places: dict[Effects, Place], most: int) -> list[Candidate]:
     """The most likely of some pairs by a few runs at few frequencies."""
     few = rough.thinned(coarse_stride(rough.observation, _GLANCE_FREQUENCIES))
-    _start_at(few, places, _GLANCE_GROUPS)
+    few.start({key: one.place for key, one in places.items()}, _GLANCE_GROUPS)
+    # Adding up decides between two ratios by chance (docs/decisions/0033).
+    others = {key: one.other for key, one in places.items() if one.other is not None}
+    few.start(others, _GLANCE_GROUPS)
     return [few.found[key] for key in few.leading(most)]
