@@ -26,9 +26,6 @@ from sim.unit import Unit
 
 __all__ = ["Hypothesis", "every_single_cause"]
 
-_TOLERANCE = 0.015
-"""Three standard deviations of a datasheet value."""
-
 _LEAST_SHARE = 0.01
 """Ranges that begin at zero begin here instead, as a share of their end, so that logs exist."""
 
@@ -119,8 +116,10 @@ class Hypothesis:
         """Whether each parameter is a datasheet value (or a factor on some) hardly off it."""
         nominal = [parameter.nominal(self.unit) for _, parameter in self.parameters]
         return [
-            known is not None and abs(value / known - 1.0) < _TOLERANCE
-            for known, value in zip(nominal, self.values(place), strict=True)
+            known is not None and abs(value / known - 1.0) < parameter.tolerance
+            for (_, parameter), known, value in zip(
+                self.parameters, nominal, self.values(place), strict=True
+            )
         ]
 
     def brought_within_tolerance(self, place: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
@@ -128,7 +127,7 @@ class Hypothesis:
         for at, (_, parameter) in enumerate(self.parameters):
             if (known := parameter.nominal(self.unit)) is not None:
                 values = self.values(place)
-                values[at] = known * (1.0 + np.sign(values[at] - known) * _TOLERANCE)
+                values[at] = known * (1.0 + np.sign(values[at] - known) * parameter.tolerance)
                 yield self.place(place[0], list(values))
 
     @property

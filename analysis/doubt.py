@@ -37,8 +37,12 @@ _CLOSER_LOOKS = 2
 _TOO_FAR, _GROUPS = 200.0, 4
 """Log-likelihood by which it is far ahead, and in how many groups of runs each of these is."""
 
-_REFUSED = 4.0
-"""Misfit or structure of a leader that is refused (`analysis.verdict`), not only doubted."""
+_REFUSED, _MISSED = 4.0, 2.0
+"""Misfit or structure of a leader that is refused (`analysis.verdict`), not only doubted, and what
+it misses of levels not fitted, however much more is spent on it."""
+
+_REFUSED_NOW, _MISSED_NOW = 2.5, 1.5
+"""The same of one that would be refused as it is: more runs may still decide either way."""
 
 _COMMON = 0.2
 """Share of the baseline's own runs that the leader explains better by as much, from which on there
@@ -96,4 +100,6 @@ def is_given_up(fine: Hunt, rng: np.random.Generator) -> bool:
 
     One that may be is looked at for as long as it takes: it might be named.
     """
-    return fine.purse.is_spent and is_doubtful(fine.best, rng, unlike=_REFUSED)
+    if fine.purse.is_overdrawn:
+        return is_doubtful(fine.best, rng, _MISSED_NOW, _REFUSED_NOW)
+    return fine.purse.is_spent and is_doubtful(fine.best, rng, _MISSED, _REFUSED)

@@ -41,8 +41,9 @@ beside a cause of the leading pair; true ones lay up to 75 behind. In how many g
 looked at, and how far about their places, which are known well: what sizes further off do would
 have to be told apart by too few runs, and ranked them by chance."""
 
-_BESIDE_CLOSER, _BESIDE_ROUNDS = 4, 2
-"""How many beside each cause are looked at closer, and how often, where one takes the lead."""
+_BESIDE_CLOSER, _STRANGER = 4, 60.0
+"""How many beside each cause are looked at closer, and the log-likelihood behind the leading pair
+within which the causes of one that shares none with it are tried, too."""
 
 
 def search_pairs(rough: Hunt, atlas: Atlas) -> None:
@@ -81,20 +82,28 @@ def look_at_felt(rough: Hunt, places: Mapping[Effects, Place]) -> None:
 def _hold_against_neighbours(
     rough: Hunt, atlas: Atlas, additions: Additions, looked_at: set[Effects]
 ) -> None:
-    """Look at others with a cause of the leading pair: true pairs nearly all share one with it."""
-    before: Effects = ()
+    """Look at others with a cause of the leading pair: true pairs nearly all share one with it.
+
+    Where one that shares none is close behind, at others with a cause of that one, too.
+    """
     leader = rough.among(looked_at)[0]
-    for _ in range(_BESIDE_ROUNDS):
-        _look_at_parts(rough, leader)
-        if additions.coarse is not rough.observation:
-            # Another reading noise was heard since.
-            additions = add_causes(rough.unit, rough.observation, atlas)
-        fresh = {k: p for k, p in _kept(rough, leader).items() if not set(k) & set(before)}
-        looked_at = looked_at | _look_beside(rough, additions, fresh)
-        before, leader = leader, rough.among(looked_at)[0]
-        if leader == before:
-            return
-    _look_at_parts(rough, leader)
+    held = [leader, *_close_stranger(rough, leader, looked_at)]
+    for pair in held:
+        _look_at_parts(rough, pair)
+    if additions.coarse is not rough.observation:
+        # Another reading noise was heard since.
+        additions = add_causes(rough.unit, rough.observation, atlas)
+    kept = {part: place for pair in held for part, place in _kept(rough, pair).items()}
+    now = rough.among(looked_at | _look_beside(rough, additions, kept))[0]
+    if now not in held:
+        _look_at_parts(rough, now)
+
+
+def _close_stranger(rough: Hunt, leader: Effects, looked_at: set[Effects]) -> list[Effects]:
+    """The likeliest pair that shares no cause with the leader, if it is not far behind."""
+    strangers = [key for key in rough.among(looked_at) if not set(key) & set(leader)]
+    least = rough.found[leader].best.log_likelihood - _STRANGER
+    return [key for key in strangers[:1] if rough.found[key].best.log_likelihood > least]
 
 
 def _kept(rough: Hunt, leader: Effects) -> Starts:

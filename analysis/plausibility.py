@@ -1,15 +1,16 @@
-"""Whether a size is where no bench has it, or where every bench does: then the cause is another.
+"""Whether a size is where no bench has it, where every bench does, or where none could see it.
 
-Owns what "at the end of a plausible range" and "within its tolerance" mean. It
-simulates nothing and passes no verdict.
+Owns what "at the end of a plausible range", "within its tolerance" and "out of sight" mean:
+the cause is another then. It simulates nothing and passes no verdict.
 """
 
 from __future__ import annotations
 
 from analysis.candidate import Candidate
 from analysis.likelihood import HEAT
+from sim.catalogue import CATALOGUE
 
-__all__ = ["EDGE", "is_pressed", "may_be_within_tolerance"]
+__all__ = ["EDGE", "is_out_of_sight", "is_pressed", "may_be_within_tolerance"]
 
 EDGE = 0.02
 """How near its end, as a share of its range, a size is at the end."""
@@ -22,6 +23,11 @@ _TOWARDS, _AS_GOOD = 0.15, 2.0 * HEAT
 """How near to an end of its range a datasheet value is that may as well be there, half or twice of
 what it should be, and the log-likelihood by which the end must be worse (two standard
 deviations). A shaft that hardens is taken for one that is twice as stiff, or more."""
+
+
+_IN_SIGHT = 2.0
+"""By what factor a resonance may lie outside the frequencies that were measured, and its shape tell
+it from a load or a brake: one found at 22 Hz, below a band from 100, was a brake, withheld."""
 
 
 def is_pressed(candidate: Candidate) -> bool:
@@ -37,6 +43,17 @@ def is_pressed(candidate: Candidate) -> bool:
         if amid and off < _TOWARDS and fit(beyond).log_likelihood > best.log_likelihood - _AS_GOOD:
             return True
     return False
+
+
+def is_out_of_sight(candidate: Candidate) -> bool:
+    """Whether what it is told by is a resonance far outside all that was measured."""
+    hypothesis, measured = candidate.hypothesis, candidate.surface.observation.frequency_hz
+    low, high = measured.min() / _IN_SIGHT, measured.max() * _IN_SIGHT
+    values = zip(hypothesis.parameters, hypothesis.values(candidate.best.place), strict=True)
+    return any(
+        CATALOGUE[effect].resonance == parameter.name and not low < value < high
+        for (effect, parameter), value in values
+    )
 
 
 def may_be_within_tolerance(candidate: Candidate) -> bool:

@@ -14,27 +14,40 @@ from sim.effort import Effort
 
 __all__ = ["Purse"]
 
-_SWEEPS, _LEAST_S = 1900, 290_000.0
+_SWEEPS, _LEAST_S = 1500, 230_000.0
 """Machines that may be taken through a sweep, and what any measurement may take: about as much as
-the usual sweep of an EDSS, three levels of 61 points, or three and a half minutes of one core. What
+the usual sweep of an EDSS, three levels of 61 points, or two and a half minutes of one core. What
 has few rows is looked at on all of them from the beginning, and needs no fewer machines. A load
-with a payload, hidden there, took 326,000 s in all, and led from 222,000 on."""
+with a payload, hidden there, took 296,000 s in all, and its payload led from 150,000 on."""
+
+_OVERDRAFT = 1.25
+"""How many times as much may be spent while the leader might still become an explanation."""
 
 
 @dataclass(frozen=True, slots=True)
 class Purse:
-    """What may be spent, and what is: motion in s, so that no clock decides what a search finds."""
+    """What may be spent, and what is: motion in s, so that no clock decides what a search finds.
+
+    `allowed_s`, `most_s`: how much, and with the overdraft.
+    """
 
     effort: Effort = field(default_factory=Effort)
     allowed_s: float = math.inf
+    most_s: float = math.inf
 
     @classmethod
     def for_observation(cls, observation: Observation, effort: Effort) -> Purse:
         """The purse of a measurement, out of what `effort` counts from now on."""
         sweep_s = sum(plan.duration_s for plan, _ in observation.plans)
-        return cls(effort, effort.simulated_s + max(_SWEEPS * sweep_s, _LEAST_S))
+        so_far, granted = effort.simulated_s, max(_SWEEPS * sweep_s, _LEAST_S)
+        return cls(effort, so_far + granted, so_far + _OVERDRAFT * granted)
 
     @property
     def is_spent(self) -> bool:
         """Whether as much was simulated as may be."""
         return self.effort.simulated_s > self.allowed_s
+
+    @property
+    def is_overdrawn(self) -> bool:
+        """Whether the overdraft is spent, too."""
+        return self.effort.simulated_s > self.most_s

@@ -23,6 +23,7 @@ from analysis.contest import (
     HOPELESS,
     LAST_GROUPS,
     TOO_FAR,
+    back_who_predicts,
     catch_up,
     compare,
     give_chances,
@@ -153,6 +154,7 @@ def search_causes(
                 _hold_rare(rough, fine, _without(without, rare), rng)
 
             for step in (
+                lambda: back_who_predicts(fine, rng),
                 lambda: look_at_every_ratio(fine),
                 lambda: see_it_predict(fine),
                 lambda: weigh_parts(fine),

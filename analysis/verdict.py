@@ -20,7 +20,7 @@ from analysis.holdout import AT_NOISE, HeldOut, hold_out
 from analysis.likelihood import HEAT
 from analysis.likeness import is_felt_alike
 from analysis.observation import Observation
-from analysis.plausibility import EDGE, is_pressed, may_be_within_tolerance
+from analysis.plausibility import EDGE, is_out_of_sight, is_pressed, may_be_within_tolerance
 
 __all__ = ["Judged", "Verdict", "judge_candidates"]
 
@@ -250,6 +250,8 @@ def _find_objection(
         return "leaves structure that its own runs do not"
     if is_pressed(candidate):
         return "wants a size that no bench has"
+    if is_out_of_sight(candidate):
+        return "resonates where nothing was measured"
     predicted = missed <= (_WELL_PREDICTED if several else _UNPREDICTED)
     if not predicted and (
         missed > (_UNPREDICTED if several else _NEVER)

@@ -274,6 +274,7 @@ _ALL = (
         "tap what is mounted, with an accelerometer on it; take it off and measure again",
         on_drivetrain=_add_payload,
         added_inertia=_payload_felt,
+        resonance="f_p",
     ),
     Effect(
         "amplifier-gain",
@@ -331,7 +332,8 @@ _ALL = (
     ),
     Effect(
         "filter-corner",
-        (_P("scale", "1", span(0.5, 2.0), (1e-6, math.inf)),),
+        # A corner is as good as the capacitors that make it.
+        (_P("scale", "1", span(0.5, 2.0), (1e-6, math.inf), 0.05),),
         "chain",
         "The corner frequency of the tachometer's filter is off.",
         "a filter part of another value, or drift of it",

@@ -23,13 +23,15 @@ class EffectParameter:
     """One physical parameter of an effect.
 
     `range` gives the plausible span for a unit, in `unit_symbol`; values
-    outside `allowed` have no physical meaning and are refused.
+    outside `allowed` have no physical meaning and are refused. `tolerance`: the share by
+    which what the datasheet knows may be off in a healthy unit, three standard deviations.
     """
 
     name: str
     unit_symbol: str
     range: Callable[[Unit], tuple[float, float]]
     allowed: tuple[float, float] = (0.0, math.inf)
+    tolerance: float = 0.015
 
     def nominal(self, unit: Unit) -> float | None:
         """What a unit without the effect has: its datasheet's value, or 1 of a factor on some.
@@ -48,8 +50,9 @@ class Effect:
     Exactly one of `on_unit` and `on_drivetrain` is given. `added_inertia`, of
     what is linear and acts on the load alone: by how much the load is felt to
     have more inertia at an angular frequency (rad/s), kg.m^2, complex where it
-    brakes or swings. `rare`: nobody would suspect it first, so that it is looked
-    for last, and alone.
+    brakes or swings. `resonance`: the parameter that is the frequency in Hz at which it
+    does, empty where there is none. `rare`: nobody would suspect it first, so that it is
+    looked for last, and alone.
     """
 
     id: str
@@ -61,6 +64,7 @@ class Effect:
     on_unit: Callable[[Unit, Mapping[str, float]], Unit] | None = None
     on_drivetrain: Callable[[Drivetrain, Unit, Mapping[str, float]], Drivetrain] | None = None
     added_inertia: Callable[[Unit, Mapping[str, Any], Any], Any] | None = None
+    resonance: str = ""
     rare: bool = False
 
 

@@ -62,12 +62,17 @@ def test_a_doubted_leader_far_ahead_gets_more_runs_before_pairs_are_looked_at(
 
 
 @pytest.mark.parametrize(
-    ("misfit", "structure", "missed", "hopeless"),
-    [(4.1, 0.0, 1.0, True), (0.0, 4.1, 1.0, True), (0.0, 0.0, 2.1, True), (3.9, 3.9, 1.9, False)],
-)
+    ("misfit", "structure", "missed", "hopeless", "refused"),
+    [
+        (4.1, 0.0, 1.0, True, True), (0.0, 4.1, 1.0, True, True), (0.0, 0.0, 2.1, True, True),
+        (3.9, 3.9, 1.9, False, True), (2.6, 0.0, 1.0, False, True), (0.0, 0.0, 1.6, False, True),
+        (2.4, 2.4, 1.4, False, False),
+    ],
+)  # fmt: skip
 def test_a_leader_that_may_explain_is_looked_at_whatever_was_spent(
-    monkeypatch, misfit, structure, missed, hopeless
+    monkeypatch, misfit, structure, missed, hopeless, refused
 ):
+    """One that may yet come to explain, for a quarter more; one that does, to the end."""
     fitted = SimpleNamespace(sigma=misfit, structure=structure)
     monkeypatch.setattr(doubt, "judge_adequacy", lambda *_: fitted)
     monkeypatch.setattr(doubt, "hold_out", lambda *_: SimpleNamespace(rms_sigma=missed))
@@ -78,6 +83,10 @@ def test_a_leader_that_may_explain_is_looked_at_whatever_was_spent(
     assert not doubt.is_given_up(fine, None)
     effort.add(1.0)
     assert doubt.is_given_up(fine, None) is hopeless
+    effort.add(0.25 * 230_000.0 - 2.0)
+    assert doubt.is_given_up(fine, None) is hopeless
+    effort.add(2.0)
+    assert doubt.is_given_up(fine, None) is refused
 
 
 def swept(duration_s):
@@ -90,8 +99,8 @@ def test_a_purse_grows_with_the_sweep_and_holds_what_comes_after_it():
     with counting() as effort:
         spend(5e5)
         quick, usual, slow = (Purse.for_observation(swept(s), effort) for s in (1.0, 70.0, 700.0))
-        assert quick.allowed_s == usual.allowed_s > 5e5 + 1900 * 70.0
-        assert slow.allowed_s == pytest.approx(5e5 + 1900 * 700.0)
+        assert quick.allowed_s == usual.allowed_s > 5e5 + 1500 * 70.0
+        assert slow.allowed_s == pytest.approx(5e5 + 1500 * 700.0)
         spend(usual.allowed_s - 5e5 + 1.0)
         assert usual.is_spent
         assert not slow.is_spent

@@ -8,7 +8,7 @@ from synthetic import ADSS
 
 from analysis import verdict as rules
 from analysis.causes import Hypothesis
-from analysis.plausibility import is_pressed, may_be_within_tolerance
+from analysis.plausibility import is_out_of_sight, is_pressed, may_be_within_tolerance
 
 TRUE = ("load-inertia",)
 PAIR = ("amplifier-gain", "cable-stiffness")
@@ -63,6 +63,39 @@ def test_one_of_several_causes_may_not_be_as_well_within_its_tolerance(effects, 
 @pytest.mark.parametrize("effects", [PAIR, ("amplifier-gain",)])
 def test_nor_may_any_cause_lie_within_it(effects):
     assert may_be_within_tolerance(off_by(effects, 0.014, 1e6))
+
+
+@pytest.mark.parametrize(
+    ("effect", "off", "within"),
+    [
+        ("filter-corner", 0.028, True), ("filter-corner", -0.049, True),
+        ("filter-corner", 0.051, False), ("amplifier-gain", 0.028, False),
+    ],
+)  # fmt: skip
+def test_a_corner_is_as_good_as_its_capacitors(effect, off, within):
+    assert may_be_within_tolerance(off_by((effect,), off, 1e6)) is within
+
+
+@pytest.mark.parametrize(
+    ("resonance_hz", "beyond"),
+    [(22.0, True), (49.0, True), (51.0, False), (130.0, False), (359.0, False), (361.0, True)],
+)
+@pytest.mark.parametrize("beside", [(), ("amplifier-lag",), ("load-inertia",)])
+def test_a_resonance_far_outside_what_was_measured_is_out_of_sight(beside, resonance_hz, beyond):
+    hypothesis = Hypothesis(ADSS, tuple(sorted((*beside, "payload-flexibility"))))
+    sizes = {"J_p": 5e-4, "f_p": resonance_hz, "zeta_p": 0.03, "tau_a": 3e-4, "J_L": 3e-3}
+    values = [sizes[parameter.name] for _, parameter in hypothesis.parameters]
+    best = SimpleNamespace(place=hypothesis.place(0.4, values))
+    measured = SimpleNamespace(frequency_hz=np.linspace(100.0, 180.0, 61))
+    surface = SimpleNamespace(observation=measured)
+    one = SimpleNamespace(hypothesis=hypothesis, best=best, surface=surface)
+    assert is_out_of_sight(one) is beyond
+
+
+def test_what_has_no_resonance_is_never_out_of_sight():
+    one = off_by(PAIR, 0.2, 0.0)
+    one.surface.observation = SimpleNamespace(frequency_hz=np.array([1e4, 2e4]))
+    assert not is_out_of_sight(one)
 
 
 def test_what_no_datasheet_knows_has_no_tolerance():

@@ -179,6 +179,59 @@ def test_a_leader_that_predicts_badly_gets_more_runs(monkeypatch, causes, missed
 
 
 @pytest.mark.parametrize(
+    ("doubted", "missed", "runs", "rounds", "leads"),
+    [
+        # It takes the lead with more runs, and is in no doubt.
+        (True, 0.78, 80, 1, True),
+        # It gets as many as the leader has, or three rounds.
+        (True, 0.78, 100, 1, False), (True, 0.78, 40, 2, False), (True, 0.78, 0, 3, False),
+        (False, 0.78, 80, 0, False), (True, 1.2, 80, 0, False), (True, 0.78, 120, 0, False),
+    ],
+)  # fmt: skip
+def test_who_predicts_better_than_a_doubted_leader_is_backed(
+    monkeypatch, doubted, missed, runs, rounds, leads
+):
+    leader, other, settled = ("load-inertia",), ("payload-flexibility",), []
+
+    def standing(effects, count):
+        hypothesis = Hypothesis(ADSS, effects)
+        return SimpleNamespace(hypothesis=hypothesis, population=range(count))
+
+    found = {leader: standing(leader, 120), other: standing(other, runs), (): standing((), 40)}
+
+    class Fine:
+        """One whose second takes the lead with more runs, or does not."""
+
+        observation = None
+        found = property(lambda _: found)
+        best = property(lambda _: found[other if settled and leads else leader])
+
+        def leading(self, most, behind):
+            assert behind == contest.HOPELESS
+            return [leader, other, ()]
+
+        def settle(self, chosen, groups):
+            settled.append(chosen)
+            for key in chosen:
+                found[key] = standing(key, len(found[key].population) + 40)
+
+        def hear(self):
+            pass
+
+    monkeypatch.setattr(
+        contest, "is_doubtful", lambda one, _: doubted and one.hypothesis.effects == leader
+    )
+    sigma = {leader: 1.37, other: missed, (): 0.1}
+    monkeypatch.setattr(
+        contest,
+        "hold_out",
+        lambda one, _: SimpleNamespace(rms_sigma=sigma[one.hypothesis.effects]),
+    )
+    contest.back_who_predicts(Fine(), None)
+    assert settled == [[other]] * rounds
+
+
+@pytest.mark.parametrize(
     ("leader", "missed", "moved", "looked", "settled"),
     [
         (("load-inertia",), 1.1, 0.11, 1, 1), (("load-inertia",), 1.1, -0.09, 1, 0),
@@ -216,16 +269,22 @@ def test_a_leader_that_predicts_worse_than_true_causes_is_looked_at_over_all_rat
     assert calls == ["start"] * looked + ["settle"] * settled
 
 
-@pytest.mark.parametrize(("gap", "rounds"), [(50.0, 4), (199.0, 4), (201.0, 1)])
-def test_a_pair_is_compared_with_its_parts_in_every_round(monkeypatch, gap, rounds):
+@pytest.mark.parametrize(
+    ("gap", "spent", "rounds"),
+    [(50.0, False, 4), (199.0, False, 4), (201.0, False, 1), (50.0, True, 1)],
+)
+def test_a_pair_is_compared_with_its_parts_in_every_round(monkeypatch, gap, spent, rounds):
+    """As long as there is motion to be spent on it."""
     pair, part, settled = ("amplifier-lag", "load-inertia"), ("load-inertia",), []
     standing = {pair: 300.0, part: 300.0 - gap, (): 0.0}
 
     def leading(most, behind):
         return [key for key in list(standing)[:most] if standing[key] >= 300.0 - behind]
 
-    fine = SimpleNamespace(found=standing, leading=leading, hear=lambda: None, purse=Purse())
+    purse = SimpleNamespace(is_spent=spent)
+    fine = SimpleNamespace(found=standing, leading=leading, hear=lambda: None, purse=purse)
     monkeypatch.setattr(contest, "is_nothing_missing", lambda *_: False)
+    monkeypatch.setattr(contest, "is_given_up", lambda *_: False)
     monkeypatch.setattr(contest, "is_pressed", lambda _: False)
     monkeypatch.setattr(contest, "is_felt_alike", lambda *_: False)
     monkeypatch.setattr(contest, "settle", lambda _, chosen: settled.append(chosen))
