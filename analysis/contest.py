@@ -144,8 +144,6 @@ def back_who_predicts(fine: Hunt, rng: np.random.Generator) -> None:
     """
     for _ in range(_ROUNDS_BACKED):
         leader = fine.best
-        if not leader.hypothesis.effects or not is_doubtful(leader, rng):
-            break
         missed = hold_out(leader, fine.observation).rms_sigma
         backed = [
             key
@@ -154,7 +152,8 @@ def back_who_predicts(fine: Hunt, rng: np.random.Generator) -> None:
             and len(fine.found[key].population) < len(leader.population)
             and hold_out(fine.found[key], fine.observation).rms_sigma < _BETTER * missed
         ]
-        if not backed:
+        # Chance of its own: where nothing is backed all comes out as if it had not been asked.
+        if not leader.hypothesis.effects or not backed or not is_doubtful(leader, rng.spawn(1)[0]):
             break
         settle(fine, backed[:_BACKED])
         fine.hear()

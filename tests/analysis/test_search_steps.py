@@ -227,8 +227,10 @@ def test_who_predicts_better_than_a_doubted_leader_is_backed(
         "hold_out",
         lambda one, _: SimpleNamespace(rms_sigma=sigma[one.hypothesis.effects]),
     )
-    contest.back_who_predicts(Fine(), None)
+    rng = np.random.default_rng(1)
+    contest.back_who_predicts(Fine(), rng)
     assert settled == [[other]] * rounds
+    assert rng.random() == np.random.default_rng(1).random()
 
 
 @pytest.mark.parametrize(
