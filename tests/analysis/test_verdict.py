@@ -201,7 +201,9 @@ def test_what_says_the_same_counts_for_the_best(alike, rivals, monkeypatch):
     [(1.0, 400.0, True), (1.0, 200.0, False), (0.97, 400.0, False), (0.0, -400.0, True),
      (0.01, -400.0, True), (0.03, -400.0, False), (0.5, 400.0, False)],
 )  # fmt: skip
-def test_a_size_that_wants_to_be_beyond_its_range_is_no_explanation(size, steep, pressed):
+def test_a_size_that_wants_to_be_beyond_its_range_is_no_explanation(
+    monkeypatch, size, steep, pressed
+):
     def fit(place):
         # Falls off inwards by the heat of 15 within 0.05, or by less.
         return SimpleNamespace(place=place, log_likelihood=steep * place[1])
@@ -214,8 +216,10 @@ def test_a_size_that_wants_to_be_beyond_its_range_is_no_explanation(size, steep,
     )
     assert is_pressed(one) is pressed
     held_out = SimpleNamespace(rms_sigma=1.0)
-    against = rules._find_objection(one, held_out, FITS, np.random.default_rng(0))
-    assert against == ("wants a size that no bench has" if pressed else "")
+    for hidden, otherwise in ((False, ""), (True, "resonates where nothing was measured")):
+        monkeypatch.setattr(rules, "is_out_of_sight", lambda _, hidden=hidden: hidden)
+        against = rules._find_objection(one, held_out, FITS, np.random.default_rng(0))
+        assert against == ("wants a size that no bench has" if pressed else otherwise)
 
 
 @pytest.mark.parametrize(
@@ -317,6 +321,7 @@ def test_a_second_cause_is_not_named_where_one_does(seed):
 def test_what_misses_other_levels_or_fits_worse_must_have_own_runs_that_do(
     effects, missed, share, adequate, monkeypatch
 ):
+    monkeypatch.setattr(rules, "is_out_of_sight", lambda _: False)
     monkeypatch.setattr(rules, "misses_alike", lambda one, held, least, rng: share > least)
     best = SimpleNamespace(place=np.full(1 + len(effects), 0.5))
     hypothesis = SimpleNamespace(effects=effects, amid=[])
