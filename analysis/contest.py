@@ -144,16 +144,17 @@ def back_who_predicts(fine: Hunt, rng: np.random.Generator) -> None:
     """
     for _ in range(_ROUNDS_BACKED):
         leader = fine.best
-        missed = hold_out(leader, fine.observation).rms_sigma
-        backed = [
+        few = [
             key
             for key in fine.leading(len(fine.found), HOPELESS)[1:]
-            if key
-            and len(fine.found[key].population) < len(leader.population)
-            and hold_out(fine.found[key], fine.observation).rms_sigma < _BETTER * missed
+            if key and len(fine.found[key].population) < len(leader.population)
         ]
+        if not leader.hypothesis.effects or not few:
+            break
+        enough = _BETTER * hold_out(leader, fine.observation).rms_sigma
+        backed = [k for k in few if hold_out(fine.found[k], fine.observation).rms_sigma < enough]
         # Chance of its own: where nothing is backed all comes out as if it had not been asked.
-        if not leader.hypothesis.effects or not backed or not is_doubtful(leader, rng.spawn(1)[0]):
+        if not backed or not is_doubtful(leader, rng.spawn(1)[0]):
             break
         settle(fine, backed[:_BACKED])
         fine.hear()

@@ -41,8 +41,9 @@ _REFUSED, _MISSED = 4.0, 2.0
 """Misfit or structure of a leader that is refused (`analysis.verdict`), not only doubted, and what
 it misses of levels not fitted, however much more is spent on it."""
 
-_REFUSED_NOW, _MISSED_NOW = 2.5, 1.5
-"""The same of one that would be refused as it is: more runs may still decide either way."""
+_STRUCTURED_NOW, _MISSED_NOW = 2.5, 1.5
+"""Structure of one that would be refused as it is, and what several causes then miss: more runs may
+still decide either way."""
 
 _COMMON = 0.2
 """Share of the baseline's own runs that the leader explains better by as much, from which on there
@@ -50,15 +51,19 @@ is nothing to be found, and nothing more is simulated."""
 
 
 def is_doubtful(
-    candidate: Candidate, rng: np.random.Generator, missed: float = _DOUBT, unlike: float = _DOUBT
+    candidate: Candidate,
+    rng: np.random.Generator,
+    missed: float = _DOUBT,
+    unlike: float = _DOUBT,
+    structured: float | None = None,
 ) -> bool:
     """Whether a candidate looks too little like its own runs, or predicts too badly.
 
     `missed`, `unlike`: limits in standard deviations of what it misses of levels not fitted, and of
-    its misfit and the structure that it leaves.
+    its misfit and the structure that it leaves, for which `structured` is another limit if given.
     """
     fitted = judge_adequacy(candidate, rng)
-    if max(fitted.sigma, fitted.structure) > unlike:
+    if fitted.sigma > unlike or fitted.structure > (unlike if structured is None else structured):
         return True
     return hold_out(candidate, candidate.surface.observation).rms_sigma > missed
 
@@ -101,5 +106,6 @@ def is_given_up(fine: Hunt, rng: np.random.Generator) -> bool:
     One that may be is looked at for as long as it takes: it might be named.
     """
     if fine.purse.is_overdrawn:
-        return is_doubtful(fine.best, rng, _MISSED_NOW, _REFUSED_NOW)
+        missed = _MISSED_NOW if len(fine.best.hypothesis.effects) > 1 else _MISSED
+        return is_doubtful(fine.best, rng, missed, _REFUSED, _STRUCTURED_NOW)
     return fine.purse.is_spent and is_doubtful(fine.best, rng, _MISSED, _REFUSED)

@@ -62,21 +62,23 @@ def test_a_doubted_leader_far_ahead_gets_more_runs_before_pairs_are_looked_at(
 
 
 @pytest.mark.parametrize(
-    ("misfit", "structure", "missed", "hopeless", "refused"),
+    ("causes", "misfit", "structure", "missed", "hopeless", "refused"),
     [
-        (4.1, 0.0, 1.0, True, True), (0.0, 4.1, 1.0, True, True), (0.0, 0.0, 2.1, True, True),
-        (3.9, 3.9, 1.9, False, True), (2.6, 0.0, 1.0, False, True), (0.0, 0.0, 1.6, False, True),
-        (2.4, 2.4, 1.4, False, False),
+        (2, 4.1, 0.0, 1.0, True, True), (2, 0.0, 4.1, 1.0, True, True),
+        (2, 0.0, 0.0, 2.1, True, True), (2, 3.9, 3.9, 1.9, False, True),
+        (2, 0.0, 2.6, 1.0, False, True), (2, 0.0, 0.0, 1.6, False, True),
+        (2, 3.9, 2.4, 1.4, False, False), (1, 3.9, 2.4, 1.9, False, False),
     ],
 )  # fmt: skip
 def test_a_leader_that_may_explain_is_looked_at_whatever_was_spent(
-    monkeypatch, misfit, structure, missed, hopeless, refused
+    monkeypatch, causes, misfit, structure, missed, hopeless, refused
 ):
     """One that may yet come to explain, for a quarter more; one that does, to the end."""
     fitted = SimpleNamespace(sigma=misfit, structure=structure)
     monkeypatch.setattr(doubt, "judge_adequacy", lambda *_: fitted)
     monkeypatch.setattr(doubt, "hold_out", lambda *_: SimpleNamespace(rms_sigma=missed))
-    best = SimpleNamespace(surface=SimpleNamespace(observation=None))
+    hypothesis = SimpleNamespace(effects=("a", "b")[:causes])
+    best = SimpleNamespace(surface=SimpleNamespace(observation=None), hypothesis=hypothesis)
     effort = Effort()
     fine = SimpleNamespace(best=best, purse=Purse.for_observation(swept(1.0), effort))
     effort.add(fine.purse.allowed_s)

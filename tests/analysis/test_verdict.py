@@ -9,7 +9,6 @@ from synthetic import BASE, LEVELS, candidate, observation, read, shape
 
 import analysis.verdict as rules
 from analysis import adequacy
-from analysis.adequacy import judge_adequacy
 from analysis.holdout import hold_out
 from analysis.plausibility import is_pressed
 from analysis.verdict import judge_candidates
@@ -339,24 +338,6 @@ def test_what_misses_other_levels_or_fits_worse_must_have_own_runs_that_do(
     assert shaped == "leaves structure that its own runs do not"
 
 
-@pytest.mark.parametrize(
-    ("missed", "share", "alike", "asked"),
-    [(0.1, 0.0, True, 1), (0.1, 0.03, True, 2), (9.0, 0.0, False, 48), (0.1, 1.0, False, 48)],
-)
-def test_own_runs_are_asked_about_other_levels_until_they_decide(
-    missed, share, alike, asked, monkeypatch
-):
-    """Own runs miss other levels by one standard deviation or so: never by 0.1 or 9."""
-    count, held_out = [], adequacy.hold_out_surface
-    monkeypatch.setattr(
-        adequacy, "hold_out_surface", lambda *given: count.append(1) or held_out(*given)
-    )
-    own = candidate(seen(TRUE, 2), TRUE)
-    asks = SimpleNamespace(rms_sigma=missed)
-    assert adequacy.misses_alike(own, asks, share, np.random.default_rng(0)) is alike
-    assert len(count) == asked
-
-
 def test_each_level_is_predicted_by_a_fit_that_has_not_seen_it():
     observed = seen(TRUE, 2)
     spoilt = observed.values.copy()
@@ -368,33 +349,6 @@ def test_each_level_is_predicted_by_a_fit_that_has_not_seen_it():
     moved = other.residual[:2][:, high] - honest.residual[:2][:, high]
     assert np.median(np.abs(moved)) == pytest.approx(0.5, abs=0.1)
     assert 0.7 < honest.rms_sigma < 1.3 < 3.0 < other.rms_sigma
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_an_observation_like_own_runs_is_adequate_and_another_is_not(seed):
-    fitting = seen(TRUE, seed)
-    rng = np.random.default_rng(seed)
-    # Twelve draws of about a standard normal: above 3.5 once in 400 of such tests.
-    assert judge_adequacy(candidate(fitting, TRUE, seed), rng).sigma < 3.5
-    odd = observation(fitting.values + 0.3 * shape(77))
-    assert judge_adequacy(candidate(odd, TRUE, seed), rng).sigma > 4.0
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_misfit_at_the_lowest_level_has_a_credit_and_at_a_higher_one_has_none(seed, monkeypatch):
-    """What is asked is the misfit at all levels, and that at all but the lowest."""
-    asked = []
-    monkeypatch.setattr(adequacy, "credited", lambda *both: asked.append(both) or -7.0)
-    fitting = seen(TRUE, seed)
-    for level in (fitting.blocks[0], fitting.blocks[-1]):
-        odd = fitting.values.copy()
-        odd[:, level] += 0.3 * shape(77)[:, level]
-        rng = np.random.default_rng(seed)
-        assert judge_adequacy(candidate(observation(odd), TRUE, seed), rng).sigma == -7.0
-    (everywhere, above_odd), (_, odd_above) = asked
-    # Of a standard normal, more or less, 3.5 is exceeded once in 4,000 draws.
-    assert above_odd < 3.5 < 4.0 < everywhere
-    assert odd_above > 4.0
 
 
 def test_the_world_of_these_tests_is_not_flat():

@@ -1,0 +1,275 @@
+"""The contest on all rows: who gets more runs, and how many, given how all stand."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import synthetic
+
+from analysis import contest
+from analysis.causes import Hypothesis
+from analysis.placement import groups_about
+from analysis.purse import Purse
+
+ADSS = synthetic.ADSS
+
+
+@pytest.mark.parametrize(
+    ("causes", "missed", "second", "rounds"),
+    [
+        (1, [1.0], 10.0, 0),
+        (1, [1.29], 10.0, 0),
+        (1, [1.6, 1.1], 10.0, 1),
+        (1, [1.6, 1.5, 1.2], 10.0, 2),
+        (1, [1.6] * 4, 10.0, 3),
+        (1, [1.6] * 4, 199.0, 3),
+        (1, [1.6] * 5 + [1.2], 201.0, 5),
+        (1, [1.6] * 9, 201.0, 7),
+        (1, [2.6], 10.0, 0),
+        (2, [0.99], 201.0, 0),
+        (2, [1.1, 1.1, 0.9], 201.0, 2),
+        (3, [1.6, 1.2, 0.9], 10.0, 2),
+        (2, [2.6], 10.0, 0),
+        (0, [1.6], 10.0, 0),
+    ],
+)
+def test_a_leader_that_predicts_badly_gets_more_runs(monkeypatch, causes, missed, second, rounds):
+    settled, left = [], iter(missed)
+    leader = ("amplifier-lag", "load-inertia", "motor-constant")[:causes]
+    best = SimpleNamespace(hypothesis=Hypothesis(ADSS, leader))
+    fine = SimpleNamespace(
+        best=best,
+        found={leader: SimpleNamespace(population=range(40))},
+        observation=None,
+        leading=lambda most, behind: [leader, ()] if second < behind else [leader],
+        settle=lambda chosen, groups: settled.append(chosen),
+        hear=lambda: None,
+    )
+    monkeypatch.setattr(contest, "hold_out", lambda *_: SimpleNamespace(rms_sigma=next(left)))
+    contest.see_it_predict(fine)
+    assert settled == [[leader]] * rounds
+
+
+@pytest.mark.parametrize(
+    ("doubted", "missed", "runs", "rounds", "leads"),
+    [
+        # It takes the lead with more runs, and is in no doubt.
+        (True, 0.78, 80, 1, True),
+        # It gets as many as the leader has, or three rounds.
+        (True, 0.78, 100, 1, False), (True, 0.78, 40, 2, False), (True, 0.78, 0, 3, False),
+        (False, 0.78, 80, 0, False), (True, 1.2, 80, 0, False), (True, 0.78, 120, 0, False),
+    ],
+)  # fmt: skip
+def test_who_predicts_better_than_a_doubted_leader_is_backed(
+    monkeypatch, doubted, missed, runs, rounds, leads
+):
+    leader, other, settled = ("load-inertia",), ("payload-flexibility",), []
+
+    def standing(effects, count):
+        hypothesis = Hypothesis(ADSS, effects)
+        return SimpleNamespace(hypothesis=hypothesis, population=range(count))
+
+    found = {leader: standing(leader, 120), other: standing(other, runs), (): standing((), 40)}
+
+    class Fine:
+        """One whose second takes the lead with more runs, or does not."""
+
+        observation = None
+        found = property(lambda _: found)
+        best = property(lambda _: found[other if settled and leads else leader])
+
+        def leading(self, most, behind):
+            assert behind == contest.HOPELESS
+            return [leader, other, ()]
+
+        def settle(self, chosen, groups):
+            settled.append(chosen)
+            for key in chosen:
+                found[key] = standing(key, len(found[key].population) + 40)
+
+        def hear(self):
+            pass
+
+    monkeypatch.setattr(
+        contest, "is_doubtful", lambda one, _: doubted and one.hypothesis.effects == leader
+    )
+    sigma = {leader: 1.37, other: missed, (): 0.1}
+    monkeypatch.setattr(
+        contest,
+        "hold_out",
+        lambda one, _: SimpleNamespace(rms_sigma=sigma[one.hypothesis.effects]),
+    )
+    rng = np.random.default_rng(1)
+    contest.back_who_predicts(Fine(), rng)
+    assert settled == [[other]] * rounds
+    assert rng.random() == np.random.default_rng(1).random()
+
+
+@pytest.mark.parametrize(
+    ("leader", "missed", "moved", "looked", "settled"),
+    [
+        (("load-inertia",), 1.1, 0.11, 1, 1), (("load-inertia",), 1.1, -0.09, 1, 0),
+        (("load-inertia",), 1.0, 0.5, 0, 0), ((), 2.0, 0.5, 0, 0),
+    ],
+)  # fmt: skip
+def test_a_leader_that_predicts_worse_than_true_causes_is_looked_at_over_all_ratios(
+    monkeypatch, leader, missed, moved, looked, settled
+):
+    calls, place = [], np.array([0.6, 0.5])[: 1 + len(leader)]
+
+    def standing(ratio):
+        best = SimpleNamespace(place=np.array([ratio, *place[1:]]))
+        return SimpleNamespace(hypothesis=Hypothesis(ADSS, leader), best=best)
+
+    def start(places, groups, reach):
+        ((key, at),) = places.items()
+        np.testing.assert_array_equal(at, place)
+        told = Hypothesis(ADSS, key), at, groups, np.random.default_rng(0), reach
+        ratios = np.concatenate([group.ratios for group in groups_about(*told)])
+        # The whole range, whatever it was found at.
+        assert (ratios.min() < 0.1, ratios.max() > 0.9) == (True, True)
+        fine.found[key] = standing(0.6 + moved)
+        calls.append("start")
+
+    fine = SimpleNamespace(
+        best=standing(0.6),
+        found={leader: standing(0.6)},
+        observation=None,
+        start=start,
+        settle=lambda chosen, groups: calls.append("settle"),
+    )
+    monkeypatch.setattr(contest, "hold_out", lambda *_: SimpleNamespace(rms_sigma=missed))
+    contest.look_at_every_ratio(fine)
+    assert calls == ["start"] * looked + ["settle"] * settled
+
+
+@pytest.mark.parametrize(
+    ("gap", "spent", "rounds"),
+    [(50.0, False, 4), (199.0, False, 4), (201.0, False, 1), (50.0, True, 1)],
+)
+def test_a_pair_is_compared_with_its_parts_in_every_round(monkeypatch, gap, spent, rounds):
+    """As long as there is motion to be spent on it."""
+    pair, part, settled = ("amplifier-lag", "load-inertia"), ("load-inertia",), []
+    standing = {pair: 300.0, part: 300.0 - gap, (): 0.0}
+
+    def leading(most, behind):
+        return [key for key in list(standing)[:most] if standing[key] >= 300.0 - behind]
+
+    purse = SimpleNamespace(is_spent=spent)
+    fine = SimpleNamespace(found=standing, leading=leading, hear=lambda: None, purse=purse)
+    monkeypatch.setattr(contest, "is_nothing_missing", lambda *_: False)
+    monkeypatch.setattr(contest, "is_given_up", lambda *_: False)
+    monkeypatch.setattr(contest, "is_pressed", lambda _: False)
+    monkeypatch.setattr(contest, "is_felt_alike", lambda *_: False)
+    monkeypatch.setattr(contest, "settle", lambda _, chosen: settled.append(chosen))
+    assert contest.compare(fine, None)
+    assert settled == ([[pair, part]] if gap < 200.0 else [[pair]]) * rounds
+
+
+@pytest.mark.parametrize(
+    ("pressed", "alike", "rounds"),
+    [
+        ("", "", 4), ("near", "", 2), ("leader", "", 2), ("leader near", "", 4),
+        ("", "leader", 2), ("", "near", 2),
+    ],
+)  # fmt: skip
+def test_who_is_no_rival_is_left_aside_after_two_rounds(monkeypatch, pressed, alike, rounds):
+    """Who wants a size that no bench has, unless all do, or says the same as the leader."""
+    leader, near, settled = ("load-inertia",), ("payload-flexibility",), []
+    found = {leader: "leader", near: "near"}
+    fine = SimpleNamespace(
+        found=found, leading=lambda *_: list(found), hear=lambda: None, purse=Purse()
+    )
+    monkeypatch.setattr(contest, "is_nothing_missing", lambda *_: False)
+    monkeypatch.setattr(contest, "is_pressed", lambda candidate: candidate in pressed)
+    monkeypatch.setattr(contest, "is_felt_alike", lambda one, simpler: simpler == alike)
+    monkeypatch.setattr(contest, "settle", lambda _, chosen: settled.append(chosen))
+    assert contest.compare(fine, None)
+    assert settled == [[leader, near]] * rounds
+
+
+@pytest.mark.parametrize(
+    ("of_leader", "behind", "rounds", "left"),
+    [
+        # The leader's runs, or enough, and no more; none where they show that it is not close.
+        (120, [20.0, 20.0, 20.0], 2, 120), (121, [20.0] * 4, 3, 160), (400, [0.0] * 9, 7, 320),
+        (120, [20.0, 31.0], 1, 80), (120, [31.0], 0, 40), (40, [20.0, 20.0], 0, 40),
+    ],
+)  # fmt: skip
+def test_a_newcomer_that_is_close_gets_as_many_runs_as_the_leader(of_leader, behind, rounds, left):
+    leader, pair, other = ("load-inertia",), ("amplifier-lag", "load-inertia"), ("motor-constant",)
+    runs, settled = {leader: of_leader, pair: 40, other: 40}, []
+
+    class Fine:
+        """One whose newcomer stands elsewhere after each round of runs."""
+
+        found = property(
+            lambda _: {key: SimpleNamespace(population=range(n)) for key, n in runs.items()}
+        )
+
+        def leading(self, most, within):
+            here = behind[min(len(settled), len(behind) - 1)] <= within
+            return [leader, other, *([pair] if here else [])]
+
+        def settle(self, chosen, groups):
+            settled.append(chosen)
+            for key in chosen:
+                runs[key] += 40
+
+    contest.catch_up(Fine(), [pair], leader)
+    assert settled == [[pair]] * rounds
+    assert runs == {leader: of_leader, pair: left, other: 40}
+
+
+def test_who_has_runs_enough_gets_no_more_to_be_compared_by():
+    settled, few, enough = [], ("load-inertia",), ("amplifier-lag",)
+    found = {
+        few: SimpleNamespace(population=range(319)),
+        enough: SimpleNamespace(population=range(320)),
+    }
+    fine = SimpleNamespace(found=found, settle=lambda chosen, groups: settled.append(chosen))
+    contest.settle(fine, [few, enough])
+    contest.settle(fine, [enough])
+    assert settled == [[few]]
+
+
+@pytest.mark.parametrize(
+    ("structures", "runs", "rounds"),
+    [
+        # Where nothing is left, and where it is plain, more runs tell nothing.
+        ([1.0], 80, 0), ([8.0], 80, 0), ([1.8, 0.5], 80, 1), ([1.8, 9.0], 80, 1),
+        ([1.8, 2.4, 3.1, 4.2], 80, 4),
+        # Who has as many as are compared by gets no more.
+        ([], 320, 0), ([1.8], 280, 1),
+    ],
+)  # fmt: skip
+def test_a_leader_that_may_leave_structure_gets_more_runs_with_who_is_close(
+    monkeypatch, structures, runs, rounds
+):
+    leader, close, settled = ("motor-constant",), ("amplifier-gain",), ("motor-resistance",)
+    found = {
+        key: SimpleNamespace(population=[None] * count, hypothesis=SimpleNamespace(effects=key))
+        for key, count in ((leader, runs), (close, 40), (settled, 320))
+    }
+    more = []
+
+    def settle(chosen, groups):
+        more.append(("settle", chosen, groups))
+        for key in chosen:
+            found[key].population += [None] * 40
+
+    fine = SimpleNamespace(
+        found=found,
+        best=found[leader],
+        leading=lambda most, behind: list(found),
+        look_closer=lambda chosen, groups: more.append(("along", chosen, groups)),
+        settle=settle,
+        hear=lambda: more.append("hear"),
+    )
+    monkeypatch.setattr(
+        contest, "judge_adequacy", lambda *_: SimpleNamespace(structure=structures.pop(0))
+    )
+    contest.settle_doubt(fine, None)
+    few = [leader, close]
+    assert more == [("along", few, 2), ("settle", few, 2), "hear"] * rounds
+    assert not structures
