@@ -26,7 +26,7 @@ from analysis.search import search_causes
 from analysis.sharpening import sharpen_candidate
 from analysis.sizing import size_candidate, widen_if_open
 from analysis.swept import check_together
-from analysis.verdict import Judged, Verdict, judge_candidates
+from analysis.verdict import Verdict, judge_candidates
 from daq.errors import AnalysisError
 from daq.frf import FrequencyResponse
 from sim.effort import counting
@@ -113,7 +113,7 @@ def _diagnose(
     observation = candidates[0].surface.observation
     rng = np.random.default_rng(seed)
     verdict = judge_candidates(candidates, observation, rng)
-    named = verdict.best if verdict.word in ("explained", "ambiguous") else None
+    named = verdict.word in ("explained", "ambiguous")
     base = size_candidate(verdict.baseline.candidate, observation, rng)
     best = base
     if verdict.word != "unexplained":
@@ -127,8 +127,8 @@ def _diagnose(
     return Diagnosis(
         unit=unit.name,
         verdict=verdict,
-        causes=() if named is None else _causes(named, best),
-        ratio_baseline=_ratio(base if named is not None else best),
+        causes=_causes(verdict, best) if named else (),
+        ratio_baseline=_ratio(base if named else best),
         ratio_extended=_ratio(best),
         departures=departures,
         left=find_departures(verdict.best.candidate, observation),
@@ -143,8 +143,8 @@ def _ratio(found: Calibrated) -> tuple[float, float]:
     return float(found.mean[0]), float(np.sqrt(found.covariance[0, 0]))
 
 
-def _causes(named: Judged, found: Calibrated) -> tuple[Cause, ...]:
-    hypothesis = named.candidate.hypothesis
+def _causes(verdict: Verdict, found: Calibrated) -> tuple[Cause, ...]:
+    hypothesis = verdict.best.candidate.hypothesis
     values = hypothesis.values(found.mean)
     # Coordinates are logarithms of the values, stretched over their range.
     stretch = hypothesis.logs[:, 1] - hypothesis.logs[:, 0]
@@ -154,7 +154,7 @@ def _causes(named: Judged, found: Calibrated) -> tuple[Cause, ...]:
         known = parameter.nominal(hypothesis.unit)
         size = Size(parameter.name, float(value), float(std), parameter.unit_symbol, known)
         sizes.setdefault(effect, []).append(size)
-    return tuple(Cause(e, tuple(of), named.probability) for e, of in sizes.items())
+    return tuple(Cause(e, tuple(of), verdict.probability) for e, of in sizes.items())
 
 
 def _proposal(

@@ -34,7 +34,7 @@ class Size:
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """One effect of the named set."""
+    """One effect of the named set, with the probability of that set and of what says the same."""
 
     effect: str
     sizes: tuple[Size, ...]
@@ -105,7 +105,11 @@ class Diagnosis:
                 for cause in self.causes
             ],
             "rivals": [
-                {"causes": list(one.effects), "probability": one.probability}
+                {
+                    "causes": list(one.effects),
+                    "probability": one.probability,
+                    "remark": self.verdict.remark(one),
+                }
                 for one in self.verdict.judged
                 if sorted(one.effects) != sorted(cause.effect for cause in self.causes)
             ],
@@ -193,11 +197,21 @@ def _sentence(diagnosis: Diagnosis) -> str:
         return "Nothing beyond tolerance is needed to explain this response."
     if word == "unexplained":
         return "Something is missing that no cause known here explains."
-    if word == "ambiguous":
-        sets = (" with ".join(one.effects) for one in diagnosis.verdict.rivals)
-        rivals = " or ".join(one or "nothing beyond tolerance" for one in sets)
-        return f"{names} ({where}) explains it, but so may {rivals}."
-    return f"{names} ({where}) explains it."
+    explains = f"{names} ({where}) explains it with probability {diagnosis.verdict.probability:.2f}"
+    # What leads and is refused is a rival, and explains nothing.
+    may, leads = (
+        " or ".join(
+            " with ".join(one.effects) or "nothing beyond tolerance"
+            for one in diagnosis.verdict.rivals
+            if one.refused == refused
+        )
+        for refused in (False, True)
+    )
+    if may:
+        explains += f", but so may {may}"
+    if leads:
+        explains += f"; {leads} is likelier, and no explanation"
+    return f"{explains}."
 
 
 def _proposed(proposal: NextMeasurement) -> str:

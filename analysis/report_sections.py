@@ -268,7 +268,8 @@ def _causes(diagnosis: Data) -> Markup:
         )
     parts = [table(rows, ("cause", "where", "size", "probability", "meaning"))]
     rivals = [
-        f"{' + '.join(rival['causes']) or 'nothing hidden'} ({rival['probability']:.2f})"
+        f"{' + '.join(rival['causes']) or 'nothing hidden'} "
+        f"({', '.join(filter(None, [format(rival['probability'], '.2f'), rival.get('remark')]))})"
         for rival in diagnosis["rivals"]
     ]
     parts += [

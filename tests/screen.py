@@ -38,7 +38,8 @@ DIAGNOSIS = {
             "probability": 0.55,
         }
     ],
-    "rivals": [{"causes": ["shaft-stiffness"], "probability": 0.41}],
+    "rivals": [{"causes": ["shaft-stiffness"], "probability": 0.41,
+                "remark": "wants a size that no bench has"}],
     "baseline": {"held_out_rms_sigma": 4.2, "held_out_rms_db": 1.9},
     "extended": {"held_out_rms_sigma": 1.1, "held_out_rms_db": 0.4},
     "gain": {"held_out_rms_ratio": 0.26},

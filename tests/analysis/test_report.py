@@ -162,6 +162,28 @@ def test_sweeps_that_were_taken_together_are_listed_and_departures_say_of_which(
     assert f"  {lines[1]}" in together.summary()
 
 
+@pytest.mark.parametrize(
+    ("against", "said"),
+    [
+        ("", ", but so may shaft-stiffness."),
+        ("leaves structure", "; shaft-stiffness is likelier, and no explanation."),
+    ],
+)
+def test_a_tie_names_what_may_explain_and_what_leads_and_does_not(report, explained, against, said):
+    first, *others = explained.verdict.judged
+    others.sort(key=lambda one: one.effects != ("shaft-stiffness",))
+    score = first.score + 1.0 if against else first.score - 1.0
+    rival = replace(others[0], score=score, probability=0.48, objection=against)
+    judged = tuple(sorted([first, rival, *others[1:]], key=lambda one: -one.score))
+    verdict = replace(explained.verdict, word="ambiguous", judged=judged)
+    tied = replace(explained, verdict=verdict)
+    assert tied.summary()[0].endswith(f"with probability {verdict.probability:.2f}{said}")
+    (told,) = (r for r in tied.to_json()["rivals"] if r["causes"] == ["shaft-stiffness"])
+    assert told == {"causes": ["shaft-stiffness"], "probability": 0.48, "remark": against}
+    _, page = report(diagnosis=tied)
+    assert f"shaft-stiffness (0.48{', ' * bool(against)}{against})" in page.text
+
+
 @pytest.mark.parametrize("given_up", [False, True])
 def test_a_diagnosis_says_that_the_search_was_left(monkeypatch, given_up):
     hidden, judged = ("load-inertia",), [("shaft-stiffness",)]
@@ -203,7 +225,7 @@ def test_a_tie_is_told_with_the_sweep_that_would_break_it(report):
 
     _, page = report(diagnosis=Told())
     assert "may explain the response, and so may others" in page.text
-    assert "Other sets judged: shaft-stiffness (0.41)" in page.text
+    assert "Other sets judged: shaft-stiffness (0.41, wants a size that no bench has)" in page.text
     assert "To tell load-inertia from shaft-stiffness (5.0 sigma expected)" in page.text
     assert "lashbench measure --x" in page.text
 

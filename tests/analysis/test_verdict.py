@@ -185,7 +185,12 @@ def test_what_says_the_same_counts_for_the_best(alike, rivals, monkeypatch):
     (wrong,) = (one for one in found.judged if one.effects == WRONG)
     wrong = replace(wrong, objection="")
     same, other = (
-        replace(wrong, candidate=replace(wrong.candidate), score=found.best.score - behind)
+        replace(
+            wrong,
+            candidate=replace(wrong.candidate),
+            score=found.best.score - behind,
+            probability=np.exp(-behind / 15.0),
+        )
         for behind in (10.0, 26.0)
     )
     monkeypatch.setattr(rules, "is_felt_alike", lambda one, _: alike and one is same.candidate)
@@ -193,6 +198,8 @@ def test_what_says_the_same_counts_for_the_best(alike, rivals, monkeypatch):
     verdict = replace(found, judged=(found.best, same, other, found.baseline))
     names = {id(same): "same", id(other): "other"}
     assert [names[id(one)] for one in verdict.rivals] == rivals
+    counted = same.probability if alike else 0.0
+    assert verdict.probability == pytest.approx(found.best.probability + counted)
 
 
 @pytest.mark.parametrize(

@@ -66,7 +66,7 @@ def outcome(kind: str, hidden: Hidden, found: Diagnosis) -> dict:
         "ratio": hidden.ratio,
         "verdict": found.verdict.word,
         "named": named,
-        "probability": found.verdict.best.probability,
+        "probability": found.verdict.probability,
         "ranked": ranked,
         "found_ratio": ratio,
         "held_out_sigma": found.held_out_sigma,

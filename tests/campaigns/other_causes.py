@@ -222,7 +222,7 @@ def outcome(cause: str, hidden: Outside, found: Diagnosis) -> dict:
         "verdict": verdict.word,
         "named": {c.effect: {s.name: (s.value, s.std) for s in c.sizes} for c in found.causes},
         "rivals": [list(one.effects) for one in verdict.rivals],
-        "probability": verdict.best.probability,
+        "probability": verdict.probability,
         "found_ratio": found.ratio_extended,
         "held_out_sigma": found.held_out_sigma,
         "misfit": verdict.best.misfit,

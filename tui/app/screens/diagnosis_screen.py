@@ -163,7 +163,8 @@ def diagnosis_lines(document: Mapping[str, Any]) -> list[str]:
         lines += ["", "Rivals"]
         for rival in document["rivals"]:
             names = " + ".join(rival["causes"]) or "no cause"
-            lines.append(f" - {names}  probability {rival['probability']:.2f}")
+            remark = f" ({rival['remark']})" if rival.get("remark") else ""
+            lines.append(f" - {names}  probability {rival['probability']:.2f}{remark}")
     ratio = document.get("contribution_ratio")
     if ratio:
         lines += ["", f"contribution ratio before {_value(ratio['baseline'])}, "
