@@ -70,8 +70,8 @@ _ONE_SIZE = 2
 """Coordinates of a cause of one size: the ratio is the first."""
 
 _NEAR = 80.0
-"""Log-likelihood within which hypotheses seen by what the load is felt as are worth a look, and a
-pair at another ratio. True pairs lay up to 45 behind another such pair (thirteen drawn), 8 behind a
+"""Log-likelihood within which hypotheses seen by what the load is felt as are worth a look, and any
+at another ratio. True pairs lay up to 45 behind another such pair (thirteen drawn), 8 behind a
 payload (eight), and 38 behind themselves at a ratio 0.7 off."""
 
 _APART = 0.25
@@ -82,8 +82,9 @@ _APART = 0.25
 class Place:
     """The best place of a hypothesis in the coarse look and its log-likelihood.
 
-    `other`: one at another ratio that is hardly worse, where there is one: what two causes do
-    together is not the sum of what each does, which decides between them by chance.
+    `other`: one at another ratio that is hardly worse, where there is one: an atlas is coarse, and
+    what two causes do together is not the sum of what each does, so that chance decides between
+    them.
     """
 
     place: NDArray[np.float64]
@@ -350,7 +351,7 @@ def _best_place(surface: Surface) -> Place:
     if surface.chart is not None:
         return _refined(surface, _FELT_COUNTS)
     counts = _COUNTS[surface.places.shape[1]]
-    return _best_of(surface, _mesh([np.linspace(0.0, 1.0, count) for count in counts]))
+    return _best_of(surface, [np.linspace(0.0, 1.0, count) for count in counts])
 
 
 def _best_felt(surface: Surface) -> Place:
@@ -360,17 +361,23 @@ def _best_felt(surface: Surface) -> Place:
 
 def _refined(surface: Surface, counts: Sequence[int]) -> Place:
     """The best place about the best of a grid, in ever finer steps."""
-    best = _best_of(surface, _mesh([_centres(count) for count in counts]))
+    best = _best_of(surface, [_centres(count) for count in counts])
     for share in _REFINED:
-        lines = [share / count * np.array([-1.0, 0.0, 1.0]) for count in counts]
-        best = _best_of(surface, np.clip(best.place + _mesh(lines), 0.0, 1.0))
+        steps = [share / count * np.array([-1.0, 0.0, 1.0]) for count in counts]
+        lines = [at + step for at, step in zip(best.place, steps, strict=True)]
+        closer = _best_of(surface, [np.clip(line, 0.0, 1.0) for line in lines])
+        best = replace(closer, other=best.other)
     return best
 
 
-def _best_of(surface: Surface, grid: NDArray[np.float64]) -> Place:
-    likelihood = surface.scan(grid)
-    top = int(np.argmax(likelihood))
-    return Place(grid[top], float(likelihood[top]))
+def _best_of(surface: Surface, lines: Sequence[NDArray[np.float64]]) -> Place:
+    """The best of all places with these coordinates; the ratio is the first of them."""
+    grid = _mesh(lines).reshape(len(lines[0]), -1, len(lines))
+    likelihood = surface.scan(grid.reshape(-1, len(lines))).reshape(grid.shape[:2])
+    tops = likelihood.argmax(axis=1)
+    places = [Place(grid[at, top], float(likelihood[at, top])) for at, top in enumerate(tops)]
+    best = max(places, key=lambda one: one.log_likelihood)
+    return replace(best, other=_other(places, best))
 
 
 def ratios_of_pairs() -> NDArray[np.float64]:

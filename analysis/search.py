@@ -49,6 +49,7 @@ from analysis.progress import Progress, part_of
 from analysis.purse import Purse
 from analysis.rarities import look_at_rare
 from analysis.screening import (
+    Place,
     add_causes,
     near,
     ranked,
@@ -175,7 +176,10 @@ def _without(effects: Collection[str], atlas: Atlas) -> Atlas:
 
 def _look_at_few(rough: Hunt, atlas: Atlas, rng: np.random.Generator) -> bool:
     """Narrow the causes down on few rows; whether no single one will do there."""
-    rough.start(_singles(rough.unit, rough.observation, atlas), _FIRST_GROUPS, _FIRST_OF_MANY)
+    singles = _singles(rough.unit, rough.observation, atlas)
+    rough.start({k: one.place for k, one in singles.items()}, _FIRST_GROUPS, _FIRST_OF_MANY)
+    others = {k: one.other for k, one in singles.items() if one.other is not None}
+    rough.start(others, _FIRST_GROUPS)
     rough.hear()
     rough.look_closer(_with_baseline(rough.leading(_SECOND, TOO_FAR)), _SECOND_GROUPS)
     rough.hear()
@@ -288,10 +292,10 @@ def _narrow(rough: Hunt, starts: Starts, closer: int, groups: tuple[int, int]) -
     return [key for key in rough.among(starts) if earns(key, rough.found)]
 
 
-def _singles(unit: Unit, coarse: Observation, atlas: Atlas) -> Starts:
+def _singles(unit: Unit, coarse: Observation, atlas: Atlas) -> dict[Effects, Place]:
     """Best places of the single causes that the atlas favours, and of the baseline."""
     places = screen_singles(unit, coarse, atlas)
-    return {key: places[key].place for key in _with_baseline(ranked(places)[:_FIRST])}
+    return {key: places[key] for key in _with_baseline(ranked(places)[:_FIRST])}
 
 
 def _third(rough: Hunt) -> list[Effects]:
