@@ -198,6 +198,7 @@ def _look_at_all(
     """
     fine.take_over([rough.found[key] for key in _third(rough)], _THIRD_GROUPS)
     fine.hear()
+    looked_beside = False
     while True:
         if not doubted and is_doubtful_still(fine, rng):
             # More rows, or more runs, show that a single cause will not do after all.
@@ -209,10 +210,12 @@ def _look_at_all(
         if doubted and is_doubtful(fine.best, rng):
             give_chances(fine)
         missing = compare(fine, rng)
+        if missing and not (doubted or looked_beside or is_doubtful(fine.best, rng)):
+            # With as many runs as that takes a single cause may come to be doubted after all.
+            looked_beside = True
+            _look_beside(rough, fine, atlas, rng)
         if doubted or not is_doubtful(fine.best, rng):
             break
-    if missing and not doubted:
-        _look_beside(rough, fine, atlas, rng)
     return missing
 
 
