@@ -8,6 +8,7 @@ import synthetic
 
 from analysis import contest, search
 from analysis.causes import Hypothesis
+from analysis.screening import Place
 
 ADSS = synthetic.ADSS
 
@@ -138,3 +139,58 @@ def test_two_of_three_causes_are_weighed_where_the_three_lead(monkeypatch):
     monkeypatch.setattr(search, "compare", lambda *_: True)
     search._search_triples(rough, fine, {}, None)
     assert looked == [{pair, ("amplifier-lag", third), ("load-inertia", third)}]
+
+
+def test_single_causes_are_started_at_both_ratios_that_their_atlas_favours(monkeypatch):
+    """An EDSS with little play at a ratio of 0.9 was looked at about 0.4 alone, and unexplained."""
+    here, there = np.array([0.4, 0.46]), np.array([0.85, 0.4])
+    places = {
+        ("total-backlash",): Place(here, 162.0, there),
+        ("load-inertia",): Place(here, 181.0),
+        (): Place(here[:1], 100.0),
+    }
+    started = []
+    rough = SimpleNamespace(
+        unit=ADSS,
+        observation=None,
+        start=lambda starts, groups, of_many=0: started.append(starts),
+        hear=lambda: None,
+        leading=lambda *_: [],
+        look_closer=lambda keys, groups: None,
+    )
+    monkeypatch.setattr(search, "screen_singles", lambda *_: places)
+    monkeypatch.setattr(search, "is_doubtful_at_once", lambda *_: False)
+    assert not search._look_at_few(rough, {}, None)
+    first, second = started
+    assert set(first) == set(places)
+    assert all(first[key] is places[key].place for key in places)
+    assert list(second) == [("total-backlash",)]
+    assert second["total-backlash",] is there
+
+
+@pytest.mark.parametrize(
+    ("doubts", "steps"),
+    [
+        # Asked after the comparison, after what is tried beside it, and before chances are given.
+        ([False, False], ["compare", "beside"]),
+        ([False, True, False], ["compare", "beside", "pairs", "compare"]),
+    ],
+)
+def test_pairs_are_searched_where_a_single_cause_is_doubted_only_after_what_is_beside_it(
+    monkeypatch, doubts, steps
+):
+    """A motor's friction with a torque on the load: friction alone left a shape with 240 runs."""
+    done, asked = [], iter(doubts)
+    fine = SimpleNamespace(found={}, best=None, take_over=lambda *_: None, hear=lambda: None)
+    rough = SimpleNamespace(found={})
+    monkeypatch.setattr(search, "_third", lambda _: [])
+    monkeypatch.setattr(search, "is_doubtful_still", lambda *_: "beside" in done)
+    monkeypatch.setattr(search, "is_doubtful", lambda *_: next(asked))
+    for name, step in {
+        "search_pairs": "pairs", "_look_beside": "beside", "give_chances": "chances",
+    }.items():  # fmt: skip
+        monkeypatch.setattr(search, name, lambda *_, step=step: done.append(step))
+    monkeypatch.setattr(search, "compare", lambda *_: done.append("compare") or True)
+    assert search._look_at_all(rough, fine, {}, None, False)
+    assert done == steps
+    assert next(asked, None) is None
