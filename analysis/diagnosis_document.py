@@ -5,6 +5,7 @@ Owns the wording and the names in the document. Nothing is computed here.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +13,7 @@ from analysis.misfit import Departure
 from analysis.next_measurement import NextMeasurement
 from analysis.observation import Observation
 from analysis.swept import sweep_document, sweep_lines
-from analysis.verdict import Verdict
+from analysis.verdict import Judged, Verdict
 from sim.catalogue import CATALOGUE
 
 __all__ = ["Cause", "Diagnosis", "Size"]
@@ -198,20 +199,22 @@ def _sentence(diagnosis: Diagnosis) -> str:
     if word == "unexplained":
         return "Something is missing that no cause known here explains."
     explains = f"{names} ({where}) explains it with probability {diagnosis.verdict.probability:.2f}"
-    # What leads and is refused is a rival, and explains nothing.
-    may, leads = (
-        " or ".join(
-            " with ".join(one.effects) or "nothing beyond tolerance"
-            for one in diagnosis.verdict.rivals
-            if one.refused == refused
-        )
-        for refused in (False, True)
-    )
+    rivals, best = diagnosis.verdict.rivals, diagnosis.verdict.best
+    may = [one for one in rivals if not one.refused]
     if may:
-        explains += f", but so may {may}"
-    if leads:
-        explains += f"; {leads} is likelier, and no explanation"
+        explains += f", but so may {_either(may)}"
+    # A rival that is refused explains nothing.
+    for said, refused in (
+        ("likelier", [one for one in rivals if one.refused and one.score > best.score]),
+        ("hardly less likely", [one for one in rivals if one.refused and one.score < best.score]),
+    ):
+        if refused:
+            explains += f"; {_either(refused)} is {said}, and no explanation"
     return f"{explains}."
+
+
+def _either(sets: Sequence[Judged]) -> str:
+    return " or ".join(" with ".join(one.effects) or "nothing beyond tolerance" for one in sets)
 
 
 def _proposed(proposal: NextMeasurement) -> str:

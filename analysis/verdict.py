@@ -152,7 +152,8 @@ class Verdict:
     def rivals(self) -> tuple[Judged, ...]:
         """Sets near the best one that say something else, and might be the explanation.
 
-        Among them that nothing is hidden, which has a wider margin. A set that would be no
+        Among them that nothing is hidden, which has a wider margin, and is one though refused where
+        the best leads it by less than it takes to be named. A set that would be no
         explanation if it led is none as a rival, nor is one that says the same with more sizes:
         what is believed of that counts for the best. One that is refused though it leads is: the
         best is then likeliest only among what is left.
@@ -184,8 +185,10 @@ class Verdict:
 
     def _is_rival(self, one: Judged, believed: float) -> bool:
         behind, best = believed - one.score, set(self.best.effects)
-        if not one.effects:
-            return bool(best) and one.adequate and self.best.score - one.score < _SURE
+        if not one.effects and best:
+            lead = self.best.score - one.score
+            # Refused it is no explanation, and what leads it by little has hardly earned its name.
+            return lead < _SURE if one.adequate else one.refused and 0.0 < lead < _FALSE_ALARM
         other = not set(one.effects) <= best and not set(one.effects) >= best
         if self._is_led_by(one):
             return other and not is_felt_alike(one.candidate, self.best.candidate)
@@ -229,8 +232,10 @@ def judge_candidates(
         if baseline.adequate:
             return Verdict("consistent", baseline, tuple(judged), baseline)
         tie = Verdict("ambiguous", best, tuple(judged), baseline)
-        if best.effects and best.adequate and any(one.adequate for one in tie.rivals):
-            # Something is missing, too little of it to say which of several it is.
+        enough = any(one.adequate or one is baseline for one in tie.rivals)
+        if best.effects and best.adequate and enough:
+            # Something is missing, too little of it to say which of several it is, or to be sure
+            # of the one that there is.
             return tie
         return Verdict("unexplained", baseline, tuple(judged), baseline)
     first, judged = judged[0], _put_behind(judged, best)

@@ -184,6 +184,15 @@ def test_a_tie_names_what_may_explain_and_what_leads_and_does_not(report, explai
     assert f"shaft-stiffness (0.48{', ' * bool(against)}{against})" in page.text
 
 
+def test_a_cause_that_hardly_leads_a_refused_plain_model_is_named_with_it(explained):
+    first, plain = explained.verdict.judged[0], explained.verdict.baseline
+    plain = replace(plain, score=first.score - 17.0, objection="leaves structure")
+    judged = (first, plain)
+    verdict = replace(explained.verdict, word="ambiguous", judged=judged, baseline=plain)
+    told = replace(explained, verdict=verdict).summary()[0]
+    assert told.endswith("; nothing beyond tolerance is hardly less likely, and no explanation.")
+
+
 @pytest.mark.parametrize("given_up", [False, True])
 def test_a_diagnosis_says_that_the_search_was_left(monkeypatch, given_up):
     hidden, judged = ("load-inertia",), [("shaft-stiffness",)]
