@@ -205,11 +205,11 @@ def _sentence(diagnosis: Diagnosis) -> str:
         explains += f", but so may {_either(may)}"
     # A rival that is refused explains nothing.
     for said, refused in (
-        ("likelier", [one for one in rivals if one.refused and one.score > best.score]),
-        ("hardly less likely", [one for one in rivals if one.refused and one.score < best.score]),
+        ("is likelier", [one for one in rivals if one.refused and one.score > best.score]),
+        ("comes near", [one for one in rivals if one.refused and one.score < best.score]),
     ):
         if refused:
-            explains += f"; {_either(refused)} is {said}, and no explanation"
+            explains += f"; {_either(refused)} {said}, and is no explanation"
     return f"{explains}."
 
 

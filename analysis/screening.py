@@ -103,7 +103,7 @@ def screen_singles(
     """The best place of every hypothesis of an atlas, or of those that are wanted.
 
     A cause of one size at the load is seen by its own runs, and by all that are felt as it is, for
-    its own lie further apart than a notch is wide: a load 10 % too light lay 100 behind a cable
+    its own lie further apart than a notch is wide: a load 10 % too light lay 77 behind a cable
     that pulls, and 12 ahead of it by what is felt.
     """
     surfaces = _surfaces(unit, coarse, atlas)
