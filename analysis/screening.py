@@ -74,6 +74,11 @@ _NEAR = 80.0
 at another ratio. True pairs lay up to 45 behind another such pair (thirteen drawn), 8 behind a
 payload (eight), and 38 behind themselves at a ratio 0.7 off."""
 
+_NEAR_ALONE = 30.0
+"""The same for a single cause at another ratio: its runs in the atlas are its own, no sum. An EDSS
+with less play lay 5 behind itself at a ratio 0.45 off. Up to 80 behind practice sets took longer by
+two fifths."""
+
 _APART = 0.25
 """By how much more another ratio differs: closer ones are reached by the same runs."""
 
@@ -243,13 +248,15 @@ def _best_pair(plain: NDArray[np.float64], first: _Added, second: _Added) -> Pla
     return replace(best, other=_other(places, best))
 
 
-def _other(places: Sequence[Place], best: Place) -> NDArray[np.float64] | None:
+def _other(
+    places: Sequence[Place], best: Place, behind: float = _NEAR
+) -> NDArray[np.float64] | None:
     """The best of places, in order of their ratio, that stands out far from the very best."""
     likelihood = np.array([one.log_likelihood for one in places])
     around = np.concatenate([[-np.inf], likelihood, [-np.inf]])
     stands_out = (likelihood >= around[:-2]) & (likelihood >= around[2:])
     far = np.abs([one.place[0] - best.place[0] for one in places]) > _APART
-    worth = stands_out & far & (likelihood > best.log_likelihood - _NEAR)
+    worth = stands_out & far & (likelihood > best.log_likelihood - behind)
     if not worth.any():
         return None
     return places[int(np.argmax(np.where(worth, likelihood, -np.inf)))].place
@@ -349,7 +356,8 @@ def _plain_surface(
 
 def _best_place(surface: Surface) -> Place:
     if surface.chart is not None:
-        return _refined(surface, _FELT_COUNTS)
+        # What swings on the load is costly, and seen by so many runs that they tell its ratio.
+        return replace(_refined(surface, _FELT_COUNTS), other=None)
     counts = _COUNTS[surface.places.shape[1]]
     return _best_of(surface, [np.linspace(0.0, 1.0, count) for count in counts])
 
@@ -377,7 +385,7 @@ def _best_of(surface: Surface, lines: Sequence[NDArray[np.float64]]) -> Place:
     tops = likelihood.argmax(axis=1)
     places = [Place(grid[at, top], float(likelihood[at, top])) for at, top in enumerate(tops)]
     best = max(places, key=lambda one: one.log_likelihood)
-    return replace(best, other=_other(places, best))
+    return replace(best, other=_other(places, best, _NEAR_ALONE))
 
 
 def ratios_of_pairs() -> NDArray[np.float64]:
