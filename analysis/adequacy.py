@@ -46,6 +46,9 @@ def judge_adequacy(candidate: Candidate, rng: np.random.Generator) -> Adequacy:
     `analysis.structure.credited`).
     """
     fits = [run.alone.climb(run.place, tries=1) for run in own_runs(candidate, rng)]
+    if not fits:
+        # Every run did alone what it did: nothing speaks against the observation.
+        return Adequacy(0.0, 0.0, ())
     surface, best = candidate.surface, candidate.best
     own = [fit.log_likelihood for fit in fits]
     sigma = _worse([best.log_likelihood, *own])
@@ -79,7 +82,7 @@ def judge_chance(simpler: Candidate, alleged: Candidate, rng: np.random.Generato
         - run.alone.climb(run.place, tries=_TRIES).log_likelihood
         for run in own_runs(simpler, rng)
     ]
-    return float(np.mean(np.array(gains) >= seen))
+    return float(np.mean(np.array(gains) >= seen)) if gains else 0.0
 
 
 def misses_alike(

@@ -59,3 +59,11 @@ def test_misfit_at_the_lowest_level_has_a_credit_and_at_a_higher_one_has_none(se
     # Of a standard normal, more or less, 3.5 is exceeded once in 4,000 draws.
     assert above_odd < 3.5 < 4.0 < everywhere
     assert odd_above > 4.0
+
+
+def test_where_every_run_did_alone_what_it_did_nothing_speaks_against_the_observation(monkeypatch):
+    """Two short sweeps of a cable at one level had no run that others did as; it was no error."""
+    monkeypatch.setattr(adequacy, "own_runs", lambda *_: iter(()))
+    one = SimpleNamespace(best=SimpleNamespace(log_likelihood=10.0), surface=None)
+    assert adequacy.judge_adequacy(one, None) == adequacy.Adequacy(0.0, 0.0, ())
+    assert adequacy.judge_chance(one, one, None) == 0.0
