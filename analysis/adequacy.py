@@ -29,8 +29,8 @@ class Adequacy:
     """How the fit of an observation compares with those of a hypothesis's own runs.
 
     `sigma`: by how many standard deviations it is worse, negative where it is
-    better than most. `structure`: by how many it leaves more structure. `own`:
-    the runs' log-likelihoods.
+    better than most. `structure`: by how many it leaves more structure. Both are 0 where no run
+    can be compared. `own`: the runs' log-likelihoods.
     """
 
     sigma: float

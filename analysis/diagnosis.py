@@ -154,7 +154,8 @@ def _causes(verdict: Verdict, found: Calibrated) -> tuple[Cause, ...]:
         known = parameter.nominal(hypothesis.unit)
         size = Size(parameter.name, float(value), float(std), parameter.unit_symbol, known)
         sizes.setdefault(effect, []).append(size)
-    return tuple(Cause(e, tuple(of), verdict.probability) for e, of in sizes.items())
+    probability = verdict.probability
+    return tuple(Cause(e, tuple(of), probability) for e, of in sizes.items())
 
 
 def _proposal(

@@ -161,7 +161,7 @@ def _diagnosed_actions(diagnosis: Mapping[str, Any]) -> list[str]:
     ratio = diagnosis["contribution_ratio"]["extended"]
     said = f"{names} explains the response"
     if word == "ambiguous":
-        said = f"{names} may explain the response, and so may others"
+        said = f"{names} may explain the response, and others are not ruled out"
     if ratio["value"] is not None:
         said += f"; with it r is {ratio['value']:.2f} ± {ratio['std'] or 0.0:.2f}"
     if any(cause.get("site") == "chain" for cause in causes):

@@ -158,7 +158,7 @@ class Verdict:
         what is believed of that counts for the best. One that is refused though it leads is: the
         best is then likeliest only among what is left.
         """
-        said = [self.best.score, *(one.score for one in self.judged if self.says_the_same(one))]
+        said = [self.best.score, *(one.score for one in self.judged if self._says_the_same(one))]
         believed = HEAT * float(np.logaddexp.reduce(np.array(said) / HEAT))
         return tuple(one for one in self.judged if self._is_rival(one, believed))
 
@@ -166,17 +166,16 @@ class Verdict:
     def probability(self) -> float:
         """Of the best set, with what is believed of sets that say the same with more sizes."""
         return self.best.probability + sum(
-            one.probability for one in self.judged if self.says_the_same(one)
+            one.probability for one in self.judged if self._says_the_same(one)
         )
 
     def remark(self, one: Judged) -> str:
         """What speaks against a set, or makes it no rival; empty where nothing does."""
         if one.refused:
             return one.objection
-        return "says the same with more sizes" if self.says_the_same(one) else ""
+        return "says the same with more sizes" if self._says_the_same(one) else ""
 
-    def says_the_same(self, one: Judged) -> bool:
-        """Whether a set says what the best one says, with more sizes."""
+    def _says_the_same(self, one: Judged) -> bool:
         return one.adequate and is_felt_alike(one.candidate, self.best.candidate)
 
     def _is_led_by(self, one: Judged) -> bool:
@@ -195,7 +194,7 @@ class Verdict:
         rarer = one.candidate.hypothesis.rare - self.best.candidate.hypothesis.rare
         if not other or not one.adequate or behind - _RARE * max(rarer, 0) >= _RIVAL:
             return False
-        return not self.says_the_same(one)
+        return not self._says_the_same(one)
 
 
 def judge_candidates(

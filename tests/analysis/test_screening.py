@@ -10,6 +10,7 @@ from synthetic import ADSS
 from synthetic_atlas import SINGLE, channels
 
 from analysis import screening
+from analysis.atlas_surfaces import surfaces_of
 from analysis.candidate import form_candidates
 from analysis.causes import Hypothesis
 from analysis.chart import reflections
@@ -231,7 +232,7 @@ def test_a_cause_of_one_size_at_the_load_is_placed_by_all_that_is_felt_there():
         place = np.array([rng.uniform(0.1, 0.9), rng.uniform(0.2, 0.8)])
         seen = synthetic.observation(felt(heavy, place[None], rng)[0])
         found = screen_singles(ADSS, seen, atlas, [heavy])[heavy]
-        own = screening._best_place(screening._surfaces(ADSS, seen, atlas)[heavy])
+        own = screening._best_place(surfaces_of(ADSS, seen, atlas)[heavy])
         # Whichever agrees better is believed.
         assert found.log_likelihood >= own.log_likelihood
         off.append(abs(found.place - place)[1])
@@ -290,7 +291,7 @@ def test_a_cause_of_three_sizes_elsewhere_than_at_the_load_is_placed_by_its_own_
     # The grid over three sizes has five lines a size; where its resonance is tells most.
     assert found.place[[0, 2]] == pytest.approx([0.4, 0.9], abs=0.15)
     assert screen_pairs(add_causes(ADSS, seen, atlas)) == {}
-    assert not screening._surfaces(ADSS, seen, atlas)[SWINGING].chart
+    assert not surfaces_of(ADSS, seen, atlas)[SWINGING].chart
 
 
 def test_runs_of_all_causes_at_the_load_tell_of_what_swings_there():
@@ -298,6 +299,6 @@ def test_runs_of_all_causes_at_the_load_tell_of_what_swings_there():
     keys = [(), *((e,) for e in (*AT_LOAD, "amplifier-lag"))]
     atlas = {key: felt_population(key, 2, rng) for key in keys}
     seen = synthetic.observation(felt((), np.array([[0.5]]), rng)[0])
-    surfaces = screening._surfaces(ADSS, seen, atlas)
+    surfaces = surfaces_of(ADSS, seen, atlas)
     assert len(surfaces[SWINGING].difference) == sum(len(atlas[k]) for k in keys[:-1])
     assert all(len(surfaces[k].difference) == len(atlas[k]) for k in keys if k != SWINGING)

@@ -25,7 +25,7 @@ __all__ = ["DiagnosisScreen", "diagnosis_lines"]
 _VERDICTS = {
     "consistent": "The model explains the measurement: no further cause is needed.",
     "explained": "A cause was found that explains what the model misses.",
-    "ambiguous": "Several causes explain it equally well; one more measurement can tell.",
+    "ambiguous": "A cause explains it, others are not ruled out; one more measurement may tell.",
     "unexplained": "Nothing in the catalogue explains what the model misses.",
 }
 
