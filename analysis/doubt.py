@@ -20,6 +20,7 @@ __all__ = [
     "is_doubtful_still",
     "is_given_up",
     "is_nothing_missing",
+    "is_refused_now",
 ]
 
 _DOUBT = 2.0
@@ -100,12 +101,17 @@ def is_nothing_missing(fine: Hunt, rng: np.random.Generator) -> bool:
     return fine.best is baseline or judge_chance(baseline, fine.best, rng) > _COMMON
 
 
+def is_refused_now(fine: Hunt, rng: np.random.Generator) -> bool:
+    """Whether the leader would be refused as it is, and is not only doubted."""
+    missed = _MISSED_NOW if len(fine.best.hypothesis.effects) > 1 else _MISSED
+    return is_doubtful(fine.best, rng, missed, _REFUSED, _STRUCTURED_NOW)
+
+
 def is_given_up(fine: Hunt, rng: np.random.Generator) -> bool:
     """Whether all was spent that may be, and the leader is no explanation.
 
     One that may be is looked at for as long as it takes: it might be named.
     """
     if fine.purse.is_overdrawn:
-        missed = _MISSED_NOW if len(fine.best.hypothesis.effects) > 1 else _MISSED
-        return is_doubtful(fine.best, rng, missed, _REFUSED, _STRUCTURED_NOW)
+        return is_refused_now(fine, rng)
     return fine.purse.is_spent and is_doubtful(fine.best, rng, _MISSED, _REFUSED)

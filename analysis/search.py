@@ -37,6 +37,7 @@ from analysis.doubt import (
     is_doubtful_at_once,
     is_doubtful_still,
     is_given_up,
+    is_refused_now,
 )
 from analysis.executor import Executor
 from analysis.holdout import AT_NOISE, hold_out
@@ -148,11 +149,16 @@ def search_causes(
             purse,
         )
         given_up = False
-        if _look_at_all(rough, fine, atlas, rng, doubted):
+        missing, pairs_searched = _look_at_all(rough, fine, atlas, rng, doubted)
+        if missing:
 
             def hold_rare() -> None:
                 rare = make_atlas(unit, coarse, cache, executor, fine.report(), rare=True)
                 _hold_rare(rough, fine, _without(without, rare), rng)
+
+            def search_late() -> None:
+                if not pairs_searched:
+                    _search_late(rough, fine, atlas, rng)
 
             for step in (
                 lambda: back_who_predicts(fine, rng),
@@ -161,6 +167,7 @@ def search_causes(
                 lambda: weigh_parts(fine),
                 lambda: _look_for_third(rough, fine, atlas, rng),
                 lambda: settle_doubt(fine, rng),
+                search_late,
                 hold_rare,
             ):
                 given_up = is_given_up(fine, rng)
@@ -191,32 +198,48 @@ def _look_at_few(rough: Hunt, atlas: Atlas, rng: np.random.Generator) -> bool:
 
 def _look_at_all(
     rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator, doubted: bool
-) -> bool:
-    """Compare those that are left on all rows; whether something is missing from the plain model.
+) -> tuple[bool, bool]:
+    """Compare those that are left on all rows.
 
-    `doubted`: whether pairs were looked for on few rows, as they are here if that is called for.
+    `doubted`: whether pairs were searched on few rows, as they are here if that is called for.
+
+    Returns whether something is missing from the plain model, and whether pairs were searched.
     """
     fine.take_over([rough.found[key] for key in _third(rough)], _THIRD_GROUPS)
     fine.hear()
-    looked_beside = False
     while True:
         if not doubted and is_doubtful_still(fine, rng):
             # More rows, or more runs, show that a single cause will not do after all.
             doubted = True
-            search_pairs(rough, atlas)
-            pairs = [key for key in _third(rough) if key not in fine.found]
-            fine.take_over([rough.found[key] for key in pairs], _THIRD_GROUPS)
-            fine.hear()
+            _bring_pairs(rough, fine, atlas)
         if doubted and is_doubtful(fine.best, rng):
             give_chances(fine)
         missing = compare(fine, rng)
-        if missing and not (doubted or looked_beside or is_doubtful(fine.best, rng)):
-            # With as many runs as that takes a single cause may come to be doubted after all.
-            looked_beside = True
-            _look_beside(rough, fine, atlas, rng)
         if doubted or not is_doubtful(fine.best, rng):
             break
-    return missing
+    if missing and not doubted:
+        _look_beside(rough, fine, atlas, rng)
+    return missing, doubted
+
+
+def _search_late(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator) -> None:
+    """Search pairs where they were not called for, and the leader would be refused after all.
+
+    It shows what is missing only with the runs that it gets as others are held against it.
+    """
+    if is_refused_now(fine, rng):
+        _bring_pairs(rough, fine, atlas)
+        give_chances(fine)
+        compare(fine, rng)
+        see_it_predict(fine)
+
+
+def _bring_pairs(rough: Hunt, fine: Hunt, atlas: Atlas) -> None:
+    """Search pairs on few rows, and look at those that lead there on all."""
+    search_pairs(rough, atlas)
+    pairs = [key for key in _third(rough) if key not in fine.found]
+    fine.take_over([rough.found[key] for key in pairs], _THIRD_GROUPS)
+    fine.hear()
 
 
 def _look_beside(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator) -> None:

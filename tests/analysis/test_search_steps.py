@@ -169,28 +169,42 @@ def test_single_causes_are_started_at_both_ratios_that_their_atlas_favours(monke
 
 
 @pytest.mark.parametrize(
-    ("doubts", "steps"),
-    [
-        # Asked after the comparison, after what is tried beside it, and before chances are given.
-        ([False, False], ["compare", "beside"]),
-        ([False, True, False], ["compare", "beside", "pairs", "compare"]),
-    ],
+    ("refused", "steps"),
+    [(False, []), (True, ["pairs", "taken over", "chances", "compare", "predict"])],
 )
-def test_pairs_are_searched_where_a_single_cause_is_doubted_only_after_what_is_beside_it(
-    monkeypatch, doubts, steps
+def test_pairs_are_searched_late_where_a_single_cause_would_be_refused_after_all(
+    monkeypatch, refused, steps
 ):
     """A motor's friction with a torque on the load: friction alone left a shape with 240 runs."""
-    done, asked = [], iter(doubts)
-    fine = SimpleNamespace(found={}, best=None, take_over=lambda *_: None, hear=lambda: None)
-    rough = SimpleNamespace(found={})
-    monkeypatch.setattr(search, "_third", lambda _: [])
-    monkeypatch.setattr(search, "is_doubtful_still", lambda *_: "beside" in done)
-    monkeypatch.setattr(search, "is_doubtful", lambda *_: next(asked))
+    pair, single, done = ("load-torque-bias", "motor-coulomb-friction"), ("load-inertia",), []
+    fine = SimpleNamespace(
+        found={single: None},
+        take_over=lambda candidates, groups: done.append("taken over") or given.extend(candidates),
+        hear=lambda: None,
+    )
+    rough, given = SimpleNamespace(found={pair: "the pair", single: "the single"}), []
+    monkeypatch.setattr(search, "_third", lambda _: [pair, single])
+    monkeypatch.setattr(search, "is_refused_now", lambda *_: refused)
     for name, step in {
-        "search_pairs": "pairs", "_look_beside": "beside", "give_chances": "chances",
+        "search_pairs": "pairs", "give_chances": "chances", "compare": "compare",
+        "see_it_predict": "predict",
     }.items():  # fmt: skip
         monkeypatch.setattr(search, name, lambda *_, step=step: done.append(step))
-    monkeypatch.setattr(search, "compare", lambda *_: done.append("compare") or True)
-    assert search._look_at_all(rough, fine, {}, None, False)
+    search._search_late(rough, fine, {}, None)
     assert done == steps
-    assert next(asked, None) is None
+    # Who is looked at on all rows already is not taken over once more.
+    assert given == (["the pair"] if refused else [])
+
+
+@pytest.mark.parametrize("doubted", [False, True])
+def test_whether_pairs_were_searched_is_told(monkeypatch, doubted):
+    fine = SimpleNamespace(found={}, best=None, take_over=lambda *_: None, hear=lambda: None)
+    beside = []
+    monkeypatch.setattr(search, "_third", lambda _: [])
+    monkeypatch.setattr(search, "is_doubtful_still", lambda *_: False)
+    monkeypatch.setattr(search, "is_doubtful", lambda *_: False)
+    monkeypatch.setattr(search, "compare", lambda *_: True)
+    monkeypatch.setattr(search, "_look_beside", lambda *_: beside.append(True))
+    rough = SimpleNamespace(found={})
+    assert search._look_at_all(rough, fine, {}, None, doubted) == (True, doubted)
+    assert bool(beside) != doubted
