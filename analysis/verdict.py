@@ -104,6 +104,8 @@ _JUDGED = 6
 
 _NOT_ASKED, _UNKNOWN = "too far behind to be asked", Adequacy(np.nan, np.nan, ())
 
+_OUT_OF_SIGHT = "resonates where nothing was measured"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Judged:
@@ -171,12 +173,15 @@ class Verdict:
 
     def remark(self, one: Judged) -> str:
         """What speaks against a set, or makes it no rival; empty where nothing does."""
-        if one.refused:
-            return one.objection
-        return "says the same with more sizes" if self._says_the_same(one) else ""
+        if self._says_the_same(one):
+            return "says the same with more sizes"
+        return one.objection if one.refused else ""
 
     def _says_the_same(self, one: Judged) -> bool:
-        return one.adequate and is_felt_alike(one.candidate, self.best.candidate)
+        # What swings out of sight is felt as a load or a brake and as nothing else: what is
+        # believed of it is believed of that.
+        may = one.adequate or one.objection == _OUT_OF_SIGHT
+        return may and is_felt_alike(one.candidate, self.best.candidate)
 
     def _is_led_by(self, one: Judged) -> bool:
         """Whether a refused set does better by little, so that the best stands in its place."""
@@ -263,7 +268,7 @@ def _find_objection(
     if is_pressed(candidate):
         return "wants a size that no bench has"
     if is_out_of_sight(candidate):
-        return "resonates where nothing was measured"
+        return _OUT_OF_SIGHT
     predicted = missed <= (_WELL_PREDICTED if several else _UNPREDICTED)
     if not predicted and (
         missed > (_UNPREDICTED if several else _NEVER)

@@ -179,8 +179,18 @@ def test_what_stands_in_for_a_refused_leader_is_not_named_alone(
         assert [one.effects for one in verdict.rivals] == ([WRONG] if word == "ambiguous" else [])
 
 
-@pytest.mark.parametrize(("alike", "rivals"), [(True, []), (False, ["same", "other"])])
-def test_what_says_the_same_counts_for_the_best(alike, rivals, monkeypatch):
+@pytest.mark.parametrize(
+    ("alike", "against", "rivals"),
+    [
+        (True, "", []),
+        # A payload that swings out of sight was half as likely as the heavier load that it stands
+        # for, and a motor's constant 32 behind the load counted as its rival.
+        (True, "resonates where nothing was measured", []),
+        (True, "leaves structure that its own runs do not", ["other"]),
+        (False, "", ["same", "other"]),
+    ],
+)
+def test_what_says_the_same_counts_for_the_best(alike, against, rivals, monkeypatch):
     found = judge(seen(TRUE, 1), ((), TRUE, WRONG), 1)
     (wrong,) = (one for one in found.judged if one.effects == WRONG)
     wrong = replace(wrong, objection="")
@@ -193,13 +203,16 @@ def test_what_says_the_same_counts_for_the_best(alike, rivals, monkeypatch):
         )
         for behind in (10.0, 26.0)
     )
+    same = replace(same, objection=against)
     monkeypatch.setattr(rules, "is_felt_alike", lambda one, _: alike and one is same.candidate)
     # Half as likely again, the best is 32 ahead of the other, of which 30 are asked.
     verdict = replace(found, judged=(found.best, same, other, found.baseline))
     names = {id(same): "same", id(other): "other"}
     assert [names[id(one)] for one in verdict.rivals] == rivals
-    counted = same.probability if alike else 0.0
+    counts = alike and not against.startswith("leaves")
+    counted = same.probability if counts else 0.0
     assert verdict.probability == pytest.approx(found.best.probability + counted)
+    assert verdict.remark(same) == ("says the same with more sizes" if counts else against)
 
 
 @pytest.mark.parametrize(
