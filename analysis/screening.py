@@ -116,14 +116,12 @@ def near(places: Mapping[Effects, Place], log_likelihood: float) -> dict[Effects
     return {key: one for key, one in places.items() if one.log_likelihood > least}
 
 
-def screen_pairs(additions: Additions, beside: Effects = ()) -> dict[Effects, Place]:
-    """The best place of every pair of causes, or of those with one of `beside`."""
+def screen_pairs(additions: Additions) -> dict[Effects, Place]:
+    """The best place of every pair of causes."""
     plain, added = additions.plain, additions.added
     found = {}
     for first, second in combinations(sorted(added), 2):
         key = *first, *second
-        if beside and not set(beside) & set(key):
-            continue
         if key in additions.felt:
             found[key] = _best_felt(additions.felt[key])
         else:

@@ -16,8 +16,6 @@ import numpy as np
 
 from analysis.atlas import Atlas, coarse_stride, make_atlas
 from analysis.candidate import Candidate, Effects
-from analysis.causes import Hypothesis
-from analysis.chart import Chart
 from analysis.contest import (
     CLOSE,
     HOPELESS,
@@ -40,11 +38,10 @@ from analysis.doubt import (
     is_refused_now,
 )
 from analysis.executor import Executor
-from analysis.holdout import AT_NOISE, hold_out
 from analysis.hunt import Hunt, Starts
 from analysis.likeness import is_felt_alike
 from analysis.observation import Observation
-from analysis.pairs import look_at_felt, search_pairs
+from analysis.pairs import search_pairs
 from analysis.parts import earns, parts_of, places_of_parts
 from analysis.progress import Progress, part_of
 from analysis.purse import Purse
@@ -52,13 +49,11 @@ from analysis.rarities import look_at_rare
 from analysis.screening import (
     Place,
     add_causes,
-    near,
     ranked,
-    screen_felt,
     screen_further,
-    screen_pairs,
     screen_singles,
 )
+from analysis.second_cause import look_for_second
 from sim.effort import counting
 from sim.unit import Unit
 
@@ -70,24 +65,13 @@ _THIRD, _THIRD_GROUPS, _SINGLES = 4, 4, 3
 """How many hypotheses are looked at in each round, and in how many groups of runs each; at first
 in more where one has many sizes. So many single causes that are close are always in the third."""
 
-_BESIDE, _BESIDE_CLOSER, _BESIDE_GROUPS = (5, 8), (2, 4), (2, 4)
-"""How many pairs with a leader that is not doubted are tried, and how many looked at closer, where
-it predicts other levels well and where worse than true causes do; in how many groups each time."""
-
-_CALLED_FOR = 37.5
-"""By so much must one of these lead a cause that predicts well to be looked at any further: half of
-what it takes to be named in its place (`analysis.verdict`)."""
-
 _TRIPLES, _TRIPLES_CLOSER, _TRIPLE_GROUPS, _TRIPLES_AFTER = 8, 4, (2, 4), 2
-"""The same for sets with a third cause beside a leading pair that is doubted."""
+"""How many sets with a third cause beside a leading pair that is doubted are tried, and looked at
+closer, in how many groups each time; and how many of them on all rows."""
 
 _LEAST_SURE = 1.5
 """What a pair may miss of levels not fitted, in their standard deviations, before a third cause is
 tried: more of it is no explanation (`analysis.verdict`)."""
-
-_LITTLE = 10.0
-"""Log-likelihood in the coarse look that a pair may lack of its leading part, and be looked at;
-any where that part predicts badly, for pairs are looked at in coarser steps."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -218,7 +202,7 @@ def _look_at_all(
         if doubted or not is_doubtful(fine.best, rng):
             break
     if missing and not doubted:
-        _look_beside(rough, fine, atlas, rng)
+        look_for_second(rough, fine, atlas)
     return missing, doubted
 
 
@@ -240,38 +224,6 @@ def _bring_pairs(rough: Hunt, fine: Hunt, atlas: Atlas) -> None:
     pairs = [key for key in _third(rough) if key not in fine.found]
     fine.take_over([rough.found[key] for key in pairs], _THIRD_GROUPS)
     fine.hear()
-
-
-def _look_beside(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator) -> None:
-    """See whether a second cause hides behind a single one that is not doubted."""
-    leader = fine.best.hypothesis.effects
-    if len(leader) != 1:
-        return
-    glance = screen_singles(rough.unit, rough.observation, atlas, [leader])[leader]
-    additions = add_causes(rough.unit, rough.observation, atlas)
-    places = screen_pairs(additions, leader)
-    poor = hold_out(fine.best, fine.observation).rms_sigma > AT_NOISE
-    enough = -np.inf if poor else glance.log_likelihood - _LITTLE
-    chosen = [k for k in ranked(places)[: _BESIDE[poor]] if places[k].log_likelihood > enough]
-    # Of what adds up exactly the place is right, and how likely it is not comparable.
-    chosen += [k for k in places if k in additions.felt and k not in chosen]
-    starts = {key: places[key].place for key in chosen}
-    kept = _narrow(rough, starts, _BESIDE_CLOSER[poor], _BESIDE_GROUPS)
-    if Chart(Hypothesis(rough.unit, leader), rough.observation.frequency_hz).bent.any():
-        # What swings on the load has stood for two causes there, and is likely by that measure.
-        stood_for = near(screen_felt(additions), glance.log_likelihood)
-        look_at_felt(rough, stood_for)
-        kept = rough.among([*kept, *(key for key in stood_for if earns(key, rough.found))])
-    kept = kept[: _BESIDE_CLOSER[0]]
-    if kept:
-        fine.take_over([rough.found[key] for key in kept], _THIRD_GROUPS)
-        catch_up(fine, kept, leader)
-        if not poor:
-            alone = fine.found[leader].best.log_likelihood
-            beside = {k: fine.found[k].best.log_likelihood - alone for k in kept if leader[0] in k}
-            fine.leave_out([k for k, lead in beside.items() if 0.0 < lead < _CALLED_FOR])
-        if fine.best.hypothesis.effects != leader:
-            compare(fine, rng)
 
 
 def _look_for_third(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator) -> None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from analysis.adequacy import Adequacy, judge_adequacy, judge_chance, misses_alike
 from analysis.candidate import Candidate
-from analysis.holdout import AT_NOISE, HeldOut, hold_out
+from analysis.holdout import HeldOut, hold_out
 from analysis.likelihood import HEAT
 from analysis.likeness import is_felt_alike
 from analysis.observation import Observation
@@ -61,11 +61,6 @@ _BY_CHANCE = 0.04
 _PART = 150.0
 """Within so much of a leading pair its parts are held against runs of their own, and the pair, too:
 with more parameters and no more runs it may fit what is chance."""
-
-_NOT_CALLED_FOR = 75.0
-"""By so much must a further cause do better where a part alone looks like its own runs and misses
-levels not fitted by no more than true causes do: nothing then calls for it, and the scores of
-sharp resonances are that far off."""
 
 _TIE = 20.0
 """The scores of two sets that say the same about everything differ by about as much, as each has
@@ -303,9 +298,7 @@ def _simplest(judged: Sequence[Judged], rng: np.random.Generator) -> Judged:
         part = one.effects and set(one.effects) < set(best.effects)
         if not part or not one.adequate:
             continue
-        enough = one.held_out.rms_sigma <= AT_NOISE
-        earned = _NOT_CALLED_FOR if enough else _FALSE_ALARM
-        if one.score > judged[0].score - earned or _may_be_chance(one, best, rng):
+        if one.score > judged[0].score - _FALSE_ALARM or _may_be_chance(one, best, rng):
             return one
     return best
 

@@ -123,13 +123,6 @@ def test_both_ratios_of_a_pair_come_out_of_the_screening(atlas):
     assert found.other[1:] == pytest.approx(found.place[1:], abs=0.1)
 
 
-def test_pairs_beside_a_cause_are_those_that_hold_it(atlas):
-    additions = add_causes(ADSS, seen({"load-inertia": 0.8}, 0.3, 4), atlas)
-    every, some = screen_pairs(additions), screen_pairs(additions, ("load-inertia",))
-    assert set(some) == {key for key in every if "load-inertia" in key}
-    assert all(some[k].log_likelihood == every[k].log_likelihood for k in some)
-
-
 def candidate(observed, effects, place, rng):
     """A pair that was simulated about a place, its sizes up to a quarter of their range off."""
     runs, places = [], []

@@ -204,7 +204,7 @@ def test_whether_pairs_were_searched_is_told(monkeypatch, doubted):
     monkeypatch.setattr(search, "is_doubtful_still", lambda *_: False)
     monkeypatch.setattr(search, "is_doubtful", lambda *_: False)
     monkeypatch.setattr(search, "compare", lambda *_: True)
-    monkeypatch.setattr(search, "_look_beside", lambda *_: beside.append(True))
+    monkeypatch.setattr(search, "look_for_second", lambda *_: beside.append(True))
     rough = SimpleNamespace(found={})
     assert search._look_at_all(rough, fine, {}, None, doubted) == (True, doubted)
     assert bool(beside) != doubted

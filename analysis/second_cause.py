@@ -1,0 +1,99 @@
+"""A second cause behind a single one that nobody doubts.
+
+Owns which others are tried beside such a leader, and how closely. A cause may look like the
+measurement, predict it, and still not be all: what is left beside it is then told by runs of
+both, made where the leader is, and by nothing that was seen before. It passes no verdict
+(`analysis.verdict` says what a second cause must bring).
+"""
+
+from __future__ import annotations
+
+from analysis.atlas import Atlas, coarse_stride
+from analysis.beside import place_beside
+from analysis.candidate import Candidate, Effects
+from analysis.causes import Hypothesis
+from analysis.chart import Chart
+from analysis.contest import CLOSE, catch_up, settle
+from analysis.hunt import Hunt
+from analysis.pairs import look_at_felt
+from analysis.parts import earns
+from analysis.screening import Additions, add_causes, near, ranked, screen_felt, screen_singles
+
+__all__ = ["look_for_second"]
+
+_GLANCE_FREQUENCIES = 10
+"""At how many frequencies others are placed beside the leader."""
+
+_TRIED, _GROUPS, _REACH = 8, 2, (0.12, 0.03)
+"""How many of them are simulated on few rows, in how many groups, and how far about their places in
+ratio and sizes. True ones stood second at worst where they were to be seen at all."""
+
+_CLOSER, _CLOSER_GROUPS = 5, 3
+"""How many of these are simulated once more, farther about, so that slopes can be told."""
+
+_ON_ALL, _ALL_GROUPS, _BEHIND = 3, 4, 20.0
+"""How many are simulated on all rows, in how many groups, and the log-likelihood on few rows behind
+the leader from which none is: few runs rank them by chance, and true ones lay 1 behind."""
+
+_CALLED_FOR, _ROUNDS = 15.0, 2
+"""By so much must one then lead to be looked at any further, and in how many rounds of runs it and
+the leader are: of false ones the best led by 9 with 160 runs of each, true ones by 44 to 80."""
+
+
+def look_for_second(rough: Hunt, fine: Hunt, atlas: Atlas) -> None:
+    """See whether a second cause hides behind a single one that is not doubted.
+
+    Parameters
+    ----------
+    rough, fine
+        Hunts on few and on all rows; the second one's leader is what others are tried beside.
+    atlas
+        On the rows of `rough`.
+
+    Raises
+    ------
+    AnalysisError
+        If a motion grew without bound.
+    """
+    leader = fine.best.hypothesis.effects
+    if len(leader) != 1:
+        return
+    additions = add_causes(rough.unit, rough.observation, atlas)
+    kept = _worth(rough, additions, fine.found[leader])
+    kept += [key for key in _stood_for(rough, additions, atlas, leader) if key not in kept]
+    if not kept:
+        return
+    fine.take_over([rough.found[key] for key in kept], _ALL_GROUPS)
+    catch_up(fine, kept, leader)
+    alone = fine.found[leader].best.log_likelihood
+    beside = {k: fine.found[k].best.log_likelihood - alone for k in kept if leader[0] in k}
+    fine.leave_out([k for k, lead in beside.items() if 0.0 < lead < _CALLED_FOR])
+    for _ in range(_ROUNDS):
+        if fine.best.hypothesis.effects == leader:
+            break
+        settle(fine, [leader, *(key for key in fine.leading(_ON_ALL, CLOSE) if key != leader)])
+        fine.hear()
+
+
+def _worth(rough: Hunt, additions: Additions, leader: Candidate) -> list[Effects]:
+    """Pairs with the leader that are worth simulating on all rows."""
+    few = rough.thinned(coarse_stride(rough.observation, _GLANCE_FREQUENCIES))
+    alone, place = leader.hypothesis, leader.best.place
+    placed = place_beside(few, additions, alone, place)
+    tried = {key: placed[key].place for key in ranked(placed)[:_TRIED]}
+    rough.start({alone.effects: place, **tried}, _GROUPS, reach=_REACH)
+    least = rough.found[alone.effects].best.log_likelihood - _BEHIND
+    closer = [k for k in rough.among(tried) if rough.found[k].best.log_likelihood > least]
+    closer = closer[:_CLOSER]
+    rough.start({key: rough.found[key].best.place for key in closer}, _CLOSER_GROUPS)
+    return rough.among(closer)[:_ON_ALL]
+
+
+def _stood_for(rough: Hunt, additions: Additions, atlas: Atlas, leader: Effects) -> list[Effects]:
+    """Two causes at the load that a payload may stand for, which is then likely by that measure."""
+    if not Chart(Hypothesis(rough.unit, leader), rough.observation.frequency_hz).bent.any():
+        return []
+    glance = screen_singles(rough.unit, rough.observation, atlas, [leader])[leader]
+    stood_for = near(screen_felt(additions), glance.log_likelihood)
+    look_at_felt(rough, stood_for)
+    return rough.among([key for key in stood_for if earns(key, rough.found)])[:_ON_ALL]

@@ -1,0 +1,187 @@
+"""What is looked for behind a single cause that nobody doubts, given how all stand."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import synthetic
+
+from analysis import second_cause
+from analysis.causes import Hypothesis
+from analysis.screening import Place
+
+ADSS = synthetic.ADSS
+
+
+class Beside:
+    """A hunt that takes over what it is given, and whose leader is who is likeliest."""
+
+    def __init__(self, leader):
+        self.found, self.settled = {leader.hypothesis.effects: leader}, []
+
+    @property
+    def best(self):
+        return max(self.found.values(), key=lambda c: c.best.log_likelihood)
+
+    def leading(self, most, behind):
+        ranked = sorted(self.found, key=lambda key: -self.found[key].best.log_likelihood)
+        likeliest = self.best.best.log_likelihood
+        near = [k for k in ranked if self.found[k].best.log_likelihood > likeliest - behind]
+        return near[:most]
+
+    def settle(self, chosen, groups):
+        self.settled.append(chosen)
+
+    def hear(self):
+        pass
+
+    def take_over(self, candidates, groups):
+        self.found |= {c.hypothesis.effects: c for c in candidates}
+
+    def leave_out(self, keys):
+        for key in keys:
+            del self.found[key]
+
+
+@pytest.mark.parametrize(
+    ("behind", "closer_at", "kept"),
+    [
+        ((-9.0, 5.0, 19.0, 21.0), 3, 3), ((21.0, 30.0, 19.0, 22.0), 1, 1), ((21.0,), 0, 0),
+        ((9.0, 5.0, 19.0, 8.0, 7.0, 6.0), 5, 3),
+    ],
+)  # fmt: skip
+def test_those_placed_best_beside_a_leader_are_kept_where_runs_bear_them_out(
+    monkeypatch, behind, closer_at, kept
+):
+    """Eight are simulated about their places, and the leader as often about its own.
+
+    Five at most are looked at closer, three on all rows.
+    """
+    leader, place, started, closer = ("load-inertia",), np.array([0.3, 0.6]), {}, {}
+    placed = {
+        (*leader, f"partner-{i}"): Place(np.array([0.3, 0.6, 0.1 * i]), 95.0 - 4.0 * i)
+        for i in range(12)
+    }
+
+    class Rough:
+        unit, observation = ADSS, SimpleNamespace(blocks=(slice(0, 21),))
+        found = {}
+
+        def thinned(self, stride):
+            return ("few", stride)
+
+        def start(self, places, groups, reach=None):
+            if reach is None:
+                closer.update(places)
+                assert groups == 3
+                return
+            started.update(places)
+            assert (groups, reach) == (2, (0.12, 0.03))
+            # Who was placed best is not who does best.
+            ranked = [-i for i in behind] + [-300.0] * len(placed)
+            order = [key for key in places if key != leader][::-1]
+            likelihood = {leader: 100.0}
+            likelihood |= {k: 100.0 + off for k, off in zip(order, ranked, strict=False)}
+            for key, one in likelihood.items():
+                best = SimpleNamespace(log_likelihood=one, place=one)
+                self.found[key] = SimpleNamespace(best=best)
+
+        def among(self, keys):
+            return sorted(keys, key=lambda key: -self.found[key].best.log_likelihood)
+
+    def beside(few, additions, known, at):
+        assert (few, additions, known.effects, at is place) == (("few", 2), "sums", leader, True)
+        return placed
+
+    monkeypatch.setattr(second_cause, "place_beside", beside)
+    alone = SimpleNamespace(hypothesis=Hypothesis(ADSS, leader), best=SimpleNamespace(place=place))
+    found = second_cause._worth(Rough(), "sums", alone)
+    best_placed = list(placed)[:8]
+    assert set(started) == {leader, *best_placed}
+    assert all(started[key] is placed[key].place for key in best_placed)
+    ranked = [best_placed[::-1][i] for i in np.argsort(behind)]
+    assert list(closer) == ranked[:closer_at]
+    assert found == ranked[:kept]
+
+
+@pytest.mark.parametrize(
+    ("leader", "behind", "pair_is_at", "looked_at", "taken_over"),
+    [
+        ("payload-flexibility", 79.0, 120.0, True, True),
+        ("payload-flexibility", 79.0, 95.0, True, False),
+        ("payload-flexibility", -300.0, 120.0, True, True),
+        ("payload-flexibility", 81.0, 120.0, False, False),
+        ("motor-constant", 0.0, 120.0, False, False),
+    ],
+)
+def test_a_payload_is_held_against_two_causes_at_the_load_that_it_may_stand_for(
+    monkeypatch, leader, behind, pair_is_at, looked_at, taken_over
+):
+    """Where what is felt says that they may, and on all rows if they beat their own parts."""
+    pair, key, part = ("cable-stiffness", "load-inertia"), (leader,), ("load-inertia",)
+
+    def standing(effects, likelihood):
+        best = SimpleNamespace(place=None, log_likelihood=likelihood)
+        return SimpleNamespace(
+            best=best, hypothesis=Hypothesis(ADSS, effects), population=range(40)
+        )
+
+    found = {key: standing(key, 110.0), part: standing(part, 90.0)}
+    looked = []
+
+    def look(rough, places):
+        looked.extend(places)
+        rough.found |= {one: standing(one, pair_is_at) for one in places}
+
+    rough = SimpleNamespace(
+        unit=ADSS, observation=SimpleNamespace(frequency_hz=None), found=found, among=list
+    )
+    fine = Beside(found[key])
+    felt = {pair: Place(None, 100.0 - behind)}
+    monkeypatch.setattr(second_cause, "screen_singles", lambda *_: {key: Place(None, 100.0)})
+    monkeypatch.setattr(second_cause, "add_causes", lambda *_: SimpleNamespace(felt=felt))
+    monkeypatch.setattr(second_cause, "_worth", lambda *_: [])
+    monkeypatch.setattr(second_cause, "screen_felt", lambda additions: additions.felt)
+    monkeypatch.setattr(second_cause, "look_at_felt", look)
+    second_cause.look_for_second(rough, fine, {key: None})
+    assert looked == ([pair] if looked_at else [])
+    assert list(fine.found) == ([key, pair] if taken_over else [key])
+    assert fine.settled == ([[key, pair]] * 2 if taken_over else [])
+
+
+@pytest.mark.parametrize(
+    ("pair", "ahead", "more", "stays"),
+    [
+        (("amplifier-lag", "load-inertia"), 16.0, 2, True),
+        (("amplifier-lag", "load-inertia"), 14.0, 0, False),
+        (("amplifier-lag", "load-inertia"), -1.0, 0, True),
+        # One that the leader is no part of has nothing to bring beside it.
+        (("amplifier-lag", "shaft-stiffness"), 1.0, 2, True),
+    ],
+)
+def test_who_takes_the_lead_behind_a_cause_gets_more_runs_and_the_cause_as_many(
+    monkeypatch, pair, ahead, more, stays
+):
+    leader = ("load-inertia",)
+    found = {
+        key: SimpleNamespace(
+            hypothesis=Hypothesis(ADSS, key),
+            population=range(40),
+            best=SimpleNamespace(place=None, log_likelihood=likelihood),
+        )
+        for key, likelihood in ((leader, 100.0), (pair, 100.0 + ahead))
+    }
+    fine = Beside(found[leader])
+    rough = SimpleNamespace(unit=ADSS, observation=SimpleNamespace(frequency_hz=None), found=found)
+    monkeypatch.setattr(second_cause, "add_causes", lambda *_: None)
+    monkeypatch.setattr(second_cause, "_worth", lambda *_: [pair])
+    second_cause.look_for_second(rough, fine, {leader: None})
+    assert fine.settled == [[leader, pair]] * more
+    assert (pair in fine.found) == stays
+
+
+def test_nothing_is_looked_for_behind_a_pair_or_behind_nothing():
+    for effects in ((), ("amplifier-lag", "load-inertia")):
+        leader = SimpleNamespace(hypothesis=Hypothesis(ADSS, effects), best=None)
+        # Neither hunt would bear being asked for anything else.
+        second_cause.look_for_second(None, SimpleNamespace(best=leader), {})
