@@ -8,6 +8,8 @@ both, made where the leader is, and by nothing that was seen before. It passes n
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from analysis.atlas import Atlas, coarse_stride
 from analysis.beside import place_beside
 from analysis.candidate import Candidate, Effects
@@ -31,13 +33,17 @@ ratio and sizes. True ones stood second at worst where they were to be seen at a
 _CLOSER, _CLOSER_GROUPS = 5, 3
 """How many of these are simulated once more, farther about, so that slopes can be told."""
 
-_ON_ALL, _ALL_GROUPS, _BEHIND = 3, 4, 20.0
-"""How many are simulated on all rows, in how many groups, and the log-likelihood on few rows behind
-the leader from which none is: few runs rank them by chance, and true ones lay 1 behind."""
+_BEHIND = 20.0
+"""Log-likelihood on few rows behind the leader from which none goes on: few runs rank them by
+chance, and true ones lay 1 behind."""
+
+_ON_ALL, _ALL_GROUPS, _NEARLY = 3, 4, 15.0
+"""How many are simulated on all rows, in how many groups, and the log-likelihood behind the leader
+within which they get as many again: true ones led by 7 to 40 with the first of these runs."""
 
 _CALLED_FOR, _ROUNDS = 15.0, 2
 """By so much must one then lead to be looked at any further, and in how many rounds of runs it and
-the leader are: of false ones the best led by 9 with 160 runs of each, true ones by 44 to 80."""
+the leader are: of false ones the best led by 15 with 80 runs, true ones by 38 to 50."""
 
 
 def look_for_second(rough: Hunt, fine: Hunt, atlas: Atlas) -> None:
@@ -59,20 +65,25 @@ def look_for_second(rough: Hunt, fine: Hunt, atlas: Atlas) -> None:
     if len(leader) != 1:
         return
     additions = add_causes(rough.unit, rough.observation, atlas)
-    kept = _worth(rough, additions, fine.found[leader])
-    kept += [key for key in _stood_for(rough, additions, atlas, leader) if key not in kept]
-    if not kept:
+    beside = _worth(rough, additions, fine.found[leader])
+    others = _stood_for(rough, additions, atlas, leader)
+    if not beside and not others:
         return
-    fine.take_over([rough.found[key] for key in kept], _ALL_GROUPS)
-    catch_up(fine, kept, leader)
-    alone = fine.found[leader].best.log_likelihood
-    beside = {k: fine.found[k].best.log_likelihood - alone for k in kept if leader[0] in k}
-    fine.leave_out([k for k, lead in beside.items() if 0.0 < lead < _CALLED_FOR])
+    fine.take_over([rough.found[key] for key in (*beside, *others)], _ALL_GROUPS)
+    settle(fine, [key for key, lead in _leads(fine, beside, leader).items() if lead > -_NEARLY])
+    catch_up(fine, others, leader)
+    leads = _leads(fine, beside, leader)
+    fine.leave_out([key for key, lead in leads.items() if 0.0 < lead < _CALLED_FOR])
     for _ in range(_ROUNDS):
         if fine.best.hypothesis.effects == leader:
             break
         settle(fine, [leader, *(key for key in fine.leading(_ON_ALL, CLOSE) if key != leader)])
         fine.hear()
+
+
+def _leads(fine: Hunt, keys: Sequence[Effects], leader: Effects) -> dict[Effects, float]:
+    alone = fine.found[leader].best.log_likelihood
+    return {key: fine.found[key].best.log_likelihood - alone for key in keys}
 
 
 def _worth(rough: Hunt, additions: Additions, leader: Candidate) -> list[Effects]:
