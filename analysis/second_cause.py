@@ -37,7 +37,7 @@ _BEHIND = 20.0
 """Log-likelihood on few rows behind the leader from which none goes on: few runs rank them by
 chance, and true ones lay 1 behind."""
 
-_ON_ALL, _ALL_GROUPS, _NEARLY = 3, 4, 15.0
+_ON_ALL, _ALL_GROUPS, _NEARLY = 4, 4, 15.0
 """How many are simulated on all rows, in how many groups, and the log-likelihood behind the leader
 within which they get as many again: true ones led by 7 to 40 with the first of these runs."""
 
