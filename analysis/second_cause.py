@@ -28,7 +28,7 @@ _GLANCE_FREQUENCIES = 10
 
 _TRIED, _GROUPS, _REACH = 8, 2, (0.12, 0.03)
 """How many of them are simulated on few rows, in how many groups, and how far about their places in
-ratio and sizes. True ones stood second at worst where they were to be seen at all."""
+ratio and sizes. True ones stood fourth at worst where they were to be seen at all."""
 
 _CLOSER, _CLOSER_GROUPS = 5, 3
 """How many of these are simulated once more, farther about, so that slopes can be told."""
@@ -42,8 +42,8 @@ _ON_ALL, _ALL_GROUPS, _NEARLY = 4, 4, 15.0
 within which they get as many again: true ones led by 7 to 40 with the first of these runs."""
 
 _CALLED_FOR, _ROUNDS = 15.0, 2
-"""By so much must one then lead to be looked at any further, and in how many rounds of runs it and
-the leader are: of false ones the best led by 15 with 80 runs, true ones by 38 to 50."""
+"""By so much must one then lead to be left in the contest, and in how many rounds of runs it and the
+leader then are: of false ones the best led by 15 to 24 with 80 runs, true ones by 38 to 50."""
 
 
 def look_for_second(rough: Hunt, fine: Hunt, atlas: Atlas) -> None:
@@ -73,7 +73,8 @@ def look_for_second(rough: Hunt, fine: Hunt, atlas: Atlas) -> None:
     settle(fine, [key for key, lead in _leads(fine, beside, leader).items() if lead > -_NEARLY])
     catch_up(fine, others, leader)
     leads = _leads(fine, beside, leader)
-    fine.leave_out([key for key, lead in leads.items() if 0.0 < lead < _CALLED_FOR])
+    # They would only take the place of rivals among those that are judged.
+    fine.leave_out([key for key, lead in leads.items() if lead < _CALLED_FOR])
     for _ in range(_ROUNDS):
         if fine.best.hypothesis.effects == leader:
             break

@@ -154,8 +154,8 @@ def test_a_payload_is_held_against_two_causes_at_the_load_that_it_may_stand_for(
     [
         (16.0, True, 2, True),
         (14.0, True, 0, False),
-        (-14.0, True, 0, True),
-        (-16.0, False, 0, True),
+        (-14.0, True, 0, False),
+        (-16.0, False, 0, False),
     ],
 )
 def test_who_takes_the_lead_behind_a_cause_gets_more_runs_and_the_cause_as_many(
