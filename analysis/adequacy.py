@@ -13,13 +13,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.candidate import Candidate
 from analysis.holdout import HeldOut, hold_out_surface
 from analysis.own_runs import MOST_RUNS, own_runs
 from analysis.structure import credited, judge_structure
 
-__all__ = ["Adequacy", "judge_adequacy", "judge_chance", "misses_alike"]
+__all__ = ["Adequacy", "judge_adequacy", "judge_chance", "judge_gain", "misses_alike"]
 
 _TRIES = 2
 
@@ -76,13 +77,41 @@ def judge_chance(simpler: Candidate, alleged: Candidate, rng: np.random.Generato
     expectation is blurred over all branches, and does so for its own runs, too
     (D. R. Cox, "Tests of separate families of hypotheses", 1961).
     """
-    seen = alleged.best.log_likelihood - simpler.best.log_likelihood
+    gains = _gains_by_chance(simpler, alleged, rng)
+    return float(np.mean(gains >= _gain(simpler, alleged))) if len(gains) else 0.0
+
+
+def judge_gain(
+    simpler: Candidate, alleged: Candidate, rng: np.random.Generator
+) -> tuple[float, float]:
+    """That share, and by how many of their standard deviations the gain exceeds own runs' mean one.
+
+    Where few own runs are on the branch that was observed, their share says little, and gains that
+    differ by hundreds from run to run say that such a gain is none. Infinite where no run can be
+    compared.
+    """
+    gains = _gains_by_chance(simpler, alleged, rng)
+    if not len(gains):
+        return 0.0, float("inf")
+    seen = _gain(simpler, alleged)
+    beyond = (seen - np.mean(gains)) / max(float(np.std(gains)), 1e-9)
+    return float(np.mean(gains >= seen)), float(beyond)
+
+
+def _gain(simpler: Candidate, alleged: Candidate) -> float:
+    return alleged.best.log_likelihood - simpler.best.log_likelihood
+
+
+def _gains_by_chance(
+    simpler: Candidate, alleged: Candidate, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """By how much (n,) another explains the own runs of a hypothesis better than it does itself."""
     gains = [
         run.seen_by(alleged.surface).climb(alleged.best.place, tries=_TRIES).log_likelihood
         - run.alone.climb(run.place, tries=_TRIES).log_likelihood
         for run in own_runs(simpler, rng)
     ]
-    return float(np.mean(np.array(gains) >= seen)) if gains else 0.0
+    return np.array(gains)
 
 
 def misses_alike(

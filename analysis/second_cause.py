@@ -42,8 +42,8 @@ _ON_ALL, _ALL_GROUPS, _NEARLY = 4, 4, 15.0
 within which they get as many again: true ones led by 7 to 40 with the first of these runs."""
 
 _CALLED_FOR, _ROUNDS = 15.0, 2
-"""By so much must one then lead to be left in the contest, and in how many rounds of runs it and the
-leader then are: of false ones the best led by 15 to 24 with 80 runs, true ones by 38 to 50."""
+"""By so much must one then lead to be left in the contest, and in how many rounds of runs it and
+the leader then are: of false ones the best led by 15 to 24 with 80 runs, true ones by 38 to 50."""
 
 
 def look_for_second(rough: Hunt, fine: Hunt, atlas: Atlas) -> None:

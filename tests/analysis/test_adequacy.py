@@ -67,3 +67,27 @@ def test_where_every_run_did_alone_what_it_did_nothing_speaks_against_the_observ
     one = SimpleNamespace(best=SimpleNamespace(log_likelihood=10.0), surface=None)
     assert adequacy.judge_adequacy(one, None) == adequacy.Adequacy(0.0, 0.0, ())
     assert adequacy.judge_chance(one, one, None) == 0.0
+    assert adequacy.judge_gain(one, one, None) == (0.0, np.inf)
+
+
+@pytest.mark.parametrize(
+    ("ahead", "share", "beyond"),
+    # By chance -3 to 1 in this world, -1 in the mean, with a standard deviation of sqrt(2).
+    [(0.0, 0.4, 1.0 / np.sqrt(2.0)), (1.0, 0.2, np.sqrt(2.0)), (6.0, 0.0, 7.0 / np.sqrt(2.0))],
+)
+def test_a_gain_is_held_against_what_own_runs_bring_by_chance(monkeypatch, ahead, share, beyond):
+    def standing(likelihood):
+        best = SimpleNamespace(log_likelihood=likelihood, place=None)
+        climbs = SimpleNamespace(climb=lambda place, tries: best)
+        return SimpleNamespace(best=best, surface=climbs, climb=climbs.climb)
+
+    simpler, alleged = standing(100.0), standing(100.0 + ahead)
+
+    def run(gain):
+        seen = standing(50.0 + gain)
+        return SimpleNamespace(seen_by=lambda _: seen, alone=standing(50.0), place=None)
+
+    runs = [run(gain) for gain in (-3.0, -2.0, -1.0, 0.0, 1.0)]
+    monkeypatch.setattr(adequacy, "own_runs", lambda *_: iter(runs))
+    assert adequacy.judge_gain(simpler, alleged, None) == pytest.approx((share, beyond))
+    assert adequacy.judge_chance(simpler, alleged, None) == pytest.approx(share)

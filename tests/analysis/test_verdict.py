@@ -242,10 +242,18 @@ def test_a_size_that_wants_to_be_beyond_its_range_is_no_explanation(
 
 
 @pytest.mark.parametrize(
-    ("share", "lead", "named"),
-    [(0.05, 60.0, TRUE), (0.03, 21.0, TRUE + WRONG), (0.03, 19.0, TRUE)],
+    ("share", "beyond", "lead", "named"),
+    [
+        (0.05, 3.1, 60.0, TRUE),
+        (0.03, 3.1, 21.0, TRUE + WRONG),
+        (0.03, 3.1, 19.0, TRUE),
+        # Friction beside damped teeth led by 304 where own runs differ by 450 from run to run.
+        (0.00, 2.9, 304.0, TRUE),
+    ],
 )
-def test_a_pair_that_leads_by_little_or_by_chance_is_not_believed(monkeypatch, share, lead, named):
+def test_a_pair_that_leads_by_little_or_by_chance_is_not_believed(
+    monkeypatch, share, beyond, lead, named
+):
     found = judge(seen(TRUE, 1), ((), TRUE, (*TRUE, *WRONG)), 1)
     pair, part = (next(o for o in found.judged if o.effects == e) for e in (TRUE + WRONG, TRUE))
     pair = replace(pair, score=part.score + lead, objection="")
@@ -253,9 +261,9 @@ def test_a_pair_that_leads_by_little_or_by_chance_is_not_believed(monkeypatch, s
 
     def chance(simpler, alleged, rng):
         assert (simpler, alleged) == (part.candidate, pair.candidate)
-        return share
+        return share, beyond
 
-    monkeypatch.setattr(rules, "judge_chance", chance)
+    monkeypatch.setattr(rules, "judge_gain", chance)
     rng = np.random.default_rng(0)
     best = rules._simplest([pair, part, found.baseline], rng)
     assert best.effects == named
