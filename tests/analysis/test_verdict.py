@@ -49,6 +49,16 @@ def test_sets_far_behind_are_not_held_against_runs_of_their_own_but_the_baseline
             assert not one.refused, "nobody asked whether it looks like its own runs"
 
 
+def test_parts_of_the_leader_are_held_against_their_own_runs_however_far_behind(monkeypatch):
+    pair = tuple(sorted(TRUE + WRONG))
+    score = {(): 0.0, TRUE: 100.0, ("cable-stiffness",): 200.0, pair: 600.0}
+    monkeypatch.setattr(rules, "_score", lambda c, h: score[c.hypothesis.effects])
+    monkeypatch.setattr(rules, "judge_gain", lambda *_: (0.0, 9.0))
+    verdict = judge(seen(TRUE, 1), tuple(score), 1)
+    unasked = [one.effects for one in verdict.judged if np.isnan(one.misfit)]
+    assert unasked == [("cable-stiffness",)]
+
+
 @pytest.mark.parametrize("seed", range(10))
 def test_nothing_is_named_where_nothing_is_hidden(seed):
     verdict = judge(seen((), seed, size=0.0), seed=10 * seed)
@@ -177,6 +187,30 @@ def test_what_stands_in_for_a_refused_leader_is_not_named_alone(
     assert verdict.best.effects == (WRONG if word == "unexplained" else TRUE)
     if word != "unexplained":
         assert [one.effects for one in verdict.rivals] == ([WRONG] if word == "ambiguous" else [])
+
+
+@pytest.mark.parametrize(
+    ("best", "holding", "objection", "rivals"),
+    [
+        # Withheld play was told to be soft teeth with 0.48, what was likelier was all refused.
+        (0.48, 0.0, "leaves structure that its own runs do not", [WRONG]),
+        (0.52, 0.0, "leaves structure that its own runs do not", []),
+        (0.40, 0.12, "leaves structure that its own runs do not", []),
+        (0.48, 0.0, rules._NOT_ASKED, []),
+    ],
+)
+def test_what_is_refused_is_a_rival_where_more_is_believed_of_others(
+    best, holding, objection, rivals, monkeypatch
+):
+    monkeypatch.setattr(rules, "is_felt_alike", lambda *_: False)
+    found = judge(seen(TRUE, 1), ((), TRUE, WRONG), 1)
+    first = replace(found.best, probability=best)
+    (wrong,) = (one for one in found.judged if one.effects == WRONG)
+    other = replace(wrong, objection=objection, score=first.score - 1.0, probability=1.0 - best)
+    both = candidate(seen(TRUE, 1), tuple(sorted(TRUE + WRONG)), 1)
+    more = replace(wrong, candidate=both, objection="no", score=0.0, probability=holding)
+    verdict = replace(found, best=first, judged=(first, other, more, found.baseline))
+    assert [one.effects for one in verdict.rivals] == rivals
 
 
 @pytest.mark.parametrize(
