@@ -201,7 +201,7 @@ def _look_at_all(
         missing = compare(fine, rng)
         if doubted or not is_doubtful(fine.best, rng):
             break
-    if missing and not doubted:
+    if missing and not doubted and not fine.purse.is_spent:
         look_for_second(rough, fine, atlas)
     return missing, doubted
 

@@ -64,15 +64,20 @@ def test_a_search_that_has_spent_all_is_left_with_a_leader_that_explains_nothing
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_search_that_has_spent_all_goes_on_with_a_leader_that_explains(runs, monkeypatch, seed):
+    """Others are held against it as before; a second cause is not looked for behind it."""
+    compared = []
+    rare = search.look_at_rare
+    monkeypatch.setattr(search, "look_at_rare", lambda *given: compared.append(1) or rare(*given))
     whole = synthetic_search.searched(("load-inertia",), [0.8], seed)
-    made = dict(runs)
+    assert any(len(key) > 1 for key in runs)
     runs.clear()
     monkeypatch.setattr(Purse, "is_spent", True)
     found = synthetic_search.searched(("load-inertia",), [0.8], seed)
     assert not whole.given_up
     assert not found.given_up
     assert found.candidates[0].hypothesis.effects == ("load-inertia",)
-    assert dict(runs) == made
+    assert len(compared) == 2
+    assert all(len(key) < 2 for key in runs)
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -86,8 +91,9 @@ def test_a_second_cause_is_found_behind_one_that_nobody_doubts(runs, monkeypatch
 def test_nothing_is_looked_for_behind_a_cause_that_explains_all(runs):
     found, verdict = synthetic_search.diagnosed(("load-inertia",), [0.8], 1)
     assert verdict.best.effects == ("load-inertia",)
-    # Twenty runs of a few pairs, forty more of two of them; what does no better goes no further.
-    assert all(count <= 60 for key, count in runs.items() if len(key) > 1)
+    # Twenty runs to place each pair with it, fifty more of a few on few rows, eighty of these on
+    # all rows; what does no better goes no further.
+    assert all(count <= 150 for key, count in runs.items() if len(key) > 1)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

@@ -73,34 +73,44 @@ def test_who_says_the_same_as_a_leader_with_fewer_sizes_is_looked_at_with_it(f_p
 
 
 @pytest.mark.parametrize(
-    ("runs_of_part", "weighed"), [(0, True), (79, True), (80, True), (81, False)]
-)
-def test_a_part_with_no_more_runs_than_a_pair_is_weighed_where_the_pair_has_it(
-    runs_of_part, weighed
+    ("runs_of_part", "at", "weighed", "closer"),
+    [
+        (0, None, True, False), (79, 0.1, True, False), (80, 0.1, True, False),
+        (81, 0.1, False, False), (81, 0.19, False, False),
+        # However many it has: friction of a motor had 240 at another ratio.
+        (240, 0.21, False, True), (40, 0.21, True, True),
+    ],
+)  # fmt: skip
+def test_a_part_with_no_more_runs_than_a_pair_or_at_another_ratio_is_weighed_where_the_pair_has_it(
+    runs_of_part, at, weighed, closer
 ):
     pair, part = ("amplifier-gain", "payload-flexibility"), ("payload-flexibility",)
-    known, started = {("amplifier-gain",): SimpleNamespace(population=range(200))}, []
+    own = np.array([0.1, 0.2, 0.3, 0.4])
+    other = SimpleNamespace(population=range(200), best=SimpleNamespace(place=np.array([0.1, 0.5])))
+    known, started = {("amplifier-gain",): other}, []
     if runs_of_part:
-        known[part] = SimpleNamespace(population=range(runs_of_part))
+        best = SimpleNamespace(place=np.array([at, *own[1:]]))
+        known[part] = SimpleNamespace(population=range(runs_of_part), best=best)
     leader = SimpleNamespace(
         hypothesis=Hypothesis(ADSS, pair),
         best=SimpleNamespace(place=np.array([0.1, 0.5, 0.2, 0.3, 0.4])),
         population=range(80),
     )
+
+    def start(places, groups, reach=None):
+        started.extend((key, place.tolist(), groups, reach) for key, place in places.items())
+
     fine = SimpleNamespace(
         best=leader,
         found={pair: leader, **known},
-        start=lambda places, groups: started.append(places),
+        start=start,
         leading=lambda *_: [pair, part],
         settle=lambda chosen, groups: started.append(chosen),
         hear=lambda: None,
     )
     contest.weigh_parts(fine)
-    assert len(started) == (2 if weighed else 0)
-    if weighed:
-        assert list(started[0]) == [part]
-        assert started[0][part].tolist() == [0.1, 0.2, 0.3, 0.4]
-        assert started[1] == [part]
+    wide, close = (part, own.tolist(), 4, None), (part, own.tolist(), 8, (0.1, 0.03))
+    assert started == [wide] * weighed + [close] * closer + [[part]] * (weighed or closer)
 
 
 def test_two_of_three_causes_are_weighed_where_the_three_lead(monkeypatch):
@@ -196,9 +206,13 @@ def test_pairs_are_searched_late_where_a_single_cause_would_be_refused_after_all
     assert given == (["the pair"] if refused else [])
 
 
-@pytest.mark.parametrize("doubted", [False, True])
-def test_whether_pairs_were_searched_is_told(monkeypatch, doubted):
-    fine = SimpleNamespace(found={}, best=None, take_over=lambda *_: None, hear=lambda: None)
+@pytest.mark.parametrize(("doubted", "spent"), [(False, False), (True, False), (False, True)])
+def test_whether_pairs_were_searched_is_told(monkeypatch, doubted, spent):
+    """A second cause is looked for behind one that nobody doubts, where it may be paid for."""
+    fine = SimpleNamespace(
+        found={}, best=None, take_over=lambda *_: None, hear=lambda: None,
+        purse=SimpleNamespace(is_spent=spent),
+    )  # fmt: skip
     beside = []
     monkeypatch.setattr(search, "_third", lambda _: [])
     monkeypatch.setattr(search, "is_doubtful_still", lambda *_: False)
@@ -207,4 +221,4 @@ def test_whether_pairs_were_searched_is_told(monkeypatch, doubted):
     monkeypatch.setattr(search, "look_for_second", lambda *_: beside.append(True))
     rough = SimpleNamespace(found={})
     assert search._look_at_all(rough, fine, {}, None, doubted) == (True, doubted)
-    assert bool(beside) != doubted
+    assert bool(beside) == (not doubted and not spent)
