@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.candidate import Candidate
 from analysis.holdout import HeldOut, hold_out_surface
@@ -77,8 +76,8 @@ def judge_chance(simpler: Candidate, alleged: Candidate, rng: np.random.Generato
     expectation is blurred over all branches, and does so for its own runs, too
     (D. R. Cox, "Tests of separate families of hypotheses", 1961).
     """
-    gains = _gains_by_chance(simpler, alleged, rng)
-    return float(np.mean(gains >= _gain(simpler, alleged))) if len(gains) else 0.0
+    share, _ = judge_gain(simpler, alleged, rng)
+    return share
 
 
 def judge_gain(
@@ -90,28 +89,16 @@ def judge_gain(
     differ by hundreds from run to run say that such a gain is none. Infinite where no run can be
     compared.
     """
-    gains = _gains_by_chance(simpler, alleged, rng)
-    if not len(gains):
-        return 0.0, float("inf")
-    seen = _gain(simpler, alleged)
-    beyond = (seen - np.mean(gains)) / max(float(np.std(gains)), 1e-9)
-    return float(np.mean(gains >= seen)), float(beyond)
-
-
-def _gain(simpler: Candidate, alleged: Candidate) -> float:
-    return alleged.best.log_likelihood - simpler.best.log_likelihood
-
-
-def _gains_by_chance(
-    simpler: Candidate, alleged: Candidate, rng: np.random.Generator
-) -> NDArray[np.float64]:
-    """By how much (n,) another explains the own runs of a hypothesis better than it does itself."""
+    seen = alleged.best.log_likelihood - simpler.best.log_likelihood
     gains = [
         run.seen_by(alleged.surface).climb(alleged.best.place, tries=_TRIES).log_likelihood
         - run.alone.climb(run.place, tries=_TRIES).log_likelihood
         for run in own_runs(simpler, rng)
     ]
-    return np.array(gains)
+    if not gains:
+        return 0.0, float("inf")
+    beyond = (seen - np.mean(gains)) / max(float(np.std(gains)), 1e-9)
+    return float(np.mean(np.array(gains) >= seen)), float(beyond)
 
 
 def misses_alike(
