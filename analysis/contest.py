@@ -75,8 +75,8 @@ of four times a motor's friction was found at a ratio of 0.61, and hidden at 0.4
 
 _THERE, _THERE_GROUPS = (0.1, 0.03), 8
 """How far about its place in a leading pair a part is looked at that is better at another ratio
-alone, and in how many groups: there it has more runs. Friction of a motor was hidden at 0.45, where
-pairs with it lay, and led itself by 40 runs there with 240 at 0.77."""
+alone, and in how many groups, unless it is hopeless: there it has more runs. Friction of a motor
+was hidden at 0.45, where pairs with it lay, and led itself by 40 runs there with 240 at 0.77."""
 
 _OPEN, _ROUNDS_OPEN = (1.0, 8.0), 4
 """Structure between which a leader gets more runs, and how many times. What the runs of a true
@@ -217,22 +217,23 @@ def weigh_parts(fine: Hunt) -> None:
     leader = fine.best
     if len(leader.hypothesis.effects) < 2:
         return
-    parts = places_of_parts(leader)
+    parts, hopeful = places_of_parts(leader), fine.leading(len(fine.found), HOPELESS)
     elsewhere = {
         part: place
         for part, place in parts.items()
-        if part in fine.found and abs(fine.found[part].best.place[0] - place[0]) > _MOVED
+        if part in hopeful and abs(fine.found[part].best.place[0] - place[0]) > _MOVED
     }
-    places = {
+    few = {
         part: place
         for part, place in parts.items()
-        if part not in fine.found or len(fine.found[part].population) <= len(leader.population)
+        if part not in elsewhere
+        and (part not in fine.found or len(fine.found[part].population) <= len(leader.population))
     }
-    if places or elsewhere:
-        fine.start(places, LAST_GROUPS)
+    if few or elsewhere:
+        fine.start(few, LAST_GROUPS)
         fine.start(elsewhere, _THERE_GROUPS, reach=_THERE)
         hopeful = fine.leading(len(fine.found), HOPELESS)
-        fine.settle([key for key in hopeful if key in places or key in elsewhere], LAST_GROUPS)
+        fine.settle([key for key in hopeful if key in few or key in elsewhere], LAST_GROUPS)
         fine.hear()
 
 

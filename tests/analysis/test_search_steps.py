@@ -73,16 +73,17 @@ def test_who_says_the_same_as_a_leader_with_fewer_sizes_is_looked_at_with_it(f_p
 
 
 @pytest.mark.parametrize(
-    ("runs_of_part", "at", "weighed", "closer"),
+    ("runs_of_part", "at", "hopeful", "weighed", "closer"),
     [
-        (0, None, True, False), (79, 0.1, True, False), (80, 0.1, True, False),
-        (81, 0.1, False, False), (81, 0.19, False, False),
+        (0, None, True, True, False), (79, 0.1, True, True, False), (80, 0.1, True, True, False),
+        (81, 0.1, True, False, False), (81, 0.19, True, False, False),
         # However many it has: friction of a motor had 240 at another ratio.
-        (240, 0.21, False, True), (40, 0.21, True, True),
+        (240, 0.21, True, False, True), (40, 0.21, True, False, True),
+        (240, 0.21, False, False, False), (40, 0.21, False, True, False),
     ],
 )  # fmt: skip
 def test_a_part_with_no_more_runs_than_a_pair_or_at_another_ratio_is_weighed_where_the_pair_has_it(
-    runs_of_part, at, weighed, closer
+    runs_of_part, at, hopeful, weighed, closer
 ):
     pair, part = ("amplifier-gain", "payload-flexibility"), ("payload-flexibility",)
     own = np.array([0.1, 0.2, 0.3, 0.4])
@@ -99,18 +100,24 @@ def test_a_part_with_no_more_runs_than_a_pair_or_at_another_ratio_is_weighed_whe
 
     def start(places, groups, reach=None):
         started.extend((key, place.tolist(), groups, reach) for key, place in places.items())
+        fine.found |= dict.fromkeys(places, other)
+
+    def leading(most, behind):
+        assert behind == contest.HOPELESS
+        return [pair, *([part] if hopeful and part in fine.found else [])]
 
     fine = SimpleNamespace(
         best=leader,
         found={pair: leader, **known},
         start=start,
-        leading=lambda *_: [pair, part],
+        leading=leading,
         settle=lambda chosen, groups: started.append(chosen),
         hear=lambda: None,
     )
     contest.weigh_parts(fine)
     wide, close = (part, own.tolist(), 4, None), (part, own.tolist(), 8, (0.1, 0.03))
-    assert started == [wide] * weighed + [close] * closer + [[part]] * (weighed or closer)
+    more = [[part] if hopeful else []] if weighed or closer else []
+    assert started == [wide] * weighed + [close] * closer + more
 
 
 def test_two_of_three_causes_are_weighed_where_the_three_lead(monkeypatch):
