@@ -7,7 +7,7 @@ It leaves what it found in the hunt, and does not tell whether a pair is called 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from analysis.atlas import Atlas, coarse_stride
 from analysis.beside import place_beside
@@ -23,7 +23,13 @@ from analysis.screening import (
     screen_pairs,
 )
 
-__all__ = ["look_at_felt", "search_pairs"]
+__all__ = [
+    "at_few_frequencies",
+    "look_at_felt",
+    "look_beside",
+    "look_closer_beside",
+    "search_pairs",
+]
 
 _PAIRS, _PARTNERS, _GLANCE_FREQUENCIES, _GLANCE_GROUPS = 20, 10, 10, 2
 _CLOSER, _AFTER, _GROUPS = 10, 5, (2, 3)
@@ -79,6 +85,21 @@ def look_at_felt(rough: Hunt, places: Mapping[Effects, Place]) -> None:
         rough.look_closer(list(places), groups)
 
 
+def at_few_frequencies(rough: Hunt) -> Hunt:
+    """A hunt on so few rows of a rough one's that many sets can be glanced at."""
+    return rough.thinned(coarse_stride(rough.observation, _GLANCE_FREQUENCIES))
+
+
+def look_beside(rough: Hunt, places: Starts) -> None:
+    """Look at sets with one cause more than known ones about their places, which are known well."""
+    rough.start(places, _BESIDE_GROUPS, reach=_BESIDE_REACH)
+
+
+def look_closer_beside(rough: Hunt, keys: Collection[Effects]) -> None:
+    """Look at some of these once more, farther about, so that slopes can be told."""
+    rough.start({key: rough.found[key].best.place for key in keys}, _GROUPS[1])
+
+
 def _hold_against_neighbours(
     rough: Hunt, atlas: Atlas, additions: Additions, looked_at: set[Effects]
 ) -> None:
@@ -94,7 +115,7 @@ def _hold_against_neighbours(
         # Another reading noise was heard since.
         additions = add_causes(rough.unit, rough.observation, atlas)
     kept = {part: place for pair in held for part, place in _kept(rough, pair).items()}
-    now = rough.among(looked_at | _look_beside(rough, additions, kept))[0]
+    now = rough.among(looked_at | _look_beside_all(rough, additions, kept))[0]
     if now not in held:
         _look_at_parts(rough, now)
 
@@ -120,17 +141,17 @@ def _look_at_parts(rough: Hunt, leader: Effects) -> None:
     rough.hear()
 
 
-def _look_beside(rough: Hunt, additions: Additions, kept: Starts) -> set[Effects]:
+def _look_beside_all(rough: Hunt, additions: Additions, kept: Starts) -> set[Effects]:
     """Look at all others beside what is kept of a leading pair; those that are worth it closer."""
-    few = rough.thinned(coarse_stride(rough.observation, _GLANCE_FREQUENCIES))
+    few = at_few_frequencies(rough)
     looked: set[Effects] = set()
     for part, place in kept.items():
         placed = place_beside(few, additions, rough.found[part].hypothesis, place)
         least = max(one.log_likelihood for one in placed.values()) - _HOPELESS
         worth = {k: one.place for k, one in placed.items() if one.log_likelihood > least}
-        rough.start(worth, _BESIDE_GROUPS, reach=_BESIDE_REACH)
+        look_beside(rough, worth)
         closer = rough.among(worth)[:_BESIDE_CLOSER]
-        rough.start({key: rough.found[key].best.place for key in closer}, _GROUPS[1])
+        look_closer_beside(rough, closer)
         looked |= set(closer)
     rough.hear()
     return looked
@@ -138,7 +159,7 @@ def _look_beside(rough: Hunt, additions: Additions, kept: Starts) -> set[Effects
 
 def _glance(rough: Hunt, places: dict[Effects, Place], most: int) -> list[Candidate]:
     """The most likely of some pairs by a few runs at few frequencies."""
-    few = rough.thinned(coarse_stride(rough.observation, _GLANCE_FREQUENCIES))
+    few = at_few_frequencies(rough)
     few.start({key: one.place for key, one in places.items()}, _GLANCE_GROUPS)
     # Adding up decides between two ratios by chance (docs/decisions/0033).
     others = {key: one.other for key, one in places.items() if one.other is not None}

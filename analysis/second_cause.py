@@ -10,28 +10,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from analysis.atlas import Atlas, coarse_stride
+from analysis.atlas import Atlas
 from analysis.beside import place_beside
 from analysis.candidate import Candidate, Effects
 from analysis.causes import Hypothesis
 from analysis.chart import Chart
 from analysis.contest import CLOSE, catch_up, settle
 from analysis.hunt import Hunt
-from analysis.pairs import look_at_felt
+from analysis.pairs import at_few_frequencies, look_at_felt, look_beside, look_closer_beside
 from analysis.parts import earns
 from analysis.screening import Additions, add_causes, near, ranked, screen_felt, screen_singles
 
 __all__ = ["look_for_second"]
 
-_GLANCE_FREQUENCIES = 10
-"""At how many frequencies others are placed beside the leader."""
-
-_TRIED, _GROUPS, _REACH = 8, 2, (0.12, 0.03)
-"""How many of them are simulated on few rows, in how many groups, and how far about their places in
-ratio and sizes. True ones stood fourth at worst where they were to be seen at all."""
-
-_CLOSER, _CLOSER_GROUPS = 5, 3
-"""How many of these are simulated once more, farther about, so that slopes can be told."""
+_TRIED, _CLOSER = 8, 5
+"""How many of them are simulated on few rows, and how many of these once more. True ones stood
+fourth at worst by where they were placed, where they were to be seen at all."""
 
 _BEHIND = 20.0
 """Log-likelihood on few rows behind the leader from which none goes on: few runs rank them by
@@ -89,16 +83,14 @@ def _leads(fine: Hunt, keys: Sequence[Effects], leader: Effects) -> dict[Effects
 
 def _worth(rough: Hunt, additions: Additions, leader: Candidate) -> list[Effects]:
     """Pairs with the leader that are worth simulating on all rows."""
-    few = rough.thinned(coarse_stride(rough.observation, _GLANCE_FREQUENCIES))
     alone, place = leader.hypothesis, leader.best.place
-    placed = place_beside(few, additions, alone, place)
+    placed = place_beside(at_few_frequencies(rough), additions, alone, place)
     tried = {key: placed[key].place for key in ranked(placed)[:_TRIED]}
-    rough.start({alone.effects: place, **tried}, _GROUPS, reach=_REACH)
+    look_beside(rough, {alone.effects: place, **tried})
     least = rough.found[alone.effects].best.log_likelihood - _BEHIND
-    closer = [k for k in rough.among(tried) if rough.found[k].best.log_likelihood > least]
-    closer = closer[:_CLOSER]
-    rough.start({key: rough.found[key].best.place for key in closer}, _CLOSER_GROUPS)
-    return rough.among(closer)[:_ON_ALL]
+    hopeful = [k for k in rough.among(tried) if rough.found[k].best.log_likelihood > least]
+    look_closer_beside(rough, hopeful[:_CLOSER])
+    return rough.among(hopeful[:_CLOSER])[:_ON_ALL]
 
 
 def _stood_for(rough: Hunt, additions: Additions, atlas: Atlas, leader: Effects) -> list[Effects]:

@@ -82,7 +82,7 @@ def test_others_are_tried_beside_the_causes_of_a_leading_pair(
         beside.extend(kept)
         return set(brought_in)
 
-    monkeypatch.setattr(pairs, "_look_beside", look)
+    monkeypatch.setattr(pairs, "_look_beside_all", look)
     monkeypatch.setattr(pairs, "places_of_parts", lambda leader: {(e,): None for e in leader.of})
     monkeypatch.setattr(pairs, "_look_at_parts", lambda rough, leader: alone.append(leader))
     additions = SimpleNamespace(coarse=Standings.observation)
@@ -98,7 +98,9 @@ def test_others_are_tried_beside_a_close_pair_that_shares_no_cause_with_the_lead
     likelihood = {leader: 100.0, ("a", "c"): 99.0, stranger: 100.0 - behind, far: 100.0 - behind}
     rough = Standings(likelihood | {(cause,): 0.0 for cause in "abcdef"})
     beside, alone = [], []
-    monkeypatch.setattr(pairs, "_look_beside", lambda r, a, kept: beside.extend(kept) or {leader})
+    monkeypatch.setattr(
+        pairs, "_look_beside_all", lambda r, a, kept: beside.extend(kept) or {leader}
+    )
     monkeypatch.setattr(pairs, "places_of_parts", lambda leader: {(e,): None for e in leader.of})
     monkeypatch.setattr(pairs, "_look_at_parts", lambda rough, leader: alone.append(leader))
     additions = SimpleNamespace(coarse=Standings.observation)
@@ -128,7 +130,7 @@ def test_what_causes_add_is_looked_at_again_where_another_noise_was_heard(
 
     monkeypatch.setattr(pairs, "_look_at_parts", look)
     monkeypatch.setattr(pairs, "add_causes", add)
-    monkeypatch.setattr(pairs, "_look_beside", beside)
+    monkeypatch.setattr(pairs, "_look_beside_all", beside)
     monkeypatch.setattr(pairs, "places_of_parts", lambda leader: {(e,): None for e in leader.of})
     pairs._hold_against_neighbours(rough, {}, first, {("a", "b")})
     assert len(anew) == added_up
@@ -162,7 +164,7 @@ def test_all_that_is_not_hopeless_beside_a_part_is_looked_at_where_it_was_placed
     )
     monkeypatch.setattr(pairs, "place_beside", place)
     monkeypatch.setattr(pairs, "coarse_stride", lambda *_: 2)
-    closer = pairs._look_beside(rough, None, where)
+    closer = pairs._look_beside_all(rough, None, where)
     near = {"reach": (0.12, 0.03)}
     assert started == [
         # Those 120 and 150 behind are not.
