@@ -5,14 +5,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import synthetic
-from synthetic import ROWS, candidate, observation, read
+from synthetic import LEVELS, ROWS, candidate, observation, read
 
 import analysis.holdout as module
 from analysis.holdout import hold_out
 from analysis.likelihood import HEAT
 from analysis.surface import Surface
 
-HALF = ROWS // 2
+HALF, TRUE = ROWS // 2, ("load-inertia",)
 
 
 @pytest.mark.parametrize(
@@ -66,6 +66,19 @@ def test_what_no_place_predicts_is_a_miss(seed):
     honest = observation(read((), np.array([0.5]), np.random.default_rng(seed)))
     assert hold_out(found, observed).rms_sigma > 2.0
     assert hold_out(candidate(honest, seed=seed), honest).rms_sigma < 1.3
+
+
+def test_each_level_is_predicted_by_a_fit_that_has_not_seen_it():
+    observed = observation(read(TRUE, np.array([0.5, 0.5]), np.random.default_rng(2)))
+    spoilt = observed.values.copy()
+    high = observed.source_vpk == LEVELS[1]
+    spoilt[:, high] += 0.5
+    honest = hold_out(candidate(observed, TRUE), observed)
+    other = hold_out(candidate(observation(spoilt), TRUE), observation(spoilt))
+    # What is predicted of the spoilt level comes from the other, which is as it was.
+    moved = other.residual[:2][:, high] - honest.residual[:2][:, high]
+    assert np.median(np.abs(moved)) == pytest.approx(0.5, abs=0.1)
+    assert 0.7 < honest.rms_sigma < 1.3 < 3.0 < other.rms_sigma
 
 
 @pytest.mark.parametrize(

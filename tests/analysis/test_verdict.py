@@ -5,28 +5,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from synthetic import BASE, LEVELS, candidate, observation, read, shape
+from judging import FITS, TRUE, WRONG, judge, seen
+from synthetic import BASE, candidate, observation, read, shape
 
 import analysis.verdict as rules
-from analysis import adequacy
-from analysis.holdout import hold_out
 from analysis.plausibility import is_pressed
 from analysis.verdict import judge_candidates
 
-TRUE, WRONG = ("load-inertia",), ("shaft-stiffness",)
 THREE = (*TRUE, *WRONG, "shaft-damping")
-FITS = adequacy.Adequacy(0.0, 0.0, ())
-SETS = ((), TRUE, WRONG, ("cable-stiffness",), ("amplifier-gain",))
-
-
-def seen(effects, seed, size=0.5):
-    return observation(read(effects, np.array([0.5, size]), np.random.default_rng(seed)))
-
-
-def judge(observed, sets=SETS, seed=0):
-    found = [candidate(observed, effects, seed + i) for i, effects in enumerate(sets)]
-    found.sort(key=lambda c: -c.best.log_likelihood)
-    return judge_candidates(found, observed, np.random.default_rng(seed))
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -132,121 +118,6 @@ def test_of_two_that_look_the_same_the_rare_one_is_a_rival_and_not_named_first(m
     # And a rival it stays, but for one case of four.
     assert sum(verdict.word == "ambiguous" for verdict in verdicts) >= 3
     assert all(rare in [one.effects for one in verdict.judged[:2]] for verdict in verdicts)
-
-
-@pytest.mark.parametrize(
-    ("lead", "adequate", "rivals"), [(44.0, True, [()]), (46.0, True, []), (44.0, False, [])]
-)
-def test_that_nothing_is_hidden_is_a_rival_while_it_has_a_twentieth(lead, adequate, rivals):
-    found = judge(seen(TRUE, 1), ((), TRUE), 1)
-    against = "" if adequate else "does not look like its own runs"
-    plain = replace(found.baseline, score=found.best.score - lead, objection=against)
-    verdict = replace(found, judged=(found.best, plain), baseline=plain)
-    assert [one.effects for one in verdict.rivals] == rivals
-
-
-@pytest.mark.parametrize(
-    ("behind", "adequate", "rivals"),
-    [(29.0, True, [WRONG]), (31.0, True, []), (29.0, False, []), (1.0, False, [])],
-)
-def test_another_set_is_a_rival_while_it_has_a_seventh_and_explains(behind, adequate, rivals):
-    found = judge(seen(TRUE, 1), ((), TRUE, WRONG), 1)
-    (wrong,) = (one for one in found.judged if one.effects == WRONG)
-    against = "" if adequate else "wants a size that no bench has"
-    near = replace(wrong, score=found.best.score - behind, objection=against)
-    verdict = replace(found, judged=(found.best, near, found.baseline))
-    assert [one.effects for one in verdict.rivals] == rivals
-
-
-@pytest.mark.parametrize(
-    ("lead", "objection", "alike", "word"),
-    [
-        (10.0, "wants a size that no bench has", False, "ambiguous"),
-        (10.0, "wants a size that no bench has", True, "explained"),
-        (-1.0, "wants a size that no bench has", False, "explained"),
-        # Further ahead it is the best itself, and nothing is named.
-        (21.0, "wants a size that no bench has", False, "unexplained"),
-        (-40.0, rules._NOT_ASKED, False, "explained"),
-    ],
-)
-def test_what_stands_in_for_a_refused_leader_is_not_named_alone(
-    lead, objection, alike, word, monkeypatch
-):
-    """A shaft that hardens, withheld, was told to be a light load: a stiff shaft led it."""
-    observed = seen(TRUE, 1)
-    found = [candidate(observed, effects, 1 + i) for i, effects in enumerate(((), TRUE, WRONG))]
-    scores = {(): 0.0, TRUE: 500.0, WRONG: 500.0 + lead}
-    monkeypatch.setattr(rules, "_score", lambda c, _: scores[c.hypothesis.effects])
-    monkeypatch.setattr(rules, "judge_chance", lambda *_: 0.0)
-    monkeypatch.setattr(
-        rules, "_find_objection", lambda c, *_: objection if c.hypothesis.effects == WRONG else ""
-    )
-    monkeypatch.setattr(rules, "is_felt_alike", lambda *_: alike)
-    verdict = rules.judge_candidates(found, observed, np.random.default_rng(0))
-    assert verdict.word == word
-    assert verdict.best.effects == (WRONG if word == "unexplained" else TRUE)
-    if word != "unexplained":
-        assert [one.effects for one in verdict.rivals] == ([WRONG] if word == "ambiguous" else [])
-
-
-@pytest.mark.parametrize(
-    ("best", "holding", "objection", "rivals"),
-    [
-        # Withheld play was told to be soft teeth with 0.48, what was likelier was all refused.
-        (0.48, 0.0, "leaves structure that its own runs do not", [WRONG]),
-        (0.52, 0.0, "leaves structure that its own runs do not", []),
-        (0.40, 0.12, "leaves structure that its own runs do not", []),
-        (0.48, 0.0, rules._NOT_ASKED, []),
-    ],
-)
-def test_what_is_refused_is_a_rival_where_more_is_believed_of_others(
-    best, holding, objection, rivals, monkeypatch
-):
-    monkeypatch.setattr(rules, "is_felt_alike", lambda *_: False)
-    found = judge(seen(TRUE, 1), ((), TRUE, WRONG), 1)
-    first = replace(found.best, probability=best)
-    (wrong,) = (one for one in found.judged if one.effects == WRONG)
-    other = replace(wrong, objection=objection, score=first.score - 1.0, probability=1.0 - best)
-    both = candidate(seen(TRUE, 1), tuple(sorted(TRUE + WRONG)), 1)
-    more = replace(wrong, candidate=both, objection="no", score=0.0, probability=holding)
-    verdict = replace(found, best=first, judged=(first, other, more, found.baseline))
-    assert [one.effects for one in verdict.rivals] == rivals
-
-
-@pytest.mark.parametrize(
-    ("alike", "against", "rivals"),
-    [
-        (True, "", []),
-        # A payload that swings out of sight was half as likely as the heavier load that it stands
-        # for, and a motor's constant 32 behind the load counted as its rival.
-        (True, "resonates where nothing was measured", []),
-        (True, "leaves structure that its own runs do not", ["other"]),
-        (False, "", ["same", "other"]),
-    ],
-)
-def test_what_says_the_same_counts_for_the_best(alike, against, rivals, monkeypatch):
-    found = judge(seen(TRUE, 1), ((), TRUE, WRONG), 1)
-    (wrong,) = (one for one in found.judged if one.effects == WRONG)
-    wrong = replace(wrong, objection="")
-    same, other = (
-        replace(
-            wrong,
-            candidate=replace(wrong.candidate),
-            score=found.best.score - behind,
-            probability=np.exp(-behind / 15.0),
-        )
-        for behind in (10.0, 26.0)
-    )
-    same = replace(same, objection=against)
-    monkeypatch.setattr(rules, "is_felt_alike", lambda one, _: alike and one is same.candidate)
-    # Half as likely again, the best is 32 ahead of the other, of which 30 are asked.
-    verdict = replace(found, judged=(found.best, same, other, found.baseline))
-    names = {id(same): "same", id(other): "other"}
-    assert [names[id(one)] for one in verdict.rivals] == rivals
-    counts = alike and not against.startswith("leaves")
-    counted = same.probability if counts else 0.0
-    assert verdict.probability == pytest.approx(found.best.probability + counted)
-    assert verdict.remark(same) == ("says the same with more sizes" if counts else against)
 
 
 @pytest.mark.parametrize(
@@ -390,19 +261,6 @@ def test_what_misses_other_levels_or_fits_worse_must_have_own_runs_that_do(
     assert unlike == "does not look like its own runs"
     shaped = rules._find_objection(candidate, held_out, replace(FITS, structure=2.6), rng)
     assert shaped == "leaves structure that its own runs do not"
-
-
-def test_each_level_is_predicted_by_a_fit_that_has_not_seen_it():
-    observed = seen(TRUE, 2)
-    spoilt = observed.values.copy()
-    high = observed.source_vpk == LEVELS[1]
-    spoilt[:, high] += 0.5
-    honest = hold_out(candidate(observed, TRUE), observed)
-    other = hold_out(candidate(observation(spoilt), TRUE), observation(spoilt))
-    # What is predicted of the spoilt level comes from the other, which is as it was.
-    moved = other.residual[:2][:, high] - honest.residual[:2][:, high]
-    assert np.median(np.abs(moved)) == pytest.approx(0.5, abs=0.1)
-    assert 0.7 < honest.rms_sigma < 1.3 < 3.0 < other.rms_sigma
 
 
 def test_the_world_of_these_tests_is_not_flat():

@@ -1,0 +1,125 @@
+"""Who is a rival of what is named, and what counts for it, in a world whose answers are known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from judging import TRUE, WRONG, judge, seen
+from synthetic import candidate
+
+import analysis.verdict as rules
+
+
+@pytest.mark.parametrize(
+    ("lead", "adequate", "rivals"), [(44.0, True, [()]), (46.0, True, []), (44.0, False, [])]
+)
+def test_that_nothing_is_hidden_is_a_rival_while_it_has_a_twentieth(lead, adequate, rivals):
+    found = judge(seen(TRUE, 1), ((), TRUE), 1)
+    against = "" if adequate else "does not look like its own runs"
+    plain = replace(found.baseline, score=found.best.score - lead, objection=against)
+    verdict = replace(found, judged=(found.best, plain), baseline=plain)
+    assert [one.effects for one in verdict.rivals] == rivals
+
+
+@pytest.mark.parametrize(
+    ("behind", "adequate", "rivals"),
+    [(29.0, True, [WRONG]), (31.0, True, []), (29.0, False, []), (1.0, False, [])],
+)
+def test_another_set_is_a_rival_while_it_has_a_seventh_and_explains(behind, adequate, rivals):
+    found = judge(seen(TRUE, 1), ((), TRUE, WRONG), 1)
+    (wrong,) = (one for one in found.judged if one.effects == WRONG)
+    against = "" if adequate else "wants a size that no bench has"
+    near = replace(wrong, score=found.best.score - behind, objection=against)
+    verdict = replace(found, judged=(found.best, near, found.baseline))
+    assert [one.effects for one in verdict.rivals] == rivals
+
+
+@pytest.mark.parametrize(
+    ("lead", "objection", "alike", "word"),
+    [
+        (10.0, "wants a size that no bench has", False, "ambiguous"),
+        (10.0, "wants a size that no bench has", True, "explained"),
+        (-1.0, "wants a size that no bench has", False, "explained"),
+        # Further ahead it is the best itself, and nothing is named.
+        (21.0, "wants a size that no bench has", False, "unexplained"),
+        (-40.0, rules._NOT_ASKED, False, "explained"),
+    ],
+)
+def test_what_stands_in_for_a_refused_leader_is_not_named_alone(
+    lead, objection, alike, word, monkeypatch
+):
+    """A shaft that hardens, withheld, was told to be a light load: a stiff shaft led it."""
+    observed = seen(TRUE, 1)
+    found = [candidate(observed, effects, 1 + i) for i, effects in enumerate(((), TRUE, WRONG))]
+    scores = {(): 0.0, TRUE: 500.0, WRONG: 500.0 + lead}
+    monkeypatch.setattr(rules, "_score", lambda c, _: scores[c.hypothesis.effects])
+    monkeypatch.setattr(rules, "judge_chance", lambda *_: 0.0)
+    monkeypatch.setattr(
+        rules, "_find_objection", lambda c, *_: objection if c.hypothesis.effects == WRONG else ""
+    )
+    monkeypatch.setattr(rules, "is_felt_alike", lambda *_: alike)
+    verdict = rules.judge_candidates(found, observed, np.random.default_rng(0))
+    assert verdict.word == word
+    assert verdict.best.effects == (WRONG if word == "unexplained" else TRUE)
+    if word != "unexplained":
+        assert [one.effects for one in verdict.rivals] == ([WRONG] if word == "ambiguous" else [])
+
+
+@pytest.mark.parametrize(
+    ("best", "holding", "objection", "rivals"),
+    [
+        # Withheld play was told to be soft teeth with 0.48, what was likelier was all refused.
+        (0.48, 0.0, "leaves structure that its own runs do not", [WRONG]),
+        (0.52, 0.0, "leaves structure that its own runs do not", []),
+        (0.40, 0.12, "leaves structure that its own runs do not", []),
+        (0.48, 0.0, rules._NOT_ASKED, []),
+    ],
+)
+def test_what_is_refused_is_a_rival_where_more_is_believed_of_others(
+    best, holding, objection, rivals, monkeypatch
+):
+    monkeypatch.setattr(rules, "is_felt_alike", lambda *_: False)
+    found = judge(seen(TRUE, 1), ((), TRUE, WRONG), 1)
+    first = replace(found.best, probability=best)
+    (wrong,) = (one for one in found.judged if one.effects == WRONG)
+    other = replace(wrong, objection=objection, score=first.score - 1.0, probability=1.0 - best)
+    both = candidate(seen(TRUE, 1), tuple(sorted(TRUE + WRONG)), 1)
+    more = replace(wrong, candidate=both, objection="no", score=0.0, probability=holding)
+    verdict = replace(found, best=first, judged=(first, other, more, found.baseline))
+    assert [one.effects for one in verdict.rivals] == rivals
+
+
+@pytest.mark.parametrize(
+    ("alike", "against", "rivals"),
+    [
+        (True, "", []),
+        # A payload that swings out of sight was half as likely as the heavier load that it stands
+        # for, and a motor's constant 32 behind the load counted as its rival.
+        (True, "resonates where nothing was measured", []),
+        (True, "leaves structure that its own runs do not", ["other"]),
+        (False, "", ["same", "other"]),
+    ],
+)
+def test_what_says_the_same_counts_for_the_best(alike, against, rivals, monkeypatch):
+    found = judge(seen(TRUE, 1), ((), TRUE, WRONG), 1)
+    (wrong,) = (one for one in found.judged if one.effects == WRONG)
+    wrong = replace(wrong, objection="")
+    same, other = (
+        replace(
+            wrong,
+            candidate=replace(wrong.candidate),
+            score=found.best.score - behind,
+            probability=np.exp(-behind / 15.0),
+        )
+        for behind in (10.0, 26.0)
+    )
+    same = replace(same, objection=against)
+    monkeypatch.setattr(rules, "is_felt_alike", lambda one, _: alike and one is same.candidate)
+    # Half as likely again, the best is 32 ahead of the other, of which 30 are asked.
+    verdict = replace(found, judged=(found.best, same, other, found.baseline))
+    names = {id(same): "same", id(other): "other"}
+    assert [names[id(one)] for one in verdict.rivals] == rivals
+    counts = alike and not against.startswith("leaves")
+    counted = same.probability if counts else 0.0
+    assert verdict.probability == pytest.approx(found.best.probability + counted)
+    assert verdict.remark(same) == ("says the same with more sizes" if counts else against)
