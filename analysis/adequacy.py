@@ -109,8 +109,8 @@ def misses_alike(
     asked, alike = 0, 0
     for run in own_runs(candidate, rng):
         asked += 1
-        missed = hold_out_surface(run.alone, run.place, observation).rms_sigma
-        alike += missed >= held_out.rms_sigma
+        missed = hold_out_surface(run.alone, run.place, observation).missed
+        alike += missed >= held_out.missed
         # Each takes a second or so: no more are asked than decide.
         if alike > share * MOST_RUNS:
             return True

@@ -156,8 +156,8 @@ def back_who_predicts(fine: Hunt, rng: np.random.Generator) -> None:
         ]
         if not leader.hypothesis.effects or not few:
             break
-        enough = _BETTER * hold_out(leader, fine.observation).rms_sigma
-        backed = [k for k in few if hold_out(fine.found[k], fine.observation).rms_sigma < enough]
+        enough = _BETTER * hold_out(leader, fine.observation).missed
+        backed = [k for k in few if hold_out(fine.found[k], fine.observation).missed < enough]
         # Chance of its own: where nothing is backed all comes out as if it had not been asked.
         if not backed or not is_doubtful(leader, rng.spawn(1)[0]):
             break
@@ -168,7 +168,7 @@ def back_who_predicts(fine: Hunt, rng: np.random.Generator) -> None:
 def see_it_predict(fine: Hunt) -> None:
     """Give a leader, and who is close to it, more runs where it predicts badly: few runs do."""
     for done in range(_ROUNDS_ALONE):
-        missed = hold_out(fine.best, fine.observation).rms_sigma
+        missed = hold_out(fine.best, fine.observation).missed
         causes = len(fine.best.hypothesis.effects)
         if not causes or not _PREDICTED[causes > 1] < missed < _NOT_PREDICTED:
             break
@@ -187,7 +187,7 @@ def look_at_every_ratio(fine: Hunt) -> None:
     It was found on few rows, and all of them may not bear that out; its runs lie about it.
     """
     leader, before = fine.best.hypothesis.effects, fine.best.best.place
-    if not leader or hold_out(fine.best, fine.observation).rms_sigma <= AT_NOISE:
+    if not leader or hold_out(fine.best, fine.observation).missed <= AT_NOISE:
         return
     fine.start({leader: before}, _ROUND_GROUPS, reach=_ROUND)
     if abs(fine.found[leader].best.place[0] - before[0]) > _MOVED:

@@ -66,7 +66,7 @@ def is_doubtful(
     fitted = judge_adequacy(candidate, rng)
     if fitted.sigma > unlike or fitted.structure > (unlike if structured is None else structured):
         return True
-    return hold_out(candidate, candidate.surface.observation).rms_sigma > missed
+    return hold_out(candidate, candidate.surface.observation).missed > missed
 
 
 def is_doubtful_at_once(rough: Hunt, rng: np.random.Generator) -> bool:

@@ -49,6 +49,10 @@ which of two that do alike is named first; no belief about benches rules the oth
 _FALSE_ALARM = 20.0
 """By so much must a cause beat the baseline beyond its costs."""
 
+_FURTHER = 10.0
+"""By so much must a further cause beat a part that has it not, beyond its costs: what it brings in
+the part's own runs asks for the rest."""
+
 _SURE = 3.0 * HEAT
 """While it leads by less than this, that nothing is hidden has a twentieth of its probability or
 more, and is a rival: causes that nobody thought of are blamed on others by leads like these.
@@ -268,7 +272,7 @@ def judge_candidates(
 def _find_objection(
     candidate: Candidate, held_out: HeldOut, fitted: Adequacy, rng: np.random.Generator
 ) -> str:
-    causes, missed = len(candidate.hypothesis.effects), held_out.rms_sigma
+    causes, missed = len(candidate.hypothesis.effects), held_out.missed
     several = causes > 1
     if fitted.sigma > (_UNLIKE if causes <= _FEW else _THREE_UNLIKE):
         return "does not look like its own runs"
@@ -318,13 +322,13 @@ def _simplest(judged: Sequence[Judged], rng: np.random.Generator) -> Judged:
         part = one.effects and set(one.effects) < set(best.effects)
         if not part or not one.adequate:
             continue
-        if one.score > judged[0].score - _FALSE_ALARM or not _earns_its_name(best, one, rng):
+        if one.score > judged[0].score - _FURTHER or not _earns_its_name(best, one, rng):
             return one
     return best
 
 
 def _put_behind(judged: Sequence[Judged], best: Judged) -> list[Judged]:
-    """Sets that hold the best one, and lead it, are as far behind as they would have to lead."""
+    """Sets that hold the best one, and lead it, are as far behind as what nobody would name."""
     held = [set(one.effects) > set(best.effects) and one.score > best.score for one in judged]
     scores = np.array([one.score for one in judged])
     scores[held] = best.score - _FALSE_ALARM

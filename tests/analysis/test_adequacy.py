@@ -29,7 +29,7 @@ def test_own_runs_are_asked_about_other_levels_until_they_decide(
         adequacy, "hold_out_surface", lambda *given: count.append(1) or held_out(*given)
     )
     own = candidate(seen(TRUE, 2), TRUE)
-    asks = SimpleNamespace(rms_sigma=missed)
+    asks = SimpleNamespace(missed=missed)
     assert adequacy.misses_alike(own, asks, share, np.random.default_rng(0)) is alike
     assert len(count) == asked
 

@@ -45,7 +45,7 @@ def test_a_leader_that_predicts_badly_gets_more_runs(monkeypatch, causes, missed
         settle=lambda chosen, groups: settled.append(chosen),
         hear=lambda: None,
     )
-    monkeypatch.setattr(contest, "hold_out", lambda *_: SimpleNamespace(rms_sigma=next(left)))
+    monkeypatch.setattr(contest, "hold_out", lambda *_: SimpleNamespace(missed=next(left)))
     contest.see_it_predict(fine)
     assert settled == [[leader]] * rounds
 
@@ -97,7 +97,7 @@ def test_who_predicts_better_than_a_doubted_leader_is_backed(
     monkeypatch.setattr(
         contest,
         "hold_out",
-        lambda one, _: SimpleNamespace(rms_sigma=sigma[one.hypothesis.effects]),
+        lambda one, _: SimpleNamespace(missed=sigma[one.hypothesis.effects]),
     )
     rng = np.random.default_rng(1)
     contest.back_who_predicts(Fine(), rng)
@@ -138,7 +138,7 @@ def test_a_leader_that_predicts_worse_than_true_causes_is_looked_at_over_all_rat
         start=start,
         settle=lambda chosen, groups: calls.append("settle"),
     )
-    monkeypatch.setattr(contest, "hold_out", lambda *_: SimpleNamespace(rms_sigma=missed))
+    monkeypatch.setattr(contest, "hold_out", lambda *_: SimpleNamespace(missed=missed))
     contest.look_at_every_ratio(fine)
     assert calls == ["start"] * looked + ["settle"] * settled
 

@@ -29,7 +29,7 @@ def test_few_rows_call_for_pairs_where_the_doubt_is_plain(
     )
     rough = SimpleNamespace(best=best, settle=lambda chosen, groups: more.append(chosen))
     monkeypatch.setattr(doubt, "judge_adequacy", lambda *_: fits.pop(0))
-    monkeypatch.setattr(doubt, "hold_out", lambda *_: SimpleNamespace(rms_sigma=missed.pop(0)))
+    monkeypatch.setattr(doubt, "hold_out", lambda *_: SimpleNamespace(missed=missed.pop(0)))
     assert doubt.is_doubtful_at_once(rough, None) is doubted
     assert more == [[leader]] * settled
     assert not fits
@@ -76,7 +76,7 @@ def test_a_leader_that_may_explain_is_looked_at_whatever_was_spent(
     """One that may yet come to explain, for a quarter more; one that does, to the end."""
     fitted = SimpleNamespace(sigma=misfit, structure=structure)
     monkeypatch.setattr(doubt, "judge_adequacy", lambda *_: fitted)
-    monkeypatch.setattr(doubt, "hold_out", lambda *_: SimpleNamespace(rms_sigma=missed))
+    monkeypatch.setattr(doubt, "hold_out", lambda *_: SimpleNamespace(missed=missed))
     hypothesis = SimpleNamespace(effects=("a", "b")[:causes])
     best = SimpleNamespace(surface=SimpleNamespace(observation=None), hypothesis=hypothesis)
     effort = Effort()

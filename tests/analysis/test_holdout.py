@@ -98,3 +98,18 @@ def test_what_is_kept_away_is_a_level_else_a_sweep_else_half_a_band(levels, bloc
     swept = Swept()
     swept.levels, swept.blocks = ([slice(*ends) for ends in some] for some in (levels, blocks))
     assert module._folds(swept) == [slice(*ends) for ends in folds]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_jump_between_branches_is_no_miss_and_a_resonance_is(seed):
+    rng = np.random.default_rng(seed)
+    z = np.clip(0.8 * rng.standard_normal((3, 183)), -2.5, 2.5)
+    jump, resonance = z.copy(), z.copy()
+    jump[:2, 107] = 6.0, 16.0
+    resonance[:2, 100:106] = 7.0
+    # A one-level sweep without phase: what was not observed counts for nothing.
+    z[1] = np.nan
+    honest, jump, resonance = (module.HeldOut(0.0, one, np.ones_like(z)) for one in (z, jump, resonance))
+    assert 0.6 < honest.missed < honest.rms_sigma < 0.9
+    assert jump.missed < 0.9 < 1.1 < jump.rms_sigma
+    assert 1.2 < resonance.missed < resonance.rms_sigma

@@ -99,7 +99,7 @@ def test_the_simpler_of_two_that_say_the_same_is_named_where_they_tie(
 def standing(scores):
     """A verdict over sets with such scores, all of them adequate."""
     judged = tuple(
-        rules.Judged(believed(effects), SimpleNamespace(rms_sigma=0.8), score, 0.0, 0.0, 0.0, "")
+        rules.Judged(believed(effects), SimpleNamespace(missed=0.8), score, 0.0, 0.0, 0.0, "")
         for effects, score in scores
     )
     return rules.Verdict("explained", judged[0], judged, judged[-1])

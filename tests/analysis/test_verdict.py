@@ -9,6 +9,7 @@ from judging import FITS, TRUE, WRONG, judge, seen
 from synthetic import BASE, candidate, observation, read, shape
 
 import analysis.verdict as rules
+from analysis.likelihood import HEAT
 from analysis.plausibility import is_pressed
 from analysis.verdict import judge_candidates
 
@@ -139,7 +140,7 @@ def test_a_size_that_wants_to_be_beyond_its_range_is_no_explanation(
         surface=surface,
     )
     assert is_pressed(one) is pressed
-    held_out = SimpleNamespace(rms_sigma=1.0)
+    held_out = SimpleNamespace(missed=1.0)
     for hidden, otherwise in ((False, ""), (True, "resonates where nothing was measured")):
         monkeypatch.setattr(rules, "is_out_of_sight", lambda _, hidden=hidden: hidden)
         against = rules._find_objection(one, held_out, FITS, np.random.default_rng(0))
@@ -150,8 +151,8 @@ def test_a_size_that_wants_to_be_beyond_its_range_is_no_explanation(
     ("share", "beyond", "lead", "named"),
     [
         (0.05, 3.1, 60.0, TRUE),
-        (0.03, 3.1, 21.0, TRUE + WRONG),
-        (0.03, 3.1, 19.0, TRUE),
+        (0.03, 3.1, 11.0, TRUE + WRONG),
+        (0.03, 3.1, 9.0, TRUE),
         # Friction beside damped teeth led by 304 where own runs differ by 450 from run to run.
         (0.00, 2.9, 304.0, TRUE),
     ],
@@ -176,8 +177,9 @@ def test_a_pair_that_leads_by_little_or_by_chance_is_not_believed(
     assert rules._simplest([pair, replace(part, misfit=4.1, objection="no")], rng) is pair
     first, second = rules._put_behind([pair, part], best)
     assert first.effects == named
-    assert first.probability > 0.75
-    assert first.score - second.score == pytest.approx(20.0 if named == TRUE else lead)
+    behind = 20.0 if named == TRUE else lead
+    assert first.score - second.score == pytest.approx(behind)
+    assert first.probability == pytest.approx(1.0 / (1.0 + np.exp(-behind / HEAT)))
 
 
 @pytest.mark.parametrize(("lead", "named"), [(6.0, ("cable-stiffness",)), (-6.0, TRUE)])
@@ -193,7 +195,7 @@ def test_where_a_pair_does_not_earn_its_second_cause_who_leads_its_first_is_name
     verdict = judge(seen(TRUE, 1), tuple(score), 1)
     assert (verdict.word, verdict.best.effects) == ("ambiguous", named)
     assert verdict.judged[0] is verdict.best
-    # The pair pays for its second cause, by what it would have had to lead its first.
+    # The pair pays for its second cause.
     assert {one.effects: one.score for one in verdict.judged}[pair] == 180.0
 
 
@@ -251,7 +253,7 @@ def test_what_misses_other_levels_or_fits_worse_must_have_own_runs_that_do(
     hypothesis = SimpleNamespace(effects=effects, amid=[])
     candidate = SimpleNamespace(hypothesis=hypothesis, best=best, surface=SimpleNamespace(fit=None))
     rng = np.random.default_rng(0)
-    held_out = SimpleNamespace(rms_sigma=missed)
+    held_out = SimpleNamespace(missed=missed)
     against = "" if adequate else "does not predict the other levels"
     assert rules._find_objection(candidate, held_out, FITS, rng) == against
     limit = 2.0 if effects == THREE else 4.0
