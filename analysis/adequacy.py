@@ -23,32 +23,34 @@ __all__ = ["Adequacy", "judge_adequacy", "judge_chance", "judge_gain", "misses_a
 
 _TRIES = 2
 
+_FEW = 2
+"""Own runs below which nothing is known of how they scatter."""
+
 
 @dataclass(frozen=True, slots=True)
 class Adequacy:
     """How the fit of an observation compares with those of a hypothesis's own runs.
 
     `sigma`: by how many standard deviations it is worse, negative where it is
-    better than most. `structure`: by how many it leaves more structure. Both are 0 where no run
-    can be compared. `own`: the runs' log-likelihoods.
+    better than most. `structure`: by how many it leaves more structure. Both are 0 where no runs
+    can be compared.
     """
 
     sigma: float
     structure: float
-    own: tuple[float, ...]
 
 
 def judge_adequacy(candidate: Candidate, rng: np.random.Generator) -> Adequacy:
     """Compare the fit of the observation with the fits of runs of the same hypothesis.
 
-    The runs are given reading noise; each is fitted without the group that
-    shares its deviations. In both numbers the lowest level has a credit (see
+    The runs are given reading noise; each is fitted by the half of the others that deviates
+    otherwise (`analysis.own_runs`). In both numbers the lowest level has a credit (see
     `analysis.structure.credited`).
     """
     fits = [run.alone.climb(run.place, tries=1) for run in own_runs(candidate, rng)]
-    if not fits:
-        # Every run did alone what it did: nothing speaks against the observation.
-        return Adequacy(0.0, 0.0, ())
+    if len(fits) < _FEW:
+        # Nearly every run did alone what it did: nothing speaks against the observation.
+        return Adequacy(0.0, 0.0)
     surface, best = candidate.surface, candidate.best
     own = [fit.log_likelihood for fit in fits]
     sigma = _worse([best.log_likelihood, *own])
@@ -57,7 +59,7 @@ def judge_adequacy(candidate: Candidate, rng: np.random.Generator) -> Adequacy:
         above = [np.sum(fit.density[:, lowest.stop :]) for fit in [best, *fits]]
         sigma = credited(sigma, _worse(above))
     structure = judge_structure(best, fits, surface.observation, surface.sigmas)
-    return Adequacy(sigma, structure, tuple(own))
+    return Adequacy(sigma, structure)
 
 
 def _worse(likelihoods: Sequence[float]) -> float:
@@ -86,7 +88,7 @@ def judge_gain(
     """That share, and by how many of their standard deviations the gain exceeds own runs' mean one.
 
     Where few own runs are on the branch that was observed, their share says little, and gains that
-    differ by hundreds from run to run say that such a gain is none. Infinite where no run can be
+    differ by hundreds from run to run say that such a gain is none. Infinite where no runs can be
     compared.
     """
     seen = alleged.best.log_likelihood - simpler.best.log_likelihood
@@ -95,7 +97,7 @@ def judge_gain(
         - run.alone.climb(run.place, tries=_TRIES).log_likelihood
         for run in own_runs(simpler, rng)
     ]
-    if not gains:
+    if len(gains) < _FEW:
         return 0.0, float("inf")
     beyond = (seen - np.mean(gains)) / max(float(np.std(gains)), 1e-9)
     return float(np.mean(np.array(gains) >= seen)), float(beyond)

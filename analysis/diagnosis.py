@@ -115,11 +115,12 @@ def _diagnose(
     verdict = judge_candidates(candidates, observation, rng)
     named = verdict.word in ("explained", "ambiguous")
     base = size_candidate(verdict.baseline.candidate, observation, rng)
-    best = base
+    sharp = None
     if verdict.word != "unexplained":
         late = part_of(progress, 0.8, 0.9, "sizing it")
-        best = sharpen_candidate(unit, verdict.best.candidate, observation, rng, executor, late)
+        sharp = sharpen_candidate(unit, verdict.best.candidate, observation, rng, executor, late)
     base = widen_if_open(base, verdict.baseline.candidate, observation, rng)
+    best = base if sharp is None else sharp
     departures = find_departures(verdict.baseline.candidate, observation)
     proposal = _proposal(unit, verdict, observation, seed, executor, progress)
     if progress is not None:

@@ -123,23 +123,33 @@ def _name(candidate: Candidate) -> str:
 def _feasible_plans(unit: Unit, observation: Observation) -> Iterator[SweepPlan]:
     """Sweeps of one level: those of the measurement and around them, each within the limits."""
     limits = unit.limits
-    low, high = float(observation.frequency_hz.min()), float(observation.frequency_hz.max())
     least, most = float(observation.source_vpk.min()), float(observation.source_vpk.max())
     base = observation.plans[0][0]
-    wide = (max(0.6 * low, limits.start_hz), min(1.5 * high, limits.stop_hz))
-    levels = sorted({round(v, 3) for v in (0.5 * least, least, most, 1.25 * most)
-                     if v <= limits.source_vpk})  # fmt: skip
+    grids = [spaced_frequencies(*band, _POINTS) for band in _feasible_bands(unit, observation)]
+    if not grids:
+        return
+    # Measured beyond the limits, another unit's file say, it is asked for at the limit.
+    wanted = (0.5 * least, least, most, 1.25 * most)
+    levels = [v for v in wanted if v <= limits.source_vpk] or [limits.source_vpk]
+    levels = sorted({round(v, 3) for v in levels})
     for level in levels:
-        for band in ((low, high), wide):
-            grid = spaced_frequencies(*band, _POINTS)
+        for grid in grids:
             yield replace(base, frequencies_hz=grid, levels_vpk=(level,), dc_offset_v=0.0)
     middle = levels[len(levels) // 2]
-    grid = spaced_frequencies(low, high, _POINTS)
-    one = replace(base, frequencies_hz=grid, levels_vpk=(middle,), dc_offset_v=0.0)
+    one = replace(base, frequencies_hz=grids[0], levels_vpk=(middle,), dc_offset_v=0.0)
     yield replace(one, direction="down" if base.direction == "up" else "up")
     offset = min(limits.source_offset_v, limits.source_vpk - middle)
     if offset > 0.0:
         yield replace(one, dc_offset_v=round(offset, 3))
+
+
+def _feasible_bands(unit: Unit, observation: Observation) -> Iterator[tuple[float, float]]:
+    """The band that was measured and a wider one, as far as the limits allow."""
+    low, high = float(observation.frequency_hz.min()), float(observation.frequency_hz.max())
+    for bottom, top in ((low, high), (0.6 * low, 1.5 * high)):
+        allowed = max(bottom, unit.limits.start_hz), min(top, unit.limits.stop_hz)
+        if allowed[0] < allowed[1]:
+            yield allowed
 
 
 def _separation(

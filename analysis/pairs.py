@@ -47,6 +47,11 @@ beside a cause of the leading pair; true ones lay up to 75 behind. In how many g
 looked at, and how far about their places, which are known well: what sizes further off do would
 have to be told apart by too few runs, and ranked them by chance."""
 
+_FOLLOWED, _EDGE = 2, 0.03
+"""How often one that agrees best at the end of the ratios it was looked at is looked at once more
+about there, and how near to that end. A weak amplifier alone was best at a ratio of 0.17; with
+damped teeth, placed at 0.3 and hidden at 0.52, it went from 65 to 258 in two steps, and alone."""
+
 _BESIDE_CLOSER, _STRANGER = 4, 60.0
 """How many beside each cause are looked at closer, and the log-likelihood behind the leading pair
 within which the causes of one that shares none with it are tried, too."""
@@ -91,13 +96,29 @@ def at_few_frequencies(rough: Hunt) -> Hunt:
 
 
 def look_beside(rough: Hunt, places: Starts) -> None:
-    """Look at sets with one cause more than known ones about their places, which are known well."""
+    """Look at sets with one cause more than known ones about their places, which are known well.
+
+    But for the ratio, which a further cause may move: who agrees best at the end of those looked at
+    is followed.
+    """
     rough.start(places, _BESIDE_GROUPS, reach=_BESIDE_REACH)
+    for _ in range(_FOLLOWED):
+        places = {k: rough.found[k].best.place for k in places if _is_at_an_end(rough.found[k])}
+        if not places:
+            break
+        rough.start(places, _BESIDE_GROUPS, reach=_BESIDE_REACH)
 
 
 def look_closer_beside(rough: Hunt, keys: Collection[Effects]) -> None:
     """Look at some of these once more, farther about, so that slopes can be told."""
     rough.start({key: rough.found[key].best.place for key in keys}, _GROUPS[1])
+
+
+def _is_at_an_end(one: Candidate) -> bool:
+    """Whether the best ratio is about the least or the largest of its runs, and no ratio's end."""
+    ratios, best = one.surface.places[:, 0], one.best.place[0]
+    ends = [end for end in (ratios.min(), ratios.max()) if _EDGE < end < 1.0 - _EDGE]
+    return any(abs(best - end) < _EDGE for end in ends)
 
 
 def _hold_against_neighbours(

@@ -130,14 +130,12 @@ class Surface:
         )
         return Fit(place, float(likelihoods[0]), residual, std, density, deviations)
 
-    def climb(
-        self, start: NDArray[np.float64], rows: NDArray[np.bool_] | None = None, tries: int = 12
-    ) -> Fit:
-        """The best fit to some rows, by ever finer random steps inside what was simulated.
+    def climb(self, start: NDArray[np.float64], tries: int = 12) -> Fit:
+        """The best fit, by ever finer random steps inside what was simulated.
 
         `tries` per coordinate and step size.
         """
-        return max(self.walk(start, rows, tries), key=lambda fit: fit.log_likelihood)
+        return max(self.walk(start, tries=tries), key=lambda fit: fit.log_likelihood)
 
     def walk(
         self, start: NDArray[np.float64], rows: NDArray[np.bool_] | None = None, tries: int = 12

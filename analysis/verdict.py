@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.adequacy import Adequacy, judge_adequacy, judge_chance, judge_gain, misses_alike
 from analysis.candidate import Candidate
@@ -107,9 +106,9 @@ are believed in its place, are rivals: of 142 sets drawn and named so two had le
 
 _JUDGED = 6
 
-_NOT_ASKED, _UNKNOWN = "too far behind to be asked", Adequacy(np.nan, np.nan, ())
-
+_NOT_ASKED = "too far behind to be asked"
 _OUT_OF_SIGHT = "resonates where nothing was measured"
+_UNEARNED = "a part of it does as well, or would by chance"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,7 +185,7 @@ class Verdict:
     def _says_the_same(self, one: Judged) -> bool:
         # What swings out of sight is felt as a load or a brake and as nothing else: what is
         # believed of it is believed of that.
-        may = one.adequate or one.objection == _OUT_OF_SIGHT
+        may = one.adequate or one.objection in (_OUT_OF_SIGHT, _UNEARNED)
         return may and is_felt_alike(one.candidate, self.best.candidate)
 
     def _is_led_by(self, one: Judged) -> bool:
@@ -202,6 +201,8 @@ class Verdict:
 
     def _is_rival(self, one: Judged, believed: float) -> bool:
         behind, best = believed - one.score, set(self.best.effects)
+        if one.objection == _UNEARNED:
+            return False
         if not one.effects and best:
             lead = self.best.score - one.score
             # Refused it is no explanation, and what leads it by little has hardly earned its name.
@@ -224,49 +225,68 @@ def judge_candidates(
     predicted from the others: the first uses all that was measured, the second
     pays for nothing that does not carry over.
     """
-    chosen = list(candidates[:_JUDGED])
-    chosen += [c for c in candidates[_JUDGED:] if not c.hypothesis.effects]
-    held = [hold_out(candidate, observation) for candidate in chosen]
-    scores = np.array([_score(c, h) for c, h in zip(chosen, held, strict=True)])
-    leader = set(chosen[int(scores.argmax())].hypothesis.effects)
-    judged = []
-    for c, h, score, share in zip(chosen, held, scores, _shares(scores), strict=True):
-        # The baseline is a part of every leader.
-        part = set(c.hypothesis.effects) < leader or not c.hypothesis.effects
-        asked = part or score > scores.max() - _SURE - _RARE * c.hypothesis.rare
-        fitted = judge_adequacy(c, rng) if asked else _UNKNOWN
-        objection = _find_objection(c, h, fitted, rng) if asked else _NOT_ASKED
-        fit = fitted.sigma, fitted.structure
-        judged.append(Judged(c, h, float(score), *fit, float(share), objection))
-    judged.sort(key=lambda one: -one.score)
+    judged = _ranked([_unasked(c, observation) for c in _worth_judging(candidates)])
+    while True:
+        judged = _ask(judged, rng)
+        best = _leader(judged)
+        part = _part_that_will_do(judged, best, rng)
+        if part is None:
+            break
+        judged = _put_behind(judged, best, part)
     (baseline,) = (one for one in judged if not one.effects)
-    best = _simplest(judged, rng)
     if (
         not best.effects
         or best.score < baseline.score + _FALSE_ALARM
         or _may_be_chance(baseline, best, rng)
     ):
         if baseline.adequate:
-            return Verdict("consistent", baseline, tuple(judged), baseline)
-        tie = Verdict("ambiguous", best, tuple(judged), baseline)
+            return Verdict("consistent", baseline, judged, baseline)
+        tie = Verdict("ambiguous", best, judged, baseline)
         enough = any(one.adequate or one is baseline for one in tie.rivals)
         if best.effects and best.adequate and enough:
             # Something is missing, too little of it to say which of several it is, or to be sure
             # of the one that there is.
             return tie
-        return Verdict("unexplained", baseline, tuple(judged), baseline)
-    first, judged = judged[0], _put_behind(judged, best)
-    if judged[0].effects != first.effects:
-        # What led was no better than its part, and another leads now.
-        best = _simplest(judged, rng)
-    (best,) = (one for one in judged if one.effects == best.effects)
-    (baseline,) = (one for one in judged if not one.effects)
-    verdict = Verdict("explained", best, tuple(judged), baseline)
+        return Verdict("unexplained", baseline, judged, baseline)
+    verdict = Verdict("explained", best, judged, baseline)
     if not best.adequate:
-        return Verdict("unexplained", best, verdict.judged, baseline)
+        return Verdict("unexplained", best, judged, baseline)
     if verdict.rivals:
-        return Verdict("ambiguous", best, verdict.judged, baseline)
+        return Verdict("ambiguous", best, judged, baseline)
     return verdict
+
+
+def _worth_judging(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Those that fit best by what they cost; what they may be held against; the baseline.
+
+    That is every part of theirs, and what says the same with fewer sizes.
+    """
+    by_fit = sorted(candidates, key=lambda c: _cost(c) - c.best.log_likelihood)
+    chosen = by_fit[:_JUDGED]
+    for other in by_fit[_JUDGED:]:
+        effects = set(other.hypothesis.effects)
+        part = any(effects < set(one.hypothesis.effects) for one in chosen)
+        if part or not effects or any(is_felt_alike(one, other) for one in chosen[:_JUDGED]):
+            chosen.append(other)
+    return chosen
+
+
+def _ask(judged: Sequence[Judged], rng: np.random.Generator) -> tuple[Judged, ...]:
+    """Ask what speaks against the leading ones and the parts of the first; the baseline is one."""
+    first = next(one for one in judged if one.objection != _UNEARNED)
+    asked = []
+    for one in judged:
+        part = set(one.effects) < set(first.effects) or not one.effects
+        near = one.score > first.score - _SURE - _RARE * one.candidate.hypothesis.rare
+        if one.objection != _NOT_ASKED or not (part or near):
+            asked.append(one)
+            continue
+        fitted = judge_adequacy(one.candidate, rng)
+        objection = _find_objection(one.candidate, one.held_out, fitted, rng)
+        asked.append(
+            replace(one, misfit=fitted.sigma, structure=fitted.structure, objection=objection)
+        )
+    return tuple(asked)
 
 
 def _find_objection(
@@ -305,46 +325,66 @@ def _earns_its_name(best: Judged, part: Judged, rng: np.random.Generator) -> boo
     return share <= _BY_CHANCE and beyond >= _BEYOND
 
 
-def _simplest(judged: Sequence[Judged], rng: np.random.Generator) -> Judged:
-    """The best set, or the part of it that does nearly as well: a further cause must earn it.
+def _leader(judged: Sequence[Judged]) -> Judged:
+    """The best set of those that have not been shown to owe their lead to chance.
 
-    It must lead by more, too, than it does in runs of the part alone.
-
-    Where the best set does not look like its own runs and another that ties with it does, it is
-    the other that is believed; and so is one that says the same with fewer sizes.
+    Where it does not look like its own runs and another that ties with it does, it
+    is the other that is believed; and so is one that says the same with fewer sizes.
     """
-    tied = [one for one in judged if one.score > judged[0].score - _TIE and one.adequate]
-    best = tied[0] if tied else judged[0]
+    left = [one for one in judged if one.objection != _UNEARNED]
+    tied = [one for one in left if one.score > left[0].score - _TIE and one.adequate]
+    best = tied[0] if tied else left[0]
     for one in tied:
         if is_felt_alike(best.candidate, one.candidate):
             best = one
+    return best
+
+
+def _part_that_will_do(
+    judged: Sequence[Judged], best: Judged, rng: np.random.Generator
+) -> Judged | None:
+    """The part of a set that does nearly as well, if any: a further cause must earn its name.
+
+    The set must lead it by more, too, than it does in runs of the part alone.
+    """
     for one in judged:
         part = one.effects and set(one.effects) < set(best.effects)
         if not part or not one.adequate:
             continue
-        if one.score > judged[0].score - _FURTHER or not _earns_its_name(best, one, rng):
+        if one.score > best.score - _FURTHER or not _earns_its_name(best, one, rng):
             return one
-    return best
+    return None
 
 
-def _put_behind(judged: Sequence[Judged], best: Judged) -> list[Judged]:
-    """Sets that hold the best one, and lead it, are as far behind as what nobody would name."""
-    held = [set(one.effects) > set(best.effects) and one.score > best.score for one in judged]
+def _put_behind(judged: Sequence[Judged], one: Judged, part: Judged) -> tuple[Judged, ...]:
+    """A set that has not earned its name is as far behind its part as what nobody would name."""
+    score = min(one.score, part.score - _FALSE_ALARM)
+    behind = replace(one, score=score, objection=_UNEARNED)
+    return _ranked([behind if other is one else other for other in judged])
+
+
+def _ranked(judged: Sequence[Judged]) -> tuple[Judged, ...]:
+    """The best first, with what is believed of each."""
     scores = np.array([one.score for one in judged])
-    scores[held] = best.score - _FALSE_ALARM
-    moved = [
-        replace(one, score=float(score), probability=float(share))
-        for one, score, share in zip(judged, scores, _shares(scores), strict=True)
-    ]
-    return sorted(moved, key=lambda one: -one.score)
-
-
-def _shares(scores: NDArray[np.float64]) -> NDArray[np.float64]:
     weight = np.exp((scores - scores.max()) / HEAT)
-    return np.asarray(weight / weight.sum())
+    shares = weight / weight.sum()
+    believed = [replace(o, probability=float(p)) for o, p in zip(judged, shares, strict=True)]
+    return tuple(sorted(believed, key=lambda one: -one.score))
+
+
+def _unasked(candidate: Candidate, observation: Observation) -> Judged:
+    """A candidate with its score; what speaks against it is still to be asked."""
+    held_out = hold_out(candidate, observation)
+    score = _score(candidate, held_out)
+    return Judged(candidate, held_out, score, np.nan, np.nan, 0.0, _NOT_ASKED)
 
 
 def _score(candidate: Candidate, held_out: HeldOut) -> float:
+    agreed = (1.0 - _HELD_OUT) * candidate.best.log_likelihood + _HELD_OUT * held_out.score
+    return float(agreed - _cost(candidate))
+
+
+def _cost(candidate: Candidate) -> float:
     sizes = candidate.best.place[1:]
     bound = np.count_nonzero((sizes < EDGE) | (sizes > 1.0 - EDGE))
     causes = len(candidate.hypothesis.effects)
@@ -352,5 +392,4 @@ def _score(candidate: Candidate, held_out: HeldOut) -> float:
     cost += _RARE * candidate.hypothesis.rare
     if may_be_within_tolerance(candidate):
         cost += _WITHIN_TOLERANCE
-    agreed = (1.0 - _HELD_OUT) * candidate.best.log_likelihood + _HELD_OUT * held_out.score
-    return agreed - cost
+    return float(cost)

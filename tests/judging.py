@@ -7,7 +7,7 @@ from analysis.adequacy import Adequacy
 from analysis.verdict import judge_candidates
 
 TRUE, WRONG = ("load-inertia",), ("shaft-stiffness",)
-FITS = Adequacy(0.0, 0.0, ())
+FITS = Adequacy(0.0, 0.0)
 SETS = ((), TRUE, WRONG, ("cable-stiffness",), ("amplifier-gain",))
 
 

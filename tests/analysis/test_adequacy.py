@@ -61,11 +61,20 @@ def test_misfit_at_the_lowest_level_has_a_credit_and_at_a_higher_one_has_none(se
     assert odd_above > 4.0
 
 
-def test_where_every_run_did_alone_what_it_did_nothing_speaks_against_the_observation(monkeypatch):
-    """Two short sweeps of a cable at one level had no run that others did as; it was no error."""
-    monkeypatch.setattr(adequacy, "own_runs", lambda *_: iter(()))
-    one = SimpleNamespace(best=SimpleNamespace(log_likelihood=10.0), surface=None)
-    assert adequacy.judge_adequacy(one, None) == adequacy.Adequacy(0.0, 0.0, ())
+@pytest.mark.parametrize("comparable", [0, 1])
+def test_where_every_run_did_alone_what_it_did_nothing_speaks_against_the_observation(
+    comparable, monkeypatch
+):
+    """Two short sweeps of a cable at one level had no run that others did as; it was no error.
+
+    One run has no scatter, by which anything would be far off.
+    """
+    other = SimpleNamespace(log_likelihood=20.0, place=None)
+    surface = SimpleNamespace(climb=lambda *_, tries: other)
+    run = SimpleNamespace(alone=surface, place=None, seen_by=lambda surface: surface)
+    monkeypatch.setattr(adequacy, "own_runs", lambda *_: iter((run,) * comparable))
+    one = SimpleNamespace(best=SimpleNamespace(log_likelihood=10.0, place=None), surface=surface)
+    assert adequacy.judge_adequacy(one, None) == adequacy.Adequacy(0.0, 0.0)
     assert adequacy.judge_chance(one, one, None) == 0.0
     assert adequacy.judge_gain(one, one, None) == (0.0, np.inf)
 

@@ -109,7 +109,9 @@ def test_a_jump_between_branches_is_no_miss_and_a_resonance_is(seed):
     resonance[:2, 100:106] = 7.0
     # A one-level sweep without phase: what was not observed counts for nothing.
     z[1] = np.nan
-    honest, jump, resonance = (module.HeldOut(0.0, one, np.ones_like(z)) for one in (z, jump, resonance))
+    honest, jump, resonance = (
+        module.HeldOut(0.0, one, np.ones_like(z)) for one in (z, jump, resonance)
+    )
     assert 0.6 < honest.missed < honest.rms_sigma < 0.9
     assert jump.missed < 0.9 < 1.1 < jump.rms_sigma
     assert 1.2 < resonance.missed < resonance.rms_sigma

@@ -1,3 +1,5 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from synthetic import ADSS, LEVELS, candidate, observation, read
@@ -32,6 +34,36 @@ def test_every_plan_lies_within_the_limits_and_the_choice_is_wide(monkeypatch):
     assert any(plan.dc_offset_v for plan in tried)
     assert min(plan.levels_vpk[0] for plan in tried) < LEVELS[0]
     assert max(plan.levels_vpk[0] for plan in tried) > LEVELS[-1]
+
+
+@pytest.mark.parametrize(
+    ("band_hz", "levels_vpk", "plans"),
+    [
+        ((40.0, 200.0), (12.0, 12.0), 3),  # The lowest level is over twice the limit.
+        ((120.0, 120.0), (1.0, 4.0), 6),  # One frequency: only a wider band has any.
+        ((450.0, 700.0), (1.0, 4.0), 10),
+        ((2.0, 6.0), (1.0, 4.0), 0),
+        ((900.0, 1000.0), (1.0, 4.0), 0),
+    ],
+)
+def test_what_was_measured_beyond_the_limits_is_answered_within_them(
+    band_hz, levels_vpk, plans, monkeypatch
+):
+    beyond = SimpleNamespace(
+        frequency_hz=np.array(band_hz), source_vpk=np.array(levels_vpk),
+        plans=SEEN.plans, noise_v=SEEN.noise_v,
+    )  # fmt: skip
+    tried = []
+    monkeypatch.setattr(
+        module, "_separation", lambda unit, groups, plan, *_: tried.append(plan) or 1
+    )
+    found = propose_measurement(ADSS, FIRST, SECOND, beyond)
+    assert len(tried) == plans
+    assert (found is None) == (plans == 0)
+    for plan in tried:
+        assert plan.levels_vpk[0] + abs(plan.dc_offset_v) <= ADSS.limits.source_vpk
+        assert plan.frequencies_hz[0] >= ADSS.limits.start_hz
+        assert plan.frequencies_hz[-1] <= ADSS.limits.stop_hz
 
 
 def test_the_plan_that_parts_them_furthest_is_taken(monkeypatch):

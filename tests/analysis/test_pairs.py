@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import synthetic_search
 
@@ -164,6 +165,7 @@ def test_all_that_is_not_hopeless_beside_a_part_is_looked_at_where_it_was_placed
     )
     monkeypatch.setattr(pairs, "place_beside", place)
     monkeypatch.setattr(pairs, "coarse_stride", lambda *_: 2)
+    monkeypatch.setattr(pairs, "_is_at_an_end", lambda _: False)
     closer = pairs._look_beside_all(rough, None, where)
     near = {"reach": (0.12, 0.03)}
     assert started == [
@@ -174,6 +176,47 @@ def test_all_that_is_not_hopeless_beside_a_part_is_looked_at_where_it_was_placed
         ({("b", f"x{i}"): f"by x{i}, better" for i in (2, 1, 0)}, 3, {}),
     ]
     assert closer == set(placed["a",]) - {("a", "x4"), ("a", "x5")} | set(placed["b",])
+
+
+@pytest.mark.parametrize(
+    ("hidden_at", "looks"), [(0.2, [0.3]), (0.46, [0.3, 0.42]), (0.9, [0.3, 0.42, 0.54])]
+)
+def test_who_agrees_best_at_the_end_of_its_ratios_is_followed_and_nobody_else(hidden_at, looks):
+    """At most two steps; one whose ratio is known is left where it is."""
+    moved, known = ("a", "moves"), ("a", "stays")
+    ratios, looked = {moved: [], known: []}, []
+
+    class Rough:
+        found = {}
+
+        def start(self, places, groups, reach):
+            assert (groups, reach) == (2, (0.12, 0.03))
+            looked.append({key: round(float(place[0]), 2) for key, place in places.items()})
+            for key, place in places.items():
+                ratios[key] += list(place[0] + np.linspace(-0.12, 0.12, 9))
+                runs = np.column_stack([ratios[key], np.full(len(ratios[key]), 0.5)])
+                best = runs[np.argmin(abs(runs[:, 0] - (hidden_at if key == moved else 0.3)))]
+                self.found[key] = SimpleNamespace(
+                    surface=SimpleNamespace(places=runs), best=SimpleNamespace(place=best)
+                )
+
+    pairs.look_beside(Rough(), {key: np.array([0.3, 0.5]) for key in (moved, known)})
+    assert looked[0] == {moved: 0.3, known: 0.3}
+    assert looked[1:] == [{moved: at} for at in looks[1:]]
+
+
+@pytest.mark.parametrize(
+    ("ratios", "best", "follow"),
+    [((0.2, 0.4), 0.39, True), ((0.2, 0.4), 0.22, True), ((0.2, 0.4), 0.3, False),
+     # There is nothing beyond all and nothing.
+     ((0.8, 1.0), 0.99, False), ((0.0, 0.2), 0.01, False), ((0.0, 0.2), 0.19, True)],
+)  # fmt: skip
+def test_the_end_of_all_ratios_is_no_end_to_be_followed(ratios, best, follow):
+    runs = np.column_stack([np.linspace(*ratios, 9), np.full(9, 0.5)])
+    one = SimpleNamespace(
+        surface=SimpleNamespace(places=runs), best=SimpleNamespace(place=np.array([best, 0.5]))
+    )
+    assert pairs._is_at_an_end(one) is follow
 
 
 def test_pairs_that_add_up_exactly_are_looked_at_whatever_is_favoured(monkeypatch):

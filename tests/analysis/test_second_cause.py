@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import synthetic
 
-from analysis import second_cause
+from analysis import pairs, second_cause
 from analysis.causes import Hypothesis
 from analysis.screening import Place
 
@@ -94,6 +94,7 @@ def test_those_placed_best_beside_a_leader_are_kept_where_runs_bear_them_out(
         return placed
 
     monkeypatch.setattr(second_cause, "place_beside", beside)
+    monkeypatch.setattr(pairs, "_is_at_an_end", lambda _: False)
     alone = SimpleNamespace(hypothesis=Hypothesis(ADSS, leader), best=SimpleNamespace(place=place))
     found = second_cause._worth(Rough(), "sums", alone)
     best_placed = list(placed)[:8]

@@ -171,15 +171,18 @@ def test_a_pair_that_leads_by_little_or_by_chance_is_not_believed(
 
     monkeypatch.setattr(rules, "judge_gain", chance)
     rng = np.random.default_rng(0)
-    best = rules._simplest([pair, part, found.baseline], rng)
-    assert best.effects == named
+    assert rules._leader([pair, part, found.baseline]) is pair
+    will_do = rules._part_that_will_do([pair, part, found.baseline], pair, rng)
+    assert (will_do is part) == (named == TRUE)
     # A part that looks like none of its own runs has nothing to say on that.
-    assert rules._simplest([pair, replace(part, misfit=4.1, objection="no")], rng) is pair
-    first, second = rules._put_behind([pair, part], best)
-    assert first.effects == named
-    behind = 20.0 if named == TRUE else lead
-    assert first.score - second.score == pytest.approx(behind)
-    assert first.probability == pytest.approx(1.0 / (1.0 + np.exp(-behind / HEAT)))
+    unlike = replace(part, misfit=4.1, objection="no")
+    assert rules._part_that_will_do([pair, unlike], pair, rng) is None
+    if named == TRUE:
+        first, second = rules._put_behind([pair, part], pair, part)
+        assert (first.effects, second.effects) == (TRUE, TRUE + WRONG)
+        assert first.score - second.score == pytest.approx(20.0)
+        assert first.probability == pytest.approx(1.0 / (1.0 + np.exp(-20.0 / HEAT)))
+        assert rules._leader([first, second]) is first
 
 
 @pytest.mark.parametrize(("lead", "named"), [(6.0, ("cable-stiffness",)), (-6.0, TRUE)])
@@ -263,6 +266,71 @@ def test_what_misses_other_levels_or_fits_worse_must_have_own_runs_that_do(
     assert unlike == "does not look like its own runs"
     shaped = rules._find_objection(candidate, held_out, replace(FITS, structure=2.6), rng)
     assert shaped == "leaves structure that its own runs do not"
+
+
+A, B, C, D = TRUE, WRONG, ("cable-stiffness",), ("amplifier-gain",)
+AB, AC, BC, CD = (tuple(sorted(one + two)) for one, two in ((A, B), (A, C), (B, C), (C, D)))
+
+
+@pytest.mark.parametrize(
+    ("scores", "unearned", "refused", "word", "named"),
+    [
+        # One that nobody asked about leads once a pair is behind its part, and is asked then.
+        ({AB: 600.0, C: 200.0, A: 100.0}, {(A, AB)}, (), "explained", C),
+        ({AB: 600.0, CD: 200.0, A: 100.0}, {(A, AB)}, (), "explained", CD),
+        # A pair that owes its lead to chance takes none with it that shares its cause.
+        ({AB: 300.0, AC: 290.0, A: 100.0}, {(A, AB)}, (), "explained", AC),
+        ({AB: 300.0, AC: 290.0, A: 100.0}, {(A, AB), (A, AC)}, (), "explained", A),
+        # What a pair must lead by it must lead by itself, not by what is refused before it.
+        ({B: 500.0, AC: 490.0, A: 485.0}, set(), (B,), "ambiguous", A),
+        # Who leads after all that is held against the plain model, too.
+        ({AB: 230.0, C: 206.0, A: 204.0}, {(A, AB), ((), C)}, (), "consistent", ()),
+        ({AB: 115.0, A: 110.0, (): 100.0}, set(), ((),), "ambiguous", A),
+        # And none that owes its lead to chance is a rival of another set.
+        ({AB: 230.0, CD: 215.0, C: 206.0, A: 170.0}, {(A, AB), (C, CD)}, (), "explained", C),
+    ],
+)
+def test_every_set_that_comes_to_lead_is_asked_what_it_owes_to_chance(
+    monkeypatch, scores, unearned, refused, word, named
+):
+    score = {(): 0.0} | scores
+    monkeypatch.setattr(rules, "_score", lambda c, h: score[c.hypothesis.effects])
+    monkeypatch.setattr(rules, "judge_adequacy", lambda c, rng: FITS)
+    monkeypatch.setattr(
+        rules, "_find_objection", lambda c, *_: "no" if c.hypothesis.effects in refused else ""
+    )
+
+    def chance(simpler, alleged, rng):
+        by_chance = (simpler.hypothesis.effects, alleged.hypothesis.effects) in unearned
+        return (0.5, 0.0) if by_chance else (0.0, 9.0)
+
+    monkeypatch.setattr(rules, "judge_gain", chance)
+    monkeypatch.setattr(rules, "judge_chance", lambda *of: chance(*of)[0])
+    monkeypatch.setattr(rules, "is_felt_alike", lambda *_: False)
+    verdict = judge(seen(TRUE, 1), tuple(score), 1)
+    assert (verdict.word, verdict.best.effects) == (word, named)
+    for part, whole in unearned:
+        (behind,) = (one for one in verdict.judged if one.effects == whole)
+        if part and behind.effects != named:
+            assert verdict.remark(behind) == "a part of it does as well, or would by chance"
+            assert behind not in verdict.rivals
+
+
+def test_parts_of_those_that_are_judged_are_judged_however_many_stand_before_them():
+    """Six pairs with one cause stood before it alone, and one of them was named."""
+    others = ("amplifier-gain", "amplifier-lag", "cable-stiffness", "motor-resistance",
+              "motor-constant", "total-backlash", "shaft-stiffness")  # fmt: skip
+    pairs = [tuple(sorted((*TRUE, other))) for other in others]
+    observed = seen(TRUE, 1)
+    found = [candidate(observed, effects, 1) for effects in ((), TRUE, *pairs)]
+    likelihood = {(): 0.0, TRUE: 500.0} | {pair: 600.0 - i for i, pair in enumerate(pairs)}
+    found = [
+        replace(c, best=replace(c.best, log_likelihood=likelihood[c.hypothesis.effects]))
+        for c in found
+    ]
+    chosen = [one.hypothesis.effects for one in rules._worth_judging(found)]
+    assert set(chosen[:6]) < set(pairs)
+    assert set(chosen[6:]) == {TRUE, ()}
 
 
 def test_the_world_of_these_tests_is_not_flat():
