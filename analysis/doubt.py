@@ -102,7 +102,10 @@ def is_nothing_missing(fine: Hunt, rng: np.random.Generator) -> bool:
 
 
 def is_refused_now(fine: Hunt, rng: np.random.Generator) -> bool:
-    """Whether the leader would be refused as it is, and is not only doubted."""
+    """Whether the leader would be refused as it is, and is not only doubted.
+
+    Three causes are refused for less (`analysis.verdict`): what is sought then is fewer.
+    """
     missed = _MISSED_NOW if len(fine.best.hypothesis.effects) > 1 else _MISSED
     return is_doubtful(fine.best, rng, missed, _REFUSED, _STRUCTURED_NOW)
 

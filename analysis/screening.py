@@ -55,9 +55,9 @@ _FELT_ONE_COUNTS, _FELT_PAIR_COUNTS = (15, 20), (10, 8, 8)
 """Places looked at along each coordinate of one cause of one size at the load, and of two."""
 
 _NEAR = 80.0
-"""Log-likelihood within which hypotheses seen by what the load is felt as are worth a look, and any
-at another ratio. True pairs lay up to 45 behind another such pair (thirteen drawn), 8 behind a
-payload (eight), and 38 behind themselves at a ratio 0.7 off."""
+"""Log-likelihood within which hypotheses seen by what the load is felt as are worth a look, and
+pairs that are added up at another ratio. True pairs lay up to 45 behind another such pair (thirteen
+drawn), 8 behind a payload (eight), and 38 behind themselves at a ratio 0.7 off."""
 
 _NEAR_ALONE = 30.0
 """The same for a single cause at another ratio: its runs in the atlas are its own, no sum. An EDSS

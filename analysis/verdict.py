@@ -59,11 +59,12 @@ Sets further behind are not held against runs of their own, which takes seconds 
 nothing; the baseline always is, and so are parts of the leader."""
 
 _BY_CHANCE = 0.04
-"""Share of the baseline's own runs, with nothing hidden, that it may explain better by as much."""
+"""Share of the baseline's own runs, with nothing hidden, that a cause may explain better by as much,
+or of a part's that a further cause may."""
 
 _BEYOND = 3.0
 """So many standard deviations must a further cause bring beyond what it brings in runs of a part
-that has it not, where the part alone may be the explanation. True ones brought 3.4 to 4.7. Damped
+that has it not, where the part alone may be the explanation. True ones brought 3.4 to 5.4. Damped
 teeth were told to have friction beside them, which led by 304: at the lowest level a few of their
 own runs move as little as what was measured, and friction makes all do so. It brought 2.2."""
 
