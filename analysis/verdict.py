@@ -194,7 +194,12 @@ class Verdict:
         return one.refused and self.best.score < one.score < self.best.score + _TIE
 
     def _is_likely(self) -> bool:
-        """Whether more is believed of the best, and of sets that hold it, than of all others."""
+        """Whether more is believed of the best, and of sets that hold it, than of all others.
+
+        It never is of more than `_FEW` causes, which stood for what nobody knew before.
+        """
+        if len(self.best.effects) > _FEW:
+            return False
         holding = sum(
             one.probability for one in self.judged if set(one.effects) > set(self.best.effects)
         )

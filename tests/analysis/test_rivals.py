@@ -89,6 +89,21 @@ def test_what_is_refused_is_a_rival_where_more_is_believed_of_others(
     assert [one.effects for one in verdict.rivals] == rivals
 
 
+@pytest.mark.parametrize(("behind", "rivals"), [(24.0, [WRONG]), (31.0, [])])
+def test_what_is_refused_near_three_causes_is_a_rival_however_likely_they_are(
+    behind, rivals, monkeypatch
+):
+    """A tachometer's gain, withheld, was told to be three other causes with 0.71."""
+    monkeypatch.setattr(rules, "is_felt_alike", lambda *_: False)
+    found = judge(seen(TRUE, 1), ((), TRUE, WRONG), 1)
+    three = tuple(sorted((*TRUE, "cable-stiffness", "total-backlash")))
+    best = replace(found.best, candidate=candidate(seen(TRUE, 1), three, 1), probability=0.9)
+    (wrong,) = (one for one in found.judged if one.effects == WRONG)
+    other = replace(wrong, objection="no", score=best.score - behind, probability=0.1)
+    verdict = replace(found, best=best, judged=(best, other, found.baseline))
+    assert [one.effects for one in verdict.rivals] == rivals
+
+
 @pytest.mark.parametrize(
     ("alike", "against", "rivals"),
     [
