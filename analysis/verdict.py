@@ -59,8 +59,8 @@ Sets further behind are not held against runs of their own, which takes seconds 
 nothing; the baseline always is, and so are parts of the leader."""
 
 _BY_CHANCE = 0.04
-"""Share of the baseline's own runs, with nothing hidden, that a cause may explain better by as much,
-or of a part's that a further cause may."""
+"""Share of the baseline's own runs, with nothing hidden, that a cause may explain better by as
+much, or of a part's that a further cause may."""
 
 _BEYOND = 3.0
 """So many standard deviations must a further cause bring beyond what it brings in runs of a part
