@@ -1,8 +1,8 @@
 """From candidates to a verdict: consistent, explained, ambiguous or unexplained.
 
-Owns the rules and their thresholds, fixed on simulated sets before any
-practice set was judged by them, but for one (`_STRUCTURED`; docs/decisions/0016).
-It simulates nothing.
+Owns how sets are held against one another: what each is worth, who leads, by what it must lead, and
+who is a rival. Its thresholds were fixed on simulated sets before any practice set was judged by
+them. What speaks against a set by itself is `analysis.objection`'s. It simulates nothing.
 """
 
 from __future__ import annotations
@@ -13,13 +13,14 @@ from typing import Literal
 
 import numpy as np
 
-from analysis.adequacy import Adequacy, judge_adequacy, judge_chance, judge_gain, misses_alike
+from analysis.adequacy import judge_adequacy, judge_chance, judge_gain
 from analysis.candidate import Candidate
 from analysis.holdout import HeldOut, hold_out
 from analysis.likelihood import HEAT
 from analysis.likeness import is_felt_alike
+from analysis.objection import FEW, OUT_OF_SIGHT, UNLIKE, find_objection
 from analysis.observation import Observation
-from analysis.plausibility import EDGE, is_out_of_sight, is_pressed, may_be_within_tolerance
+from analysis.plausibility import EDGE, may_be_within_tolerance
 
 __all__ = ["Judged", "Verdict", "judge_candidates"]
 
@@ -75,32 +76,6 @@ runs of its own."""
 _RIVAL = 2.0 * HEAT
 """Within so much of the best, a set is a rival."""
 
-_UNLIKE, _THREE_UNLIKE = 4.0, 2.0
-"""A fit worse than own runs' by more standard deviations than this is no explanation, nor is that
-of more than `_FEW` causes by more than the second: three lags and gains of the chain make up nearly
-any filter. Both threes that were named for what was not there were worse by 2.5; of 147 sets of one
-cause or two that were named one was worse by more than 2."""
-
-_STRUCTURED = 2.5
-"""Nor is one whose fit leaves more structure than own runs' by so many: of past sets' leaders
-22 of 38 wrong ones did, and of 78 right ones a payload alone of which all runs lay beside it."""
-
-_UNPREDICTED = 1.5
-"""Nor is one that misses levels not fitted by so many standard deviations, root mean square."""
-
-_NEVER, _SELDOM = 2.0, 0.03
-"""The baseline, or a single cause, may miss them by as many as the first of these, where a larger
-share of its own runs than the second does so, too: a payload of four parameters, and chatter at
-low drive, are not easily told from other levels."""
-
-_WELL_PREDICTED = 1.0
-"""Several causes together can fit nearly anything: where they miss levels not fitted by more than
-this, some of their own runs must do so, too."""
-
-_FEW = 2
-"""More causes than this must miss them by no more than that, whatever their own runs do: three
-that fitted where one of them was another's stand-in missed them by 1.13 and 1.24."""
-
 _LIKELY = 0.5
 """Where less than this is believed of the best and of all that hold it, those that are refused, and
 are believed in its place, are rivals: of 142 sets drawn and named so two had less, both wrong."""
@@ -108,7 +83,6 @@ are believed in its place, are rivals: of 142 sets drawn and named so two had le
 _JUDGED = 6
 
 _NOT_ASKED = "too far behind to be asked"
-_OUT_OF_SIGHT = "resonates where nothing was measured"
 _UNEARNED = "a part of it does as well, or would by chance"
 
 
@@ -186,7 +160,7 @@ class Verdict:
     def _says_the_same(self, one: Judged) -> bool:
         # What swings out of sight is felt as a load or a brake and as nothing else: what is
         # believed of it is believed of that.
-        may = one.adequate or one.objection in (_OUT_OF_SIGHT, _UNEARNED)
+        may = one.adequate or one.objection in (OUT_OF_SIGHT, _UNEARNED)
         return may and is_felt_alike(one.candidate, self.best.candidate)
 
     def _is_led_by(self, one: Judged) -> bool:
@@ -196,9 +170,9 @@ class Verdict:
     def _is_likely(self) -> bool:
         """Whether more is believed of the best, and of sets that hold it, than of all others.
 
-        It never is of more than `_FEW` causes, which stood for what nobody knew before.
+        It never is of more than `FEW` causes, which stood for what nobody knew before.
         """
-        if len(self.best.effects) > _FEW:
+        if len(self.best.effects) > FEW:
             return False
         holding = sum(
             one.probability for one in self.judged if set(one.effects) > set(self.best.effects)
@@ -272,7 +246,7 @@ def _worth_judging(candidates: Sequence[Candidate]) -> list[Candidate]:
     for other in by_fit[_JUDGED:]:
         effects = set(other.hypothesis.effects)
         part = any(effects < set(one.hypothesis.effects) for one in chosen)
-        if part or not effects or any(is_felt_alike(one, other) for one in chosen[:_JUDGED]):
+        if part or any(is_felt_alike(one, other) for one in chosen[:_JUDGED]):
             chosen.append(other)
     return chosen
 
@@ -288,39 +262,16 @@ def _ask(judged: Sequence[Judged], rng: np.random.Generator) -> tuple[Judged, ..
             asked.append(one)
             continue
         fitted = judge_adequacy(one.candidate, rng)
-        objection = _find_objection(one.candidate, one.held_out, fitted, rng)
+        objection = find_objection(one.candidate, one.held_out, fitted, rng)
         asked.append(
             replace(one, misfit=fitted.sigma, structure=fitted.structure, objection=objection)
         )
     return tuple(asked)
 
 
-def _find_objection(
-    candidate: Candidate, held_out: HeldOut, fitted: Adequacy, rng: np.random.Generator
-) -> str:
-    causes, missed = len(candidate.hypothesis.effects), held_out.missed
-    several = causes > 1
-    if fitted.sigma > (_UNLIKE if causes <= _FEW else _THREE_UNLIKE):
-        return "does not look like its own runs"
-    if fitted.structure > _STRUCTURED:
-        return "leaves structure that its own runs do not"
-    if is_pressed(candidate):
-        return "wants a size that no bench has"
-    if is_out_of_sight(candidate):
-        return _OUT_OF_SIGHT
-    predicted = missed <= (_WELL_PREDICTED if several else _UNPREDICTED)
-    if not predicted and (
-        missed > (_UNPREDICTED if several else _NEVER)
-        or causes > _FEW
-        or not misses_alike(candidate, held_out, 0.0 if several else _SELDOM, rng)
-    ):
-        return "does not predict the other levels"
-    return ""
-
-
 def _may_be_chance(simpler: Judged, best: Judged, rng: np.random.Generator) -> bool:
     # Own runs say nothing about an observation that is unlike all of them.
-    if simpler.misfit > _UNLIKE:
+    if simpler.misfit > UNLIKE:
         return False
     return judge_chance(simpler.candidate, best.candidate, rng) > _BY_CHANCE
 

@@ -55,7 +55,7 @@ def test_what_stands_in_for_a_refused_leader_is_not_named_alone(
     monkeypatch.setattr(rules, "_score", lambda c, _: scores[c.hypothesis.effects])
     monkeypatch.setattr(rules, "judge_chance", lambda *_: 0.0)
     monkeypatch.setattr(
-        rules, "_find_objection", lambda c, *_: objection if c.hypothesis.effects == WRONG else ""
+        rules, "find_objection", lambda c, *_: objection if c.hypothesis.effects == WRONG else ""
     )
     monkeypatch.setattr(rules, "is_felt_alike", lambda *_: alike)
     verdict = rules.judge_candidates(found, observed, np.random.default_rng(0))
