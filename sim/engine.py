@@ -16,26 +16,31 @@ stops the motion at the end of a step or turns where the velocity passes zero.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from daq.errors import AnalysisError
 from sim.assembly import PiecewiseLinearSystem
 from sim.kernel import MOST_VECTORS, step_cycles
 from sim.layout import SUMS, Layout, Structure
 from sim.propagator import Modes, Propagator, build_propagator, find_modes
 from sim.solving import kinds_of, law_coefficients, order_of
 
-__all__ = ["HARMONICS", "LONGEST_STEP_S", "Motion", "Stretch", "advance"]
+__all__ = ["HARMONICS", "LONGEST_STEP_S", "Motion", "Stretch", "advance", "carry"]
 
 HARMONICS = 4
 """Fourier coefficients kept per cycle: 0 (mean), 1, 2 and 3."""
 
 LONGEST_STEP_S = 5e-6
 """Default bound of the step: a twentieth of the fastest mesh mode of the paper's units."""
+
+
+_SELDOM = 0.1
+"""Share of the stretches that may be gone through again before a shorter step is kept."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +109,60 @@ def advance(
         motion = _dwell(moving, parameters, state, stretch, longest_step_s)
         state = motion.state
         yield motion
+
+
+def carry(
+    system: PiecewiseLinearSystem,
+    parameters: NDArray[np.float64],
+    state: NDArray[np.float64],
+    stretches: Sequence[Stretch],
+    steps_s: Sequence[float],
+    single: bool = False,
+    done: Callable[[], None] = lambda: None,
+) -> list[Motion]:
+    """Carry trajectories through stretches, at shorter steps where they grow without bound.
+
+    Parameters
+    ----------
+    steps_s
+        Upper bounds of the time step, s. Each is taken where the one before lets a motion grow
+        without bound, for that stretch and the one before it, as growth may have begun before it
+        showed; and for all that follow where that happens often. All others keep the first.
+    done
+        Called after each stretch.
+
+    Raises
+    ------
+    AnalysisError
+        If a motion grew without bound, at the last of the steps.
+    """
+    longest, *shorter = steps_s
+    motions: list[Motion] = []
+    grew = 0
+    while len(motions) < len(stretches):
+        begin = motions[-1].state if motions else state
+        if grew > _SELDOM * len(stretches):
+            rest = stretches[len(motions) :]
+            return motions + carry(system, parameters, begin, rest, shorter, single, done)
+        for motion in advance(
+            system, parameters, begin, stretches[len(motions) :], longest, single
+        ):
+            if not np.all(np.isfinite(motion.coefficients)):
+                if not shorter:
+                    raise AnalysisError(
+                        f"the simulated motion at {stretches[len(motions)].frequency_hz:g} Hz grew "
+                        "without bound; check the parameters, or take a shorter step"
+                    )
+                back = max(len(motions) - 1, 0)
+                begin = motions[back - 1].state if back else state
+                again = stretches[back : len(motions) + 1]
+                motions[back:] = carry(system, parameters, begin, again, shorter, single)
+                grew += 1
+                done()
+                break
+            motions.append(motion)
+            done()
+    return motions
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ error bar of every point. It judges nothing.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ from daq.plan import SweepPlan
 from sim.assembly import Law, PiecewiseLinearSystem
 from sim.effects import EffectSetting, drivetrain_with
 from sim.effort import spend
-from sim.engine import HARMONICS, LONGEST_STEP_S, Motion, Stretch, advance
+from sim.engine import HARMONICS, LONGEST_STEP_S, Motion, Stretch, carry
 from sim.reading import PERIODIC_SCATTER, response_of_cycles, scatter_of_cycles
 from sim.unit import Unit
 
@@ -151,8 +151,9 @@ def simulate_cycles(
     Parameters
     ----------
     shorter_steps_s
-        Longest steps that are tried in turn where a motion grows without bound; servos that
-        share their linear part with it go along, all others keep theirs.
+        Longest steps that are tried in turn where a motion grows without bound, at that frequency
+        and the one before; servos that share their linear part with it go along, all others
+        keep theirs.
     single
         Step in single precision, at half of the cost (`sim.engine.advance`).
     point_done
@@ -180,11 +181,11 @@ def simulate_cycles(
     def sweep(task: tuple[Sequence[int], slice]) -> NDArray[np.complex128]:
         group, share = [servos[i] for i in task[0]], task[1]
         part = replace(plan, frequencies_hz=tuple(points[share].tolist()))
-        *steps, last = longest_step_s, *shorter_steps_s
-        for step in steps:
+        steps = longest_step_s, *shorter_steps_s
+        for at in range(len(shorter_steps_s)):
             with suppress(AnalysisError):
-                return _sweep(group, part, step, single, point_done)
-        return _sweep(group, part, last, single, point_done)
+                return _sweep(group, part, steps[at:], single, point_done)
+        return _sweep(group, part, steps[-1:], single, point_done)
 
     tasks = [(group, share) for group in groups for share in shares]
     with ThreadPoolExecutor(workers) as pool:
@@ -254,10 +255,9 @@ class SteppedServo:
             integrate_cycles,
         )  # fmt: skip
         system = self._servo.system
-        (motion,) = advance(
-            system, _parameters([self._servo], 1), self._state, [stretch], self._longest_step_s
+        (motion,) = carry(
+            system, _parameters([self._servo], 1), self._state, [stretch], [self._longest_step_s]
         )
-        _require_finite(motion.coefficients, frequency_hz)
         self._state = motion.state
         return DwellRecord(
             source_cycles=np.full(integrate_cycles, source_vpk, dtype=complex),
@@ -270,11 +270,14 @@ class SteppedServo:
 def _sweep(
     servos: Sequence[Servo],
     plan: SweepPlan,
-    longest_step_s: float,
+    steps_s: Sequence[float],
     single: bool,
     point_done: Callable[[], None],
 ) -> NDArray[np.complex128]:
-    """(servos, levels, points, cycles, 4) of servos that share their linear part."""
+    """(servos, levels, points, cycles, 4) of servos that share their linear part.
+
+    `steps_s`: longest steps, each taken where the one before lets a motion grow without bound.
+    """
     levels = np.asarray(plan.levels_vpk, dtype=float)
     amplitude = np.tile(levels, len(servos))
     zero = np.zeros_like(amplitude)
@@ -286,22 +289,15 @@ def _sweep(
     ]  # fmt: skip
     system = servos[0].system
     parameters, start = _parameters(servos, len(levels)), _start(servos, len(levels))
-    shape = (len(visited), plan.integrate_cycles, HARMONICS, len(amplitude))
-    kept = np.empty(shape, dtype=complex)
-    motions: Iterator[Motion]
-    if plan.from_rest:
-        motions = (
-            next(advance(system, parameters, start, [s], longest_step_s, single)) for s in stretches
-        )
-    else:
-        motions = advance(system, parameters, start, stretches, longest_step_s, single)
-    for i, motion in enumerate(motions):
-        _require_finite(motion.coefficients, visited[i])
-        kept[i] = motion.coefficients / amplitude
-        point_done()
+
+    def carried(some: Sequence[Stretch]) -> list[Motion]:
+        return carry(system, parameters, start, some, steps_s, single, point_done)
+
+    motions = [carried([s])[0] for s in stretches] if plan.from_rest else carried(stretches)
+    kept = np.array([motion.coefficients / amplitude for motion in motions])
     if plan.direction == "down":
         kept = kept[::-1]
-    lanes = kept.reshape(*shape[:3], len(servos), len(levels))
+    lanes = kept.reshape(*kept.shape[:3], len(servos), len(levels))
     return np.ascontiguousarray(lanes.transpose(3, 4, 0, 1, 2))
 
 
@@ -371,14 +367,6 @@ def _linear_key(system: PiecewiseLinearSystem) -> bytes:
         fixed = np.array([law.law, law.feedthrough, law.stiffness, law.damping, stribeck])
         parts += [law.inlet, law.outlet, fixed]
     return b"".join(np.ascontiguousarray(part, dtype=float).tobytes() for part in parts)
-
-
-def _require_finite(values: NDArray[np.complex128], frequency_hz: float) -> None:
-    if not np.all(np.isfinite(values)):
-        raise AnalysisError(
-            f"the simulated motion at {frequency_hz:g} Hz grew without bound; "
-            "check the parameters, or take a shorter step"
-        )
 
 
 def _cores() -> int:

@@ -276,12 +276,12 @@ def test_only_servos_that_need_a_shorter_step_take_it(monkeypatch):
     servos = [Servo.of(ADSS, 0.3), Servo.of(ADSS, 0.3, stiff), Servo.of(ADSS, 0.6)]
     plain, swept = response._sweep, []
 
-    def sweep(group, plan, step, *told):
+    def sweep(group, plan, steps, *told):
         for servo in group:
-            swept.append((next(i for i, one in enumerate(servos) if one is servo), step))
-            if servo is servos[1] and step > 4e-6:
+            swept.append((next(i for i, one in enumerate(servos) if one is servo), steps[0]))
+            if servo is servos[1] and steps[0] > 4e-6:
                 raise AnalysisError("grew without bound")
-        return plain(group, plan, step, *told)
+        return plain(group, plan, steps, *told)
 
     monkeypatch.setattr(response, "_sweep", sweep)
     steps = {"longest_step_s": 1e-5, "shorter_steps_s": (5e-6, 2.5e-6)}
