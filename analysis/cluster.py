@@ -113,8 +113,8 @@ class ClusterExecutor:
         results: dict[int, R] = {}
         try:
             for future in as_completed(futures, loop=self._client.loop):
-                results[place[future.key]], simulated_s = future.result()
-                spend(simulated_s)
+                results[place[future.key]], spent = future.result()
+                spend(*spent)
                 # Fetched is safe: a worker that is lost from now on takes no result with it.
                 future.release()
                 if progress is not None:
@@ -131,7 +131,7 @@ class ClusterExecutor:
         return [results[at] for at in range(len(tasks))]
 
 
-def _run(parcel: tuple[Callable[[T], R], T, str]) -> tuple[R, float]:
+def _run(parcel: tuple[Callable[[T], R], T, str]) -> tuple[R, tuple[float, float]]:
     """On a worker: do a task, and count what it simulates.
 
     Raises
@@ -147,4 +147,4 @@ def _run(parcel: tuple[Callable[[T], R], T, str]) -> tuple[R, float]:
         )
     with counting() as effort:
         result = work(task)
-    return result, effort.simulated_s
+    return result, (effort.simulated_s, effort.worth_s)

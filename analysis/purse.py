@@ -28,7 +28,8 @@ _OVERDRAFT = 1.25
 class Purse:
     """What may be spent, and what is: motion in s, so that no clock decides what a search finds.
 
-    `allowed_s`, `most_s`: how much, and with the overdraft.
+    It is that of a plain unit; a shaft that hardens costs more (`sim.effort`). `allowed_s`,
+    `most_s`: how much, and with the overdraft.
     """
 
     effort: Effort = field(default_factory=Effort)
@@ -39,15 +40,15 @@ class Purse:
     def for_observation(cls, observation: Observation, effort: Effort) -> Purse:
         """The purse of a measurement, out of what `effort` counts from now on."""
         sweep_s = sum(plan.duration_s for plan, _ in observation.plans)
-        so_far, granted = effort.simulated_s, max(_SWEEPS * sweep_s, _LEAST_S)
+        so_far, granted = effort.worth_s, max(_SWEEPS * sweep_s, _LEAST_S)
         return cls(effort, so_far + granted, so_far + _OVERDRAFT * granted)
 
     @property
     def is_spent(self) -> bool:
         """Whether as much was simulated as may be."""
-        return self.effort.simulated_s > self.allowed_s
+        return self.effort.worth_s > self.allowed_s
 
     @property
     def is_overdrawn(self) -> bool:
         """Whether the overdraft is spent, too."""
-        return self.effort.simulated_s > self.most_s
+        return self.effort.worth_s > self.most_s

@@ -61,7 +61,7 @@ def look_for_second(rough: Hunt, fine: Hunt, atlas: Atlas) -> None:
     additions = add_causes(rough.unit, rough.observation, atlas)
     beside = _worth(rough, additions, fine.found[leader])
     others = _stood_for(rough, additions, atlas, leader)
-    if not beside and not others:
+    if not beside and not others or fine.purse.is_spent:
         return
     fine.take_over([rough.found[key] for key in (*beside, *others)], _ALL_GROUPS)
     settle(fine, [key for key, lead in _leads(fine, beside, leader).items() if lead > -_NEARLY])
@@ -70,7 +70,7 @@ def look_for_second(rough: Hunt, fine: Hunt, atlas: Atlas) -> None:
     # They would only take the place of rivals among those that are judged.
     fine.leave_out([key for key, lead in leads.items() if lead < _CALLED_FOR])
     for _ in range(_ROUNDS):
-        if fine.best.hypothesis.effects == leader:
+        if fine.best.hypothesis.effects == leader or fine.purse.is_spent:
             break
         settle(fine, [leader, *(key for key in fine.leading(_ON_ALL, CLOSE) if key != leader)])
         fine.hear()

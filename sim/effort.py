@@ -1,6 +1,7 @@
 """How much motion was simulated: what an analysis costs, whatever machine it runs on.
 
-Owns the count of simulated seconds. It measures no time and slows nothing.
+Owns the count of simulated seconds, and of what they are worth. It measures no time and slows
+nothing.
 """
 
 from __future__ import annotations
@@ -14,16 +15,20 @@ __all__ = ["Effort", "counting", "spend"]
 
 
 class Effort:
-    """Seconds of motion simulated inside a `counting` block so far; threads may add to it."""
+    """Seconds of motion simulated inside a `counting` block so far; threads may add to it.
+
+    `simulated_s`, and `worth_s`: seconds of a plain unit's motion that take as long to simulate.
+    """
 
     def __init__(self) -> None:
-        self.simulated_s = 0.0
+        self.simulated_s = self.worth_s = 0.0
         self._lock = Lock()
 
-    def add(self, simulated_s: float) -> None:
-        """Count so many seconds more."""
+    def add(self, simulated_s: float, worth_s: float | None = None) -> None:
+        """Count so many seconds more; a plain unit's motion is worth itself."""
         with self._lock:
             self.simulated_s += simulated_s
+            self.worth_s += simulated_s if worth_s is None else worth_s
 
 
 _COUNTS: ContextVar[tuple[Effort, ...]] = ContextVar("counts", default=())
@@ -43,7 +48,7 @@ def counting() -> Iterator[Effort]:
         _COUNTS.reset(token)
 
 
-def spend(simulated_s: float) -> None:
+def spend(simulated_s: float, worth_s: float | None = None) -> None:
     """Add to every count that is open."""
     for effort in _COUNTS.get():
-        effort.add(simulated_s)
+        effort.add(simulated_s, worth_s)

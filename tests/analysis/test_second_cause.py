@@ -14,10 +14,18 @@ ADSS = synthetic.ADSS
 
 
 class Beside:
-    """A hunt that takes over what it is given, and whose leader is who is likeliest."""
+    """A hunt that takes over what it is given, and whose leader is who is likeliest.
 
-    def __init__(self, leader):
+    Its purse is spent after so many looks.
+    """
+
+    def __init__(self, leader, looks=99):
         self.found, self.settled = {leader.hypothesis.effects: leader}, []
+        self.looks = looks
+
+    @property
+    def purse(self):
+        return SimpleNamespace(is_spent=len(self.settled) + len(self.found) - 1 >= self.looks)
 
     @property
     def best(self):
@@ -179,6 +187,30 @@ def test_who_takes_the_lead_behind_a_cause_gets_more_runs_and_the_cause_as_many(
     second_cause.look_for_second(rough, fine, {leader: None})
     assert fine.settled == [[pair]] * hopeful + [[leader, pair]] * more
     assert (pair in fine.found) == stays
+
+
+@pytest.mark.parametrize(
+    ("looks", "taken_over", "settled"), [(0, False, 0), (2, True, 1), (9, True, 3)]
+)
+def test_what_may_be_simulated_ends_where_it_is_spent(monkeypatch, looks, taken_over, settled):
+    """Before anything comes to all rows, or after that with those runs alone."""
+    leader, pair = ("load-inertia",), ("amplifier-lag", "load-inertia")
+    found = {
+        key: SimpleNamespace(
+            hypothesis=Hypothesis(ADSS, key),
+            population=range(40),
+            best=SimpleNamespace(place=None, log_likelihood=likelihood),
+        )
+        for key, likelihood in ((leader, 100.0), (pair, 116.0))
+    }
+    fine = Beside(found[leader], looks)
+    rough = SimpleNamespace(unit=ADSS, observation=SimpleNamespace(frequency_hz=None), found=found)
+    monkeypatch.setattr(second_cause, "add_causes", lambda *_: None)
+    monkeypatch.setattr(second_cause, "_worth", lambda *_: [pair])
+    monkeypatch.setattr(second_cause, "_stood_for", lambda *_: [])
+    second_cause.look_for_second(rough, fine, {leader: None})
+    assert (pair in fine.found) == taken_over
+    assert len(fine.settled) == settled
 
 
 def test_nothing_is_looked_for_behind_a_pair_or_behind_nothing():

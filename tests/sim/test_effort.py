@@ -6,6 +6,7 @@ from contextvars import copy_context
 import pytest
 
 from daq.plan import SweepPlan
+from sim.effects import parse_effect
 from sim.effort import counting, spend
 from sim.response import Servo, simulate_cycles
 from sim.unit import load_unit
@@ -18,6 +19,26 @@ def test_every_machine_level_point_and_cycle_counts_its_duration():
         simulate_cycles(servos, plan)
     # Three machines at two levels, five cycles at 100 and at 200 Hz.
     assert effort.simulated_s == pytest.approx(3 * 2 * 5 * (1 / 100.0 + 1 / 200.0))
+
+
+def test_motion_of_a_hardening_shaft_is_worth_more_of_a_plain_units():
+    plan = SweepPlan((200.0,), (1.5,), settle_cycles=2, integrate_cycles=3)
+    unit = load_unit("adss")
+    effects = [parse_effect(text) for text in ("shaft-hardening:h=1e4", "shaft-stiffness:k_s1=30")]
+    servos = [Servo.of(unit, 0.5, settings) for settings in ([], effects[:1], effects[1:])]
+    with counting() as effort:
+        simulate_cycles(servos, plan)
+    assert effort.simulated_s == pytest.approx(3 * plan.duration_s)
+    # One in three, that takes a bit more than twice as long a step.
+    assert 4 * plan.duration_s < effort.worth_s < 5 * plan.duration_s
+
+
+def test_what_is_not_said_to_be_dear_is_worth_itself():
+    with counting() as outer, counting() as inner:
+        spend(1.0)
+        spend(2.0, 5.0)
+    for effort in (outer, inner):
+        assert (effort.simulated_s, effort.worth_s) == (3.0, 6.0)
 
 
 def test_blocks_count_for_themselves_and_for_those_around_them():
