@@ -73,8 +73,9 @@ _TIE = 20.0
 """The scores of two sets that say the same about everything differ by about as much, as each has
 runs of its own."""
 
-_RIVAL = 2.0 * HEAT
-"""Within so much of the best, a set is a rival."""
+_RIVAL, _RARE_RIVAL = 2.0 * HEAT, HEAT
+"""Within so much of the best, a set is a rival; and a rare one, but for being rare. Of seventeen
+rare causes that were hidden two stood behind the leader but for that, by 6 at most."""
 
 _LIKELY = 0.5
 """Where less than this is believed of the best and of all that hold it, those that are refused, and
@@ -190,8 +191,8 @@ class Verdict:
         other = not set(one.effects) <= best and not set(one.effects) >= best
         if self._is_led_by(one) or one.refused and behind < _RIVAL and not self._is_likely():
             return other and not is_felt_alike(one.candidate, self.best.candidate)
-        rarer = one.candidate.hypothesis.rare - self.best.candidate.hypothesis.rare
-        if not other or not one.adequate or behind - _RARE * max(rarer, 0) >= _RIVAL:
+        rarer = one.candidate.hypothesis.rare > self.best.candidate.hypothesis.rare
+        if not other or not one.adequate or behind >= (_RARE + _RARE_RIVAL if rarer else _RIVAL):
             return False
         return not self._says_the_same(one)
 

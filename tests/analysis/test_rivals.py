@@ -9,6 +9,9 @@ from synthetic import candidate
 
 import analysis.verdict as rules
 
+RARE, TEN_TIMES = ("motor-inertia",), 34.5
+"""A rare cause, and what it takes to lead one that is not."""
+
 
 @pytest.mark.parametrize(
     ("lead", "adequate", "rivals"), [(44.0, True, [()]), (46.0, True, []), (44.0, False, [])]
@@ -32,6 +35,29 @@ def test_another_set_is_a_rival_while_it_has_a_seventh_and_explains(behind, adeq
     near = replace(wrong, score=found.best.score - behind, objection=against)
     verdict = replace(found, judged=(found.best, near, found.baseline))
     assert [one.effects for one in verdict.rivals] == rivals
+
+
+@pytest.mark.parametrize(
+    ("best", "other", "behind", "is_rival"),
+    [
+        (TRUE, RARE, TEN_TIMES + 14.0, True),
+        (TRUE, RARE, TEN_TIMES + 16.0, False),
+        # Of two rare ones neither is taken for less likely than the other.
+        (RARE, ("gear-ratio",), 29.0, True),
+        (RARE, ("gear-ratio",), 31.0, False),
+        (RARE, TRUE, 29.0, True),
+        (RARE, TRUE, 31.0, False),
+    ],
+)
+def test_a_rare_set_is_a_rival_where_it_does_about_as_well(best, other, behind, is_rival):
+    found = judge(seen(TRUE, 1), ((), best, other), 1)
+    one, another = (
+        next(o for o in found.judged if o.effects == effects) for effects in (best, other)
+    )
+    one = replace(one, objection="")
+    near = replace(another, score=one.score - behind, objection="")
+    verdict = replace(found, best=one, judged=(one, near, found.baseline))
+    assert (near in verdict.rivals) == is_rival
 
 
 @pytest.mark.parametrize(
