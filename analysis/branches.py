@@ -15,7 +15,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.agreement import log_shares
 from analysis.observation import Observation
 from analysis.population import Population
 
@@ -65,14 +64,6 @@ class Motions:
     def mixed(self) -> NDArray[np.bool_]:
         """(rows,): where not all runs are in the observed state."""
         return np.asarray(self.alike.min(axis=0) < 1.0)
-
-    def log_shares(self, weight: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Logarithm (rows,) of the share of weighted runs (n,) that do as was observed.
-
-        Of those in the observed state one row before: what is observed of a
-        level begins on one branch and then stays there or changes.
-        """
-        return np.asarray(log_shares(weight, *self.course))
 
     @cached_property
     def course(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:

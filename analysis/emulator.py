@@ -8,7 +8,7 @@ repeatable, so a prediction is a distribution; it never runs a simulation.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,16 +78,6 @@ class Emulator:
     blocks: tuple[slice, ...]
     width: NDArray[np.float64]
     sigmas: NDArray[np.float64]
-
-    def without(self, draws: NDArray[np.int64]) -> Emulator:
-        """The emulator that has not seen some draws."""
-        kept = np.setdiff1d(np.arange(len(self.places)), draws)
-        return replace(
-            self,
-            places=self.places[kept],
-            deviations=self.deviations[kept],
-            channels=self.channels[kept],
-        )
 
     def predict(self, place: NDArray[np.float64]) -> Prediction:
         """Local quadratic regression about `place` (d,).

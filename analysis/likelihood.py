@@ -49,21 +49,8 @@ class Match:
     std: NDArray[np.float64]
 
 
-def match_prediction(
-    observation: Observation,
-    prediction: Prediction,
-    branching: bool = True,
-) -> Match:
-    """Likelihood of an observation under a prediction.
-
-    Parameters
-    ----------
-    observation, prediction
-        Rows in the same order.
-    branching
-        Whether to follow branches along the sweep, or to take every point for
-        itself (quicker, for one comparison among many).
-    """
+def match_prediction(observation: Observation, prediction: Prediction) -> Match:
+    """Likelihood of an observation under a prediction, rows in the same order."""
     difference = observation.values - prediction.mean
     difference[1] = np.angle(np.exp(1j * difference[1]))
     std = prediction.std.copy()
@@ -79,10 +66,7 @@ def match_prediction(
         normal = (slopes * trust) @ slopes.T + precision
         best = np.asarray(np.linalg.solve(normal, (slopes * trust) @ y), dtype=float)
     residual = difference - np.tensordot(best, prediction.slopes, axes=1)
-    if branching:
-        total = _log_branching(residual, std, prediction, observation)
-    else:
-        total = float(_log_tailed(residual, std).sum())
+    total = _log_branching(residual, std, prediction, observation)
     _, log_det = np.linalg.slogdet(normal @ np.diag(sigmas**2))
     total -= 0.5 * np.sum((best / sigmas) ** 2) + 0.5 * log_det
     return Match(float(total), best, residual, np.where(seen, std, np.nan))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from synthetic import ROWS, observation
 
+from analysis.agreement import log_shares
 from analysis.branches import Motions, find_motions
 from analysis.population import Population
 from analysis.surface import Surface
@@ -38,18 +39,23 @@ def test_a_state_is_told_by_the_scatter_above_the_reading_s_noise():
     assert found.alike[:, :4].tolist() == [[1, 0, 1, 1], [0, 1, 1, 0]]
 
 
+def shares_of(found):
+    """Log share (rows,) of runs of equal weight that do as was observed, at every row."""
+    return log_shares(np.ones(len(found.quiet)), *found.course)
+
+
 def test_shares_are_paid_for_where_a_level_begins_and_where_the_motion_changes():
     quiet = [[True] * 4] * 2 + [[False] * 4] * 6
-    shares = motions(quiet, [1, 1, 1, 1]).log_shares(np.ones(8))
+    shares = shares_of(motions(quiet, [1, 1, 1, 1]))
     assert shares[0] == pytest.approx(np.log(2.5 / 9.0))
     assert shares[1:] == pytest.approx(np.log(2.98 / 3.0))
-    jumped = motions(quiet, [1, 1, 0, 0]).log_shares(np.ones(8))
+    jumped = shares_of(motions(quiet, [1, 1, 0, 0]))
     # Of two quiet runs none changes; then six of six stay.
     assert jumped[2] == pytest.approx(np.log(0.02 / 3.0))
     assert jumped[3] == pytest.approx(np.log(6.98 / 7.0))
-    both = motions(quiet, [1, 1, 1, 1], first=(0, 2)).log_shares(np.ones(8))
+    both = shares_of(motions(quiet, [1, 1, 1, 1], first=(0, 2)))
     assert both[2] == pytest.approx(both[0])
-    assert not np.any(Motions.unknown(8, 4).log_shares(np.ones(8)))
+    assert not np.any(shares_of(Motions.unknown(8, 4)))
 
 
 def test_another_observation_brings_its_own_states_where_states_are_known():

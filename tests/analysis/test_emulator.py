@@ -71,10 +71,3 @@ def test_reach_grows_until_draws_suffice_and_then_it_says_so():
     assert np.all(np.isfinite(emulator.predict(np.array([0.0])).mean))
     with pytest.raises(AnalysisError, match="simulated machines"):
         drawn(0, count=5).predict(np.array([0.0]))
-
-
-def test_runs_left_out_are_gone():
-    emulator = drawn(0)
-    blind = emulator.without(np.arange(100))
-    assert len(blind.places) == 300
-    np.testing.assert_array_equal(blind.channels, emulator.channels[100:])

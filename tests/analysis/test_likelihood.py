@@ -23,7 +23,15 @@ def observation(gain=None, **fields):
     return replace(seen, noise=np.zeros(ROWS))
 
 
-def prediction(seen, std=0.05, shift=0.0, runs=None):
+FAR = np.zeros((1, 3, ROWS))
+FAR[:, 0] = 1e6
+"""A run that nobody would take for what was observed."""
+
+COMMON = np.log(0.5) + (ROWS - 1) * np.log(0.95 + 0.5 * 0.05)
+"""What it costs to follow the common run all the way: half at first, then to stay or come back."""
+
+
+def prediction(seen, std=0.05, shift=0.0, runs=FAR):
     mean = np.where(np.isfinite(seen.values), seen.values, 0.0)
     mean[0] += shift
     slopes = np.zeros((1, 3, ROWS))
@@ -33,25 +41,26 @@ def prediction(seen, std=0.05, shift=0.0, runs=None):
         std=np.full((3, ROWS), std),
         slopes=slopes,
         sigmas=np.array([1e-9]),
-        runs=np.zeros((1, 3, ROWS)) if runs is None else runs,
-        shares=np.ones(1) if runs is None else np.full(len(runs), 1.0 / len(runs)),
+        runs=runs,
+        shares=np.full(len(runs), 1.0 / len(runs)),
     )
 
 
 def test_it_is_students_t_point_by_point():
     seen = observation()
-    got = match_prediction(seen, prediction(seen, std=0.05, shift=0.12), branching=False)
+    got = match_prediction(seen, prediction(seen, std=0.05, shift=0.12))
     exact = student(TAIL_FREEDOM)
     centre = 2 * ROWS * (exact.logpdf(0.0) - np.log(0.05))
     off = ROWS * (exact.logpdf(0.12 / 0.05) - np.log(0.05))
     constant = 3 * ROWS * exact.logpdf(0.0)
-    assert got.log_likelihood == pytest.approx(centre + off - constant, abs=1e-6)
+    expected = centre + off - constant + COMMON
+    assert got.log_likelihood == pytest.approx(expected, abs=1e-6)
 
 
 def test_a_wide_prediction_does_not_explain_everything():
     seen = observation()
-    tight = match_prediction(seen, prediction(seen, std=0.02), branching=False)
-    wide = match_prediction(seen, prediction(seen, std=2.0), branching=False)
+    tight = match_prediction(seen, prediction(seen, std=0.02))
+    wide = match_prediction(seen, prediction(seen, std=2.0))
     assert tight.log_likelihood - wide.log_likelihood == pytest.approx(3 * ROWS * np.log(100.0))
 
 
@@ -59,14 +68,14 @@ def test_a_deviation_is_fitted_within_its_prior():
     seen = observation()
     free = replace(prediction(seen, std=0.01, shift=-0.03), sigmas=np.array([1.0]))
     held = replace(free, sigmas=np.array([1e-5]))
-    assert match_prediction(seen, free, False).deviations[0] == pytest.approx(0.03, rel=1e-3)
-    assert abs(match_prediction(seen, held, False).deviations[0]) < 1e-5
+    assert match_prediction(seen, free).deviations[0] == pytest.approx(0.03, rel=1e-3)
+    assert abs(match_prediction(seen, held).deviations[0]) < 1e-5
 
 
 def test_what_was_not_measured_does_not_count():
     without_phase = observation(phase_known=False)
-    got = match_prediction(without_phase, prediction(without_phase, std=0.05), branching=False)
-    assert got.log_likelihood == pytest.approx(-2 * ROWS * np.log(0.05))
+    got = match_prediction(without_phase, prediction(without_phase, std=0.05))
+    assert got.log_likelihood == pytest.approx(-2 * ROWS * np.log(0.05) + COMMON)
     assert np.all(np.isnan(got.residual[1]))
 
 
@@ -74,7 +83,7 @@ def test_phases_meet_across_180_degrees():
     seen = observation(gain=np.full(ROWS, -0.1 + 1e-6j))
     other = prediction(seen)
     other.mean[1] -= 2.0 * np.pi - 0.01
-    assert np.abs(match_prediction(seen, other, False).residual[1] + 0.01).max() < 1e-9
+    assert np.abs(match_prediction(seen, other).residual[1] + 0.01).max() < 1e-9
 
 
 def test_a_branch_that_single_runs_show_explains_a_stretch():
