@@ -186,6 +186,7 @@ def simulate_cycles(
         group, share = [servos[i] for i in task[0]], task[1]
         part = replace(plan, frequencies_hz=tuple(points[share].tolist()))
         steps = longest_step_s, *shorter_steps_s
+        # What grows at every step may have begun further back than it was gone through again from.
         for at in range(len(shorter_steps_s)):
             with suppress(AnalysisError):
                 return _sweep(group, part, steps[at:], single, point_done)

@@ -20,6 +20,7 @@ from analysis.observation import unread
 from analysis.population import Group, Population, simulate_groups
 from daq.errors import AnalysisError, InputError, LinkError
 from daq.plan import SweepPlan
+from sim.effects import EffectSetting
 from sim.effort import counting
 from sim.unit import load_unit
 
@@ -126,7 +127,14 @@ def test_runs_on_a_cluster_are_those_of_this_machine_to_the_last_bit(workers):
     plan = SweepPlan((120.0, 150.0), (1.5, 2.5), settle_cycles=2, integrate_cycles=3)
     families = [
         [Machine(ratio, seed) for seed, ratio in enumerate((0.2, 0.5, 0.7))],
-        [Machine(0.4, 5, deviations=(("k_s1", 0.004),))],
+        [
+            Machine(
+                0.4,
+                5,
+                deviations=(("k_s1", 0.004),),
+                effects=(EffectSetting("shaft-hardening", {"h": 1e4}),),
+            )
+        ],
     ]
     seen = unread(plan, 5e-4)
     unit = load_unit("adss")
@@ -139,6 +147,9 @@ def test_runs_on_a_cluster_are_those_of_this_machine_to_the_last_bit(workers):
     # What workers simulate counts here.
     assert spent_there.simulated_s == pytest.approx(spent_here.simulated_s)
     assert spent_here.simulated_s == pytest.approx(4 * plan.duration_s)
+    # So does what it is worth, which is more for a shaft that hardens.
+    assert spent_there.worth_s == pytest.approx(spent_here.worth_s)
+    assert spent_here.worth_s > 5 * plan.duration_s
 
 
 def test_a_search_on_a_cluster_makes_the_runs_of_this_machine(workers):

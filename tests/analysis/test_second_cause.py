@@ -158,6 +158,28 @@ def test_a_payload_is_held_against_two_causes_at_the_load_that_it_may_stand_for(
     assert fine.settled == ([[key, pair]] * 2 if taken_over else [])
 
 
+LEADER, PAIR = ("load-inertia",), ("amplifier-lag", "load-inertia")
+
+
+def looked_behind(monkeypatch, ahead, looks=99):
+    """The hunt on all rows after one pair was worth it, so far ahead of its leader."""
+    found = {
+        key: SimpleNamespace(
+            hypothesis=Hypothesis(ADSS, key),
+            population=range(40),
+            best=SimpleNamespace(place=None, log_likelihood=likelihood),
+        )
+        for key, likelihood in ((LEADER, 100.0), (PAIR, 100.0 + ahead))
+    }
+    fine = Beside(found[LEADER], looks)
+    rough = SimpleNamespace(unit=ADSS, observation=SimpleNamespace(frequency_hz=None), found=found)
+    monkeypatch.setattr(second_cause, "add_causes", lambda *_: None)
+    monkeypatch.setattr(second_cause, "_worth", lambda *_: [PAIR])
+    monkeypatch.setattr(second_cause, "_stood_for", lambda *_: [])
+    second_cause.look_for_second(rough, fine, {LEADER: None})
+    return fine
+
+
 @pytest.mark.parametrize(
     ("ahead", "hopeful", "more", "stays"),
     [
@@ -170,23 +192,9 @@ def test_a_payload_is_held_against_two_causes_at_the_load_that_it_may_stand_for(
 def test_who_takes_the_lead_behind_a_cause_gets_more_runs_and_the_cause_as_many(
     monkeypatch, ahead, hopeful, more, stays
 ):
-    leader, pair = ("load-inertia",), ("amplifier-lag", "load-inertia")
-    found = {
-        key: SimpleNamespace(
-            hypothesis=Hypothesis(ADSS, key),
-            population=range(40),
-            best=SimpleNamespace(place=None, log_likelihood=likelihood),
-        )
-        for key, likelihood in ((leader, 100.0), (pair, 100.0 + ahead))
-    }
-    fine = Beside(found[leader])
-    rough = SimpleNamespace(unit=ADSS, observation=SimpleNamespace(frequency_hz=None), found=found)
-    monkeypatch.setattr(second_cause, "add_causes", lambda *_: None)
-    monkeypatch.setattr(second_cause, "_worth", lambda *_: [pair])
-    monkeypatch.setattr(second_cause, "_stood_for", lambda *_: [])
-    second_cause.look_for_second(rough, fine, {leader: None})
-    assert fine.settled == [[pair]] * hopeful + [[leader, pair]] * more
-    assert (pair in fine.found) == stays
+    fine = looked_behind(monkeypatch, ahead)
+    assert fine.settled == [[PAIR]] * hopeful + [[LEADER, PAIR]] * more
+    assert (PAIR in fine.found) == stays
 
 
 @pytest.mark.parametrize(
@@ -194,22 +202,8 @@ def test_who_takes_the_lead_behind_a_cause_gets_more_runs_and_the_cause_as_many(
 )
 def test_what_may_be_simulated_ends_where_it_is_spent(monkeypatch, looks, taken_over, settled):
     """Before anything comes to all rows, or after that with those runs alone."""
-    leader, pair = ("load-inertia",), ("amplifier-lag", "load-inertia")
-    found = {
-        key: SimpleNamespace(
-            hypothesis=Hypothesis(ADSS, key),
-            population=range(40),
-            best=SimpleNamespace(place=None, log_likelihood=likelihood),
-        )
-        for key, likelihood in ((leader, 100.0), (pair, 116.0))
-    }
-    fine = Beside(found[leader], looks)
-    rough = SimpleNamespace(unit=ADSS, observation=SimpleNamespace(frequency_hz=None), found=found)
-    monkeypatch.setattr(second_cause, "add_causes", lambda *_: None)
-    monkeypatch.setattr(second_cause, "_worth", lambda *_: [pair])
-    monkeypatch.setattr(second_cause, "_stood_for", lambda *_: [])
-    second_cause.look_for_second(rough, fine, {leader: None})
-    assert (pair in fine.found) == taken_over
+    fine = looked_behind(monkeypatch, 16.0, looks)
+    assert (PAIR in fine.found) == taken_over
     assert len(fine.settled) == settled
 
 
