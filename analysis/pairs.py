@@ -52,9 +52,17 @@ _FOLLOWED, _EDGE = 2, 0.03
 about there, and how near to that end. A weak amplifier alone was best at a ratio of 0.17; with
 damped teeth, placed at 0.3 and hidden at 0.52, it went from 65 to 258 in two steps, and alone."""
 
-_BESIDE_CLOSER, _STRANGER = 4, 60.0
-"""How many beside each cause are looked at closer, and the log-likelihood behind the leading pair
-within which the causes of one that shares none with it are tried, too."""
+_BESIDE, _AT_ONCE, _BESIDE_CLOSER = 24, 6, 8
+"""How many are looked at beside what is known, how many before the purse is asked again, and how
+many of all of them closer: of 28 true pairs none was placed farther back than twelfth."""
+
+_STRANGER = 60.0
+"""Log-likelihood behind the leading pair within which others are also looked at beside the causes
+of one that shares none with it."""
+
+_ON_PAIRS = 0.75
+"""Share of what may be simulated from which on nobody looks at more beside the causes of leading
+pairs: those that lead are to be compared on all rows for the rest."""
 
 
 def search_pairs(rough: Hunt, atlas: Atlas) -> None:
@@ -149,9 +157,13 @@ def _close_stranger(rough: Hunt, leader: Effects, looked_at: set[Effects]) -> li
 
 
 def _kept(rough: Hunt, leader: Effects) -> Starts:
-    """The causes of a leading pair where it has them; the one that does as well alone, if any."""
+    """The causes of a leading pair where it has them; the one that does as well alone, if any.
+
+    Who explains more alone comes first, as it is more likely there.
+    """
     if earns(leader, rough.found):
-        return places_of_parts(rough.found[leader])
+        places = places_of_parts(rough.found[leader])
+        return {part: places[part] for part in rough.among(places)}
     alone = rough.among(parts_of(leader, rough.found))[0]
     return {alone: rough.found[alone].best.place}
 
@@ -163,19 +175,35 @@ def _look_at_parts(rough: Hunt, leader: Effects) -> None:
 
 
 def _look_beside_all(rough: Hunt, additions: Additions, kept: Starts) -> set[Effects]:
-    """Look at all others beside what is kept of a leading pair; those that are worth it closer."""
-    few = at_few_frequencies(rough)
-    looked: set[Effects] = set()
+    """Look at all others beside what is kept of leading pairs; those that are worth it closer.
+
+    The likeliest first, a few whatever was spent, and others while enough is left of the purse.
+    """
+    few, placed, others = at_few_frequencies(rough), dict[Effects, Place](), dict[Effects, Place]()
     for part, place in kept.items():
-        placed = place_beside(few, additions, rough.found[part].hypothesis, place)
-        least = max(one.log_likelihood for one in placed.values()) - _HOPELESS
-        worth = {k: one.place for k, one in placed.items() if one.log_likelihood > least}
-        look_beside(rough, worth)
-        closer = rough.among(worth)[:_BESIDE_CLOSER]
-        look_closer_beside(rough, closer)
-        looked |= set(closer)
+        for key, one in place_beside(few, additions, rough.found[part].hypothesis, place).items():
+            # A pair may be placed beside either of its causes, at another ratio each.
+            if key in placed:
+                placed[key], others[key] = sorted((one, placed[key]), key=_likelihood, reverse=True)
+            else:
+                placed[key] = one
+    least = max(map(_likelihood, placed.values())) - _HOPELESS
+    worth = [key for key in ranked(placed)[:_BESIDE] if _likelihood(placed[key]) > least]
+    looked_at: list[Effects] = []
+    while worth and not (looked_at and rough.purse.has_spent(_ON_PAIRS)):
+        some, worth = worth[:_AT_ONCE], worth[_AT_ONCE:]
+        for places in (placed, others):
+            if now := {key: places[key].place for key in some if key in places}:
+                look_beside(rough, now)
+        looked_at += some
+    closer = rough.among(looked_at)[:_BESIDE_CLOSER]
+    look_closer_beside(rough, closer)
     rough.hear()
-    return looked
+    return set(closer)
+
+
+def _likelihood(place: Place) -> float:
+    return place.log_likelihood
 
 
 def _glance(rough: Hunt, places: dict[Effects, Place], most: int) -> list[Candidate]:

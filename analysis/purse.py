@@ -28,27 +28,30 @@ _OVERDRAFT = 1.25
 class Purse:
     """What may be spent, and what is: motion in s, so that no clock decides what a search finds.
 
-    It is that of a plain unit; a shaft that hardens costs more (`sim.effort`). `allowed_s`,
-    `most_s`: how much, and with the overdraft.
+    It is that of a plain unit; a shaft that hardens costs more (`sim.effort`). `so_far_s`: what
+    `effort` counted before; `granted_s`: how much may be spent, but for the overdraft.
     """
 
     effort: Effort = field(default_factory=Effort)
-    allowed_s: float = math.inf
-    most_s: float = math.inf
+    so_far_s: float = 0.0
+    granted_s: float = math.inf
 
     @classmethod
     def for_observation(cls, observation: Observation, effort: Effort) -> Purse:
         """The purse of a measurement, out of what `effort` counts from now on."""
         sweep_s = sum(plan.duration_s for plan, _ in observation.plans)
-        so_far, granted = effort.worth_s, max(_SWEEPS * sweep_s, _LEAST_S)
-        return cls(effort, so_far + granted, so_far + _OVERDRAFT * granted)
+        return cls(effort, effort.worth_s, max(_SWEEPS * sweep_s, _LEAST_S))
+
+    def has_spent(self, share: float) -> bool:
+        """Whether more than a share of what may be simulated was."""
+        return self.effort.worth_s > self.so_far_s + share * self.granted_s
 
     @property
     def is_spent(self) -> bool:
         """Whether as much was simulated as may be."""
-        return self.effort.worth_s > self.allowed_s
+        return self.has_spent(1.0)
 
     @property
     def is_overdrawn(self) -> bool:
         """Whether the overdraft is spent, too."""
-        return self.effort.worth_s > self.most_s
+        return self.has_spent(_OVERDRAFT)

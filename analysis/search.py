@@ -121,7 +121,14 @@ def search_causes(
     # What an atlas takes is simulated once for a plan, and is not held against a measurement.
     with counting() as effort:
         purse = Purse.for_observation(observation, effort)
-        rough = Hunt(unit, coarse, rng, executor, part_of(progress, 0.4, 0.6, "narrowing down"))
+        rough = Hunt(
+            unit,
+            coarse,
+            rng,
+            executor,
+            part_of(progress, 0.4, 0.6, "narrowing down"),
+            purse=purse,
+        )
         doubted = _look_at_few(rough, atlas, rng)
         fine = Hunt(
             unit,

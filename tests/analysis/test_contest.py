@@ -167,6 +167,43 @@ def test_a_pair_is_compared_with_its_parts_in_every_round(monkeypatch, gap, spen
 
 
 @pytest.mark.parametrize(
+    ("explains_at", "overdrawn_at", "runs"),
+    [
+        # It explains as it is, or with one or two rounds more, and is then compared, once.
+        (80, 999, 120), (120, 999, 160), (160, 999, 200),
+        # It explains too late, or nothing is left to try that with.
+        (200, 999, 160), (120, 80, 80), (160, 120, 120),
+    ],
+)  # fmt: skip
+def test_a_search_is_not_left_with_a_leader_of_few_runs(
+    monkeypatch, explains_at, overdrawn_at, runs
+):
+    """All is spent that may be. It has 80 runs, and gets 40 at a time."""
+    leader, made = ("shaft-damping", "total-backlash"), [None] * 80
+    best = SimpleNamespace(hypothesis=SimpleNamespace(effects=leader), population=made)
+
+    class Spent:
+        is_spent = True
+
+        @property
+        def is_overdrawn(self):
+            return len(made) >= overdrawn_at
+
+    fine = SimpleNamespace(
+        best=best,
+        found={leader: best},
+        purse=Spent(),
+        leading=lambda *_: [leader],
+        hear=lambda: None,
+    )
+    monkeypatch.setattr(contest, "is_nothing_missing", lambda *_: False)
+    monkeypatch.setattr(contest, "is_given_up", lambda *_: len(made) < explains_at)
+    monkeypatch.setattr(contest, "settle", lambda _, who: made.extend([None] * 40))
+    assert contest.compare(fine, None)
+    assert len(made) == runs
+
+
+@pytest.mark.parametrize(
     ("pressed", "alike", "rounds"),
     [
         ("", "", 4), ("near", "", 2), ("leader", "", 2), ("leader near", "", 4),

@@ -81,7 +81,7 @@ def test_a_leader_that_may_explain_is_looked_at_whatever_was_spent(
     best = SimpleNamespace(surface=SimpleNamespace(observation=None), hypothesis=hypothesis)
     effort = Effort()
     fine = SimpleNamespace(best=best, purse=Purse.for_observation(swept(1.0), effort))
-    effort.add(fine.purse.allowed_s)
+    effort.add(fine.purse.granted_s)
     assert not doubt.is_given_up(fine, None)
     effort.add(1.0)
     assert doubt.is_given_up(fine, None) is hopeless
@@ -101,9 +101,12 @@ def test_a_purse_grows_with_the_sweep_and_holds_what_comes_after_it():
     with counting() as effort:
         spend(5e5)
         quick, usual, slow = (Purse.for_observation(swept(s), effort) for s in (1.0, 70.0, 700.0))
-        assert quick.allowed_s == usual.allowed_s > 5e5 + 1500 * 70.0
-        assert slow.allowed_s == pytest.approx(5e5 + 1500 * 700.0)
-        spend(usual.allowed_s - 5e5 + 1.0)
+        assert quick.granted_s == usual.granted_s > 1500 * 70.0
+        assert slow.granted_s == pytest.approx(1500 * 700.0)
+        spend(0.5 * usual.granted_s)
+        assert usual.has_spent(0.49)
+        assert not usual.has_spent(0.51)
+        spend(0.5 * usual.granted_s + 1.0)
         assert usual.is_spent
         assert not slow.is_spent
-    assert not Purse().is_spent
+    assert not Purse().has_spent(0.0)

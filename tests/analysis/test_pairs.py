@@ -7,8 +7,10 @@ import pytest
 import synthetic_search
 
 from analysis import pairs, search
+from analysis.purse import Purse
 from analysis.screening import Place
 from sim.catalogue import CATALOGUE
+from sim.effort import Effort
 
 
 @pytest.mark.parametrize("seed", synthetic_search.MORE_SEEDS)
@@ -110,6 +112,20 @@ def test_others_are_tried_beside_a_close_pair_that_shares_no_cause_with_the_lead
     assert alone == [leader, *([stranger] if held else [])]
 
 
+def test_others_are_tried_first_beside_the_cause_that_explains_more(monkeypatch):
+    leader, stranger = ("a", "b"), ("c", "d")
+    alone = {("a",): 10.0, ("b",): 20.0, ("c",): 40.0, ("d",): 30.0}
+    rough, beside = Standings({leader: 100.0, stranger: 90.0} | alone), []
+    monkeypatch.setattr(
+        pairs, "_look_beside_all", lambda r, a, kept: beside.extend(kept) or {leader}
+    )
+    monkeypatch.setattr(pairs, "places_of_parts", lambda leader: {(e,): None for e in leader.of})
+    monkeypatch.setattr(pairs, "_look_at_parts", lambda *_: None)
+    additions = SimpleNamespace(coarse=Standings.observation)
+    pairs._hold_against_neighbours(rough, {}, additions, {leader, stranger})
+    assert beside == [("b",), ("a",), ("c",), ("d",)]
+
+
 @pytest.mark.parametrize(("heard_anew", "added_up"), [([False, False], 0), ([True, False], 1)])
 def test_what_causes_add_is_looked_at_again_where_another_noise_was_heard(
     monkeypatch, heard_anew, added_up
@@ -138,44 +154,94 @@ def test_what_causes_add_is_looked_at_again_where_another_noise_was_heard(
     assert used == [anew[0] if added_up else first]
 
 
-def test_all_that_is_not_hopeless_beside_a_part_is_looked_at_where_it_was_placed(monkeypatch):
-    found = {key: SimpleNamespace(hypothesis=key) for key in [("a",), ("b",)]}
-    placed = {
-        ("a",): {("a", f"x{i}"): Place(f"near x{i}", -30.0 * i) for i in range(6)},
-        ("b",): {("b", f"x{i}"): Place(f"by x{i}", 500.0 - i) for i in range(3)},
-    }
-    where, started = {("a",): "where the leader has a", ("b",): "where it has b"}, []
+class Rough:
+    """A hunt on few rows that tells what was looked at beside which causes, and how."""
 
-    def place(few, additions, known, at):
-        assert (few, at) == ("few", where[known])
-        return placed[known]
+    observation = None
 
-    def start(places, groups, **reach):
-        started.append((places, groups, reach))
-        for key, at in places.items():
-            found[key] = SimpleNamespace(best=SimpleNamespace(place=f"{at}, better"))
+    def __init__(self, monkeypatch, placed, purse=None, costs=lambda: None):
+        self.found = {part: SimpleNamespace(hypothesis=part) for part in placed}
+        self.looks, self.purse = [], Purse() if purse is None else purse
 
-    rough = SimpleNamespace(
-        observation=None,
-        found=found,
-        thinned=lambda stride: "few",
-        start=start,
-        among=lambda keys: sorted(keys, reverse=True),
-        hear=lambda: None,
+        def place(few, additions, known, at):
+            assert (few, at) == ("few", f"where {known} is")
+            return placed[known]
+
+        def look(name):
+            def record(rough, what):
+                self.looks.append((name, what))
+                costs()
+
+            return record
+
+        monkeypatch.setattr(pairs, "coarse_stride", lambda *_: 2)
+        monkeypatch.setattr(pairs, "place_beside", place)
+        for name in ("look_beside", "look_closer_beside"):
+            monkeypatch.setattr(pairs, name, look(name))
+
+    def thinned(self, stride):
+        return "few"
+
+    def among(self, keys):
+        return sorted(keys, reverse=True)
+
+    def hear(self):
+        self.looks.append(("hear", None))
+
+    def look_beside_all(self):
+        return pairs._look_beside_all(self, None, {part: f"where {part} is" for part in self.found})
+
+
+def test_all_that_is_not_hopeless_is_looked_at_where_it_was_placed_the_likeliest_first(monkeypatch):
+    """Whichever cause it stands beside, and at both places if it was placed beside both.
+
+    Six at a time, and eight of them closer.
+    """
+    beside_a = {("a", f"x{i}"): Place(f"near x{i}", -12.0 * i) for i in range(11)}
+    beside_b = {("b", "y"): Place("near y", -5.0), ("b", "z"): Place("near z", -97.0)}
+    both = {"a": Place("as a has it", -40.0), "b": Place("as b has it", -30.0)}
+    rough = Rough(
+        monkeypatch,
+        {("a",): beside_a | {("a", "b"): both["a"]}, ("b",): beside_b | {("a", "b"): both["b"]}},
     )
-    monkeypatch.setattr(pairs, "place_beside", place)
-    monkeypatch.setattr(pairs, "coarse_stride", lambda *_: 2)
-    monkeypatch.setattr(pairs, "_is_at_an_end", lambda _: False)
-    closer = pairs._look_beside_all(rough, None, where)
-    near = {"reach": (0.12, 0.03)}
-    assert started == [
-        # Those 120 and 150 behind are not.
-        ({("a", f"x{i}"): f"near x{i}" for i in range(4)}, 2, near),
-        ({("a", f"x{i}"): f"near x{i}, better" for i in (3, 2, 1, 0)}, 3, {}),
-        ({("b", f"x{i}"): f"by x{i}" for i in range(3)}, 2, near),
-        ({("b", f"x{i}"): f"by x{i}, better" for i in (2, 1, 0)}, 3, {}),
-    ]
-    assert closer == set(placed["a",]) - {("a", "x4"), ("a", "x5")} | set(placed["b",])
+    closer = rough.look_beside_all()
+    first, again, then, *rest = rough.looks
+    near = {("a", f"x{i}"): f"near x{i}" for i in range(9)}
+    assert first[1] == {k: near[k] for k in list(near)[:3]} | {
+        ("b", "y"): "near y",
+        ("a", "b"): "as b has it",
+        ("a", "x3"): "near x3",
+    }
+    assert list(first[1])[:3] == [("a", "x0"), ("b", "y"), ("a", "x1")]
+    assert again[1] == {("a", "b"): "as a has it"}
+    # Those 108 and 120 behind are not looked at.
+    assert list(then[1].items()) == [*list(near.items())[4:], (("b", "z"), "near z")]
+    assert rest == [("look_closer_beside", sorted(closer, reverse=True)), ("hear", None)]
+    assert closer == set(sorted([*first[1], *then[1]], reverse=True)[:8])
+
+
+@pytest.mark.parametrize(("pairs_placed", "looked_at"), [(24, 24), (25, 24), (40, 24)])
+def test_no_more_are_looked_at_than_the_likeliest(monkeypatch, pairs_placed, looked_at):
+    placed = {("a", f"x{i}"): Place("", -0.1 * i) for i in range(pairs_placed)}
+    rough = Rough(monkeypatch, {("a",): placed})
+    rough.look_beside_all()
+    looks = [what for name, what in rough.looks if name == "look_beside"]
+    assert [key for some in looks for key in some] == list(placed)[:looked_at]
+
+
+@pytest.mark.parametrize(("spent", "looked_at"), [(0.0, 13), (0.5, 12), (0.6, 6), (2.0, 6)])
+def test_no_more_are_looked_at_once_most_of_the_purse_is_spent(monkeypatch, spent, looked_at):
+    """Each look takes a fifth of it; the first is worth it whatever was spent."""
+    effort = Effort()
+    effort.add(spent * 1e6)
+    placed = {("a", f"x{i}"): Place("", -1.0 * i) for i in range(13)}
+    rough = Rough(
+        monkeypatch, {("a",): placed}, Purse(effort, granted_s=1e6), lambda: effort.add(0.2e6)
+    )
+    closer = rough.look_beside_all()
+    looks = [what for name, what in rough.looks if name == "look_beside"]
+    assert [key for some in looks for key in some] == list(placed)[:looked_at]
+    assert len(closer) == min(looked_at, 8)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 import synthetic
 import synthetic_search
 
-from analysis import contest, hunt, search
+from analysis import contest, hunt, pairs, search
 from analysis.executor import LocalExecutor
 from analysis.observation import USUAL_NOISE_V
 from analysis.purse import Purse
@@ -45,19 +45,31 @@ def test_a_search_that_has_spent_all_is_left_with_a_leader_that_explains_nothing
 ):
     """Three causes, two of which explain too little: the third is looked for no more.
 
-    What the first look takes counts: here it takes all.
+    What the first look takes counts: here it takes all. Nor are more pairs tried beside the causes
+    of the leading one than the first few.
     """
-    simulate = hunt.simulate_groups
+    simulate, beside = hunt.simulate_groups, []
+    look = pairs.look_beside
+    # In this world one stands out where it is placed.
+    monkeypatch.setattr(pairs, "_HOPELESS", np.inf)
+    monkeypatch.setattr(
+        pairs, "look_beside", lambda *given: beside.extend(given[1]) or look(*given)
+    )
 
     def spending(*given):
         if not runs:
             spend(1e9)
         return simulate(*given)
 
-    monkeypatch.setattr(hunt, "simulate_groups", spending)
     three = ("amplifier-lag", "load-inertia", "mesh1-damping")
+    synthetic_search.searched(three, [0.8, 0.3, 0.7], seed)
+    assert len(set(beside)) > pairs._AT_ONCE
+    beside.clear()
+    runs.clear()
+    monkeypatch.setattr(hunt, "simulate_groups", spending)
     found = synthetic_search.searched(three, [0.8, 0.3, 0.7], seed)
     assert found.given_up
+    assert len(set(beside)) == pairs._AT_ONCE
     assert len(found.candidates[0].hypothesis.effects) == 2
     assert max(map(len, runs)) == 2
 
