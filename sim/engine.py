@@ -58,6 +58,11 @@ class Stretch:
     settle_cycles: int
     integrate_cycles: int
 
+    @property
+    def duration_s(self) -> float:
+        """How long it takes, s."""
+        return (self.settle_cycles + self.integrate_cycles) / self.frequency_hz
+
 
 @dataclass(frozen=True, slots=True)
 class Motion:
@@ -65,12 +70,13 @@ class Motion:
 
     `coefficients` (cycles, 4, lanes): V_o = Im(sum_k C_k exp(i k (2 pi f t + phase)))
     for harmonics k of 1 to 3; C_0 is the mean, in V. `peak` (lanes,): largest
-    |V_o| in the kept cycles, V. `state` (n, lanes): the state at the end.
+    |V_o| in the kept cycles, V. `state` (n, lanes): the state at the end. `step_s`: its time step.
     """
 
     coefficients: NDArray[np.complex128]
     peak: NDArray[np.float64]
     state: NDArray[np.float64]
+    step_s: float
 
 
 def advance(
@@ -236,6 +242,7 @@ def _dwell(
         _coefficients(sums, propagator.steps_per_cycle) * turn,
         peak,
         _times(modes.shapes, end) + forced.imag,
+        propagator.step_s,
     )
 
 

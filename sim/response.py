@@ -182,7 +182,7 @@ def simulate_cycles(
     shares = _shares(plan, workers) if apart and len(groups) < workers else [slice(None)]
     points = np.asarray(plan.frequencies_hz)
 
-    def sweep(task: tuple[Sequence[int], slice]) -> NDArray[np.complex128]:
+    def sweep(task: tuple[Sequence[int], slice]) -> tuple[NDArray[np.complex128], float]:
         group, share = [servos[i] for i in task[0]], task[1]
         part = replace(plan, frequencies_hz=tuple(points[share].tolist()))
         steps = longest_step_s, *shorter_steps_s
@@ -195,11 +195,10 @@ def simulate_cycles(
     tasks = [(group, share) for group in groups for share in shares]
     with ThreadPoolExecutor(workers) as pool:
         done = list(pool.map(sweep, tasks))
-    worth = sum(_worth(servo.system) for servo in servos)
-    spend(len(servos) * plan.duration_s, worth * plan.duration_s)
+    spend(len(servos) * plan.duration_s, sum(steps for _, steps in done) * longest_step_s)
     shape = (levels, len(points), plan.integrate_cycles, HARMONICS)
     results = [np.empty(shape, dtype=complex) for _ in servos]
-    for (group, share), cycles in zip(tasks, done, strict=True):
+    for (group, share), (cycles, _) in zip(tasks, done, strict=True):
         for position, index in enumerate(group):
             results[index][:, share] = cycles[position]
     return results
@@ -279,8 +278,10 @@ def _sweep(
     steps_s: Sequence[float],
     single: bool,
     point_done: Callable[[], None],
-) -> NDArray[np.complex128]:
+) -> tuple[NDArray[np.complex128], float]:
     """(servos, levels, points, cycles, 4) of servos that share their linear part.
+
+    And how many steps of a plain unit take as long as theirs.
 
     `steps_s`: longest steps, each taken where the one before lets a motion grow without bound.
     """
@@ -300,11 +301,13 @@ def _sweep(
         return carry(system, parameters, start, some, steps_s, single, point_done)
 
     motions = [carried([s])[0] for s in stretches] if plan.from_rest else carried(stretches)
+    steps = sum(s.duration_s / m.step_s for s, m in zip(stretches, motions, strict=True))
+    steps *= _worth(system) * len(amplitude)
     kept = np.array([motion.coefficients / amplitude for motion in motions])
     if plan.direction == "down":
         kept = kept[::-1]
     lanes = kept.reshape(*kept.shape[:3], len(servos), len(levels))
-    return np.ascontiguousarray(lanes.transpose(3, 4, 0, 1, 2))
+    return np.ascontiguousarray(lanes.transpose(3, 4, 0, 1, 2)), steps
 
 
 def _start(servos: Sequence[Servo], levels: int) -> NDArray[np.float64]:
@@ -376,7 +379,7 @@ def _linear_key(system: PiecewiseLinearSystem) -> bytes:
 
 
 def _worth(system: PiecewiseLinearSystem) -> float:
-    """How many times as long as a plain unit's its motion takes to simulate."""
+    """How many times as long as a plain unit's its steps take to simulate."""
     hardens = any(law.law is Law.CUBIC for law in system.nonlinearities)
     return _DEAR if hardens else 1.0
 

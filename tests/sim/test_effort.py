@@ -2,10 +2,13 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from daq.plan import SweepPlan
+from sim import engine
 from sim.effects import parse_effect
 from sim.effort import counting, spend
 from sim.response import Servo, simulate_cycles
@@ -31,6 +34,26 @@ def test_motion_of_a_hardening_shaft_is_worth_more_of_a_plain_units():
     assert effort.simulated_s == pytest.approx(3 * plan.duration_s)
     # One in three, that takes a bit more than twice as long a step.
     assert 4 * plan.duration_s < effort.worth_s < 5 * plan.duration_s
+
+
+def test_motion_that_needs_shorter_steps_is_worth_more(monkeypatch):
+    """At 125 Hz the first step will not do: that and the one before take twice as long."""
+    plan = SweepPlan((100.0, 110.0, 125.0), (1.5,), settle_cycles=2, integrate_cycles=3)
+    plain = engine.advance
+
+    def growing(system, parameters, state, stretches, step_s, single):
+        motions = plain(system, parameters, state, stretches, step_s, single)
+        for stretch, motion in zip(stretches, motions, strict=True):
+            grows = stretch.frequency_hz == 125.0 and step_s > 5e-6
+            yield replace(motion, coefficients=motion.coefficients * (np.nan if grows else 1.0))
+
+    monkeypatch.setattr(engine, "advance", growing)
+    servos = [Servo.of(load_unit("adss"), 0.5)] * 2
+    with counting() as effort:
+        simulate_cycles(servos, plan, longest_step_s=1e-5, shorter_steps_s=(5e-6,))
+    assert effort.simulated_s == pytest.approx(2 * plan.duration_s)
+    worth_s = 5 / 100.0 + 2 * (5 / 110.0 + 5 / 125.0)
+    assert effort.worth_s == pytest.approx(2 * worth_s, rel=2e-3)
 
 
 def test_what_is_not_said_to_be_dear_is_worth_itself():
