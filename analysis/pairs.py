@@ -157,13 +157,9 @@ def _close_stranger(rough: Hunt, leader: Effects, looked_at: set[Effects]) -> li
 
 
 def _kept(rough: Hunt, leader: Effects) -> Starts:
-    """The causes of a leading pair where it has them; the one that does as well alone, if any.
-
-    Who explains more alone comes first, as it is more likely there.
-    """
+    """The causes of a leading pair where it has them; the one that does as well alone, if any."""
     if earns(leader, rough.found):
-        places = places_of_parts(rough.found[leader])
-        return {part: places[part] for part in rough.among(places)}
+        return places_of_parts(rough.found[leader])
     alone = rough.among(parts_of(leader, rough.found))[0]
     return {alone: rough.found[alone].best.place}
 

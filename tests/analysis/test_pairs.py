@@ -112,20 +112,6 @@ def test_others_are_tried_beside_a_close_pair_that_shares_no_cause_with_the_lead
     assert alone == [leader, *([stranger] if held else [])]
 
 
-def test_others_are_tried_first_beside_the_cause_that_explains_more(monkeypatch):
-    leader, stranger = ("a", "b"), ("c", "d")
-    alone = {("a",): 10.0, ("b",): 20.0, ("c",): 40.0, ("d",): 30.0}
-    rough, beside = Standings({leader: 100.0, stranger: 90.0} | alone), []
-    monkeypatch.setattr(
-        pairs, "_look_beside_all", lambda r, a, kept: beside.extend(kept) or {leader}
-    )
-    monkeypatch.setattr(pairs, "places_of_parts", lambda leader: {(e,): None for e in leader.of})
-    monkeypatch.setattr(pairs, "_look_at_parts", lambda *_: None)
-    additions = SimpleNamespace(coarse=Standings.observation)
-    pairs._hold_against_neighbours(rough, {}, additions, {leader, stranger})
-    assert beside == [("b",), ("a",), ("c",), ("d",)]
-
-
 @pytest.mark.parametrize(("heard_anew", "added_up"), [([False, False], 0), ([True, False], 1)])
 def test_what_causes_add_is_looked_at_again_where_another_noise_was_heard(
     monkeypatch, heard_anew, added_up
