@@ -28,8 +28,8 @@ _OVERDRAFT = 1.25
 class Purse:
     """What may be spent, and what is: motion in s, so that no clock decides what a search finds.
 
-    It is that of a plain unit; what takes longer to step costs more (`sim.effort`). `so_far_s`: what
-    `effort` counted before; `granted_s`: how much may be spent, but for the overdraft.
+    It is that of a plain unit; what takes longer to step costs more (`sim.effort`). `so_far_s`:
+    what `effort` counted before; `granted_s`: how much may be spent, but for the overdraft.
     """
 
     effort: Effort = field(default_factory=Effort)
