@@ -121,8 +121,7 @@ def compare(fine: Hunt, rng: np.random.Generator) -> bool:
 def _is_left(fine: Hunt, rng: np.random.Generator) -> bool:
     """Whether a search is left with no explanation; its leader first gets runs that can tell."""
     while is_given_up(fine, rng):
-        few = len(fine.best.population) < _SOUND
-        if not few or fine.purse.is_overdrawn:
+        if len(fine.best.population) >= _SOUND or fine.purse.is_overdrawn:
             return True
         settle(fine, [fine.best.hypothesis.effects])
     return False

@@ -206,6 +206,14 @@ def test_all_that_is_not_hopeless_is_looked_at_where_it_was_placed_the_likeliest
     assert closer == set(sorted([*first[1], *then[1]], reverse=True)[:8])
 
 
+def test_a_closer_look_is_about_the_best_place_so_far_and_as_far_as_usual():
+    looks = []
+    rough = Standings({("a", "b"): 2.0, ("a", "c"): 1.0})
+    rough.start = lambda *given, **more: looks.append((given, more))
+    pairs.look_closer_beside(rough, [("a", "c")])
+    assert looks == [(({("a", "c"): "where ('a', 'c') is"}, 3), {})]
+
+
 @pytest.mark.parametrize(("pairs_placed", "looked_at"), [(24, 24), (25, 24), (40, 24)])
 def test_no_more_are_looked_at_than_the_likeliest(monkeypatch, pairs_placed, looked_at):
     placed = {("a", f"x{i}"): Place("", -0.1 * i) for i in range(pairs_placed)}
