@@ -21,7 +21,7 @@ from analysis.observation import Observation, channels_of_readings
 from analysis.population import Population
 from analysis.reading_noise import draw_noises
 
-__all__ = ["Calibrated", "calibrate"]
+__all__ = ["NEAREST", "Calibrated", "calibrate"]
 
 _RIDGES = (0.003, 0.01, 0.03, 0.1, 0.3)
 _FLOOR = 0.03
@@ -32,9 +32,8 @@ _REACH = 2.0
 _MARGIN = 1.3
 """Factor on stated errors: machines drawn anew were missed by so much more than those left out."""
 
-_NEAREST = 180
-"""Runs that take part: the answer is learned where it lies."""
-
+NEAREST = 180
+"""Runs that take part, if not told otherwise: the answer is learned where it lies."""
 
 _WITHIN = 3.0
 """Runs that lie so many standard deviations about the first answer all take part with caution."""
@@ -61,6 +60,7 @@ def calibrate(
     width: NDArray[np.float64],
     rng: np.random.Generator,
     *,
+    nearest: int = NEAREST,
     cautious: bool = False,
 ) -> Calibrated:
     """Estimate the place of an observation among runs.
@@ -71,6 +71,8 @@ def calibrate(
 
     Parameters
     ----------
+    nearest
+        How many of the runs take part in the second.
     cautious
         Allow for a sweep that tells little. Runs then differ in what a stated error is itself off
         by, as the scatter says nothing else where all of a motion repeats itself; and all runs
@@ -81,7 +83,7 @@ def calibrate(
     kin = _kin(runs.deviations)
     first = _regress(observation, readings, runs.places, kin)
     distance = np.abs((runs.places - first.mean) / width).max(axis=1)
-    count = _NEAREST
+    count = nearest
     if cautious:
         reach = _WITHIN * np.sqrt(np.diag(first.covariance))
         possible = np.all(np.abs(runs.places - first.mean) <= reach, axis=1)
@@ -134,8 +136,9 @@ def _regress(
 ) -> Calibrated:
     features, asked = _features(observation, readings)
     count = len(features)
-    # Row by row: all pairs at once would be hundreds of megabytes, far outside any cache.
-    apart = np.array([((one - features) ** 2).mean(axis=-1) for one in features])
+    # One product of matrices: all pairs of features at once would be hundreds of megabytes.
+    square = (features**2).sum(axis=-1)
+    apart = (square[:, None] + square - 2.0 * features @ features.T) / features.shape[1]
     scale = _REACH * float(np.median(apart[np.triu_indices(count, 1)])) + 1e-12
     kernel = np.exp(-apart / scale)
     likeness = np.exp(-((features - asked) ** 2).mean(axis=-1) / scale)

@@ -136,7 +136,7 @@ def _diagnose(
         shape=describe_departures(departures, observation),
         next_measurement=proposal,
         observation=observation,
-        given_up=searched.given_up,
+        given_up=searched.given_up or (searched.spared and verdict.word == "unexplained"),
     )
 
 
@@ -186,7 +186,7 @@ def _warnings(diagnosis: Diagnosis) -> tuple[str, ...]:
     found, observation = [], diagnosis.observation
     if diagnosis.given_up:
         found.append(
-            "the search was left with no explanation, having simulated as much motion as it may: "
+            "the search was left with no explanation, as it may simulate no more motion: "
             "not every set of causes was tried"
         )
     if len(observation.blocks) == 1:

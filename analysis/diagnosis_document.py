@@ -49,8 +49,8 @@ class Diagnosis:
     `ratio_baseline`, `ratio_extended`: contribution ratio and its standard
     deviation under the plain and the extended model. `departures`: of the
     measurement from the plain model; `left`: from the extended one.
-    `given_up`: whether the search was left with no explanation, having simulated as much as it
-    may. `simulated_s`: seconds of motion that were simulated for it.
+    `given_up`: whether the search was left with no explanation, having tried no more sets than it
+    may simulate. `simulated_s`: seconds of motion that were simulated for it.
     """
 
     unit: str

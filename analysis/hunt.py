@@ -42,7 +42,11 @@ of further runs of several causes lie along the places that agree."""
 
 
 class Hunt:
-    """Candidates on the rows of one observation, and the runs made for them so far."""
+    """Candidates on the rows of one observation, and the runs made for them so far.
+
+    `spared`: whether something that is worth a look was not looked at, for what is left of the
+    purse.
+    """
 
     def __init__(
         self,
@@ -61,6 +65,7 @@ class Hunt:
         self.purse = Purse() if purse is None else purse
         self._runs: dict[Effects, Population] = {}
         self.found: dict[Effects, Candidate] = {}
+        self.spared = False
 
     @property
     def best(self) -> Candidate:

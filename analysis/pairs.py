@@ -192,6 +192,7 @@ def _look_beside_all(rough: Hunt, additions: Additions, kept: Starts) -> set[Eff
             if now := {key: places[key].place for key in some if key in places}:
                 look_beside(rough, now)
         looked_at += some
+    rough.spared |= bool(worth)
     closer = rough.among(looked_at)[:_BESIDE_CLOSER]
     look_closer_beside(rough, closer)
     rough.hear()

@@ -76,13 +76,15 @@ tried: more of it is no explanation (`analysis.verdict`)."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Searched:
-    """Candidates, the most likely first, and whether the search was left with none that explains.
+    """Candidates, the most likely first, and whether all that was worth it was looked at.
 
-    It is where that took all the motion that a measurement may (`analysis.purse`).
+    `given_up`: the search was left with none that explains, having taken all the motion that a
+    measurement may (`analysis.purse`). `spared`: not all pairs were looked at that were worth it.
     """
 
     candidates: list[Candidate]
     given_up: bool
+    spared: bool = False
 
 
 def search_causes(
@@ -165,7 +167,8 @@ def search_causes(
                 if given_up:
                     break
                 step()
-    return Searched(sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood), given_up)
+    likeliest = sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
+    return Searched(likeliest, given_up, rough.spared)
 
 
 def _without(effects: Collection[str], atlas: Atlas) -> Atlas:

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.calibration import Calibrated, calibrate
+from analysis.calibration import NEAREST, Calibrated, calibrate
 from analysis.candidate import Candidate
 from analysis.observation import Observation
 
@@ -23,20 +23,32 @@ less."""
 
 
 def size_candidate(
-    candidate: Candidate, observation: Observation, rng: np.random.Generator
+    candidate: Candidate,
+    observation: Observation,
+    rng: np.random.Generator,
+    nearest: int = NEAREST,
 ) -> Calibrated:
-    """Mean (d,) and covariance (d, d) of the coordinates, from runs left out in turn."""
-    return _clipped(calibrate(observation, candidate.population, _width(candidate), rng))
+    """Mean (d,) and covariance (d, d) of the coordinates, from runs left out in turn.
+
+    `nearest`: how many of the runs take part where the answer lies.
+    """
+    runs, width = candidate.population, _width(candidate)
+    return _clipped(calibrate(observation, runs, width, rng, nearest=nearest))
 
 
 def widen_if_open(
-    found: Calibrated, candidate: Candidate, observation: Observation, rng: np.random.Generator
+    found: Calibrated,
+    candidate: Candidate,
+    observation: Observation,
+    rng: np.random.Generator,
+    nearest: int = NEAREST,
 ) -> Calibrated:
     """What was found of a candidate, or what is with more caution where that leaves much more open.
 
     A search places runs ever closer about an answer; where the data say nothing, it seems known.
     """
-    open_ = calibrate(observation, candidate.population, _width(candidate), rng, cautious=True)
+    runs, width = candidate.population, _width(candidate)
+    open_ = calibrate(observation, runs, width, rng, nearest=nearest, cautious=True)
     wider = np.sqrt(np.diag(open_.covariance) / np.diag(found.covariance))
     return _clipped(open_) if wider[0] > _OPEN else found
 

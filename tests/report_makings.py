@@ -67,13 +67,14 @@ def diagnosis(
     hidden: tuple[str, ...],
     judged: list[tuple[str, ...]],
     given_up: bool = False,
+    spared: bool = False,
 ):
     """A real diagnosis of a synthetic world in which some effects are hidden."""
     rng = np.random.default_rng(3)
     place = np.array([0.5, *([0.6] if hidden else [])])
     seen = synthetic.observation(synthetic.read(hidden, place, rng))
     candidates = [synthetic.candidate(seen, effects) for effects in [(), *judged]]
-    searched = Searched(candidates, given_up)
+    searched = Searched(candidates, given_up, spared)
     monkeypatch.setattr(diagnosis_module, "observe", lambda response: seen)
     monkeypatch.setattr(diagnosis_module, "search_causes", lambda *_, **__: searched)
     monkeypatch.setattr(diagnosis_module, "propose_measurement", lambda *_, **__: None)

@@ -47,9 +47,17 @@ def test_an_answer_without_a_rival_says_how_probable_it_is(explained):
     assert explained.to_json()["causes"][0]["probability"] == pytest.approx(probability)
 
 
-@pytest.mark.parametrize("given_up", [False, True])
-def test_a_diagnosis_says_that_the_search_was_left(monkeypatch, given_up):
-    found = makings.diagnosis(monkeypatch, ("load-inertia",), [STIFF], given_up)
+@pytest.mark.parametrize(
+    ("judged", "given_up", "spared", "warned"),
+    [
+        (STIFF, False, False, False), (STIFF, True, False, True), (STIFF, False, True, True),
+        # What explains needs no further pair.
+        (("load-inertia",), False, True, False),
+    ],
+)  # fmt: skip
+def test_a_diagnosis_says_that_not_all_was_tried(monkeypatch, judged, given_up, spared, warned):
+    found = makings.diagnosis(monkeypatch, ("load-inertia",), [judged], given_up, spared)
+    assert (found.verdict.word == "unexplained") == (judged == STIFF)
     said = [text for text in found.to_json()["warnings"] if "the search was left" in text]
-    assert len(said) == given_up
+    assert len(said) == warned
     assert all(any(text in line for line in found.summary()) for text in said)

@@ -62,13 +62,15 @@ def test_a_search_that_has_spent_all_is_left_with_a_leader_that_explains_nothing
         return simulate(*given)
 
     three = ("amplifier-lag", "load-inertia", "mesh1-damping")
-    synthetic_search.searched(three, [0.8, 0.3, 0.7], seed)
+    whole = synthetic_search.searched(three, [0.8, 0.3, 0.7], seed)
     assert len(set(beside)) > pairs._AT_ONCE
+    assert not whole.spared
     beside.clear()
     runs.clear()
     monkeypatch.setattr(hunt, "simulate_groups", spending)
     found = synthetic_search.searched(three, [0.8, 0.3, 0.7], seed)
     assert found.given_up
+    assert found.spared
     assert len(set(beside)) == pairs._AT_ONCE
     assert len(found.candidates[0].hypothesis.effects) == 2
     assert max(map(len, runs)) == 2

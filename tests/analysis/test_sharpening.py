@@ -10,6 +10,8 @@ import synthetic
 from analysis import sharpening
 from analysis.calibration import Calibrated
 from analysis.population import Population
+from analysis.purse import Purse
+from sim.effort import Effort, counting, spend
 
 TRUE = ("load-inertia",)
 
@@ -43,7 +45,7 @@ def sized(stds, ratio_std=None):
     """
     told = iter(stds)
 
-    def size(candidate, observation, rng):
+    def size(candidate, observation, rng, nearest):
         std = next(told)
         both = (std, 0.001) if ratio_std is None else (ratio_std, std)
         return Calibrated(np.array([0.5, 0.5]), np.diag(np.square(both)))
@@ -70,11 +72,15 @@ def observed_at(seed):
     return synthetic.observation(synthetic.read(TRUE, np.array([0.5, 0.5]), rng))
 
 
+def sharpened(observed):
+    rng = np.random.default_rng(0)
+    return sharpening.sharpen_candidate(synthetic.ADSS, found(observed, 0), observed, rng)
+
+
 def test_what_is_sharp_costs_nothing_more(monkeypatch, asked):
     observed = observed_at(0)
     monkeypatch.setattr(sharpening, "size_candidate", sized([0.01]))
-    rng = np.random.default_rng(0)
-    sharpening.sharpen_candidate(synthetic.ADSS, found(observed, 0), observed, rng)
+    sharpened(observed)
     assert asked == []
 
 
@@ -92,46 +98,83 @@ def test_it_stops_as_soon_as_the_answer_is_sharp(monkeypatch, asked):
 
 def test_it_ends_where_the_data_tell_no_more(monkeypatch, asked):
     observed = observed_at(0)
-    monkeypatch.setattr(sharpening, "size_candidate", sized([0.2] * 50, 0.05))
+    monkeypatch.setattr(sharpening, "size_candidate", sized([0.2] * 50, 0.02))
     monkeypatch.setattr(sharpening, "_APART", 0.0)
-    rng = np.random.default_rng(0)
-    answer = sharpening.sharpen_candidate(synthetic.ADSS, found(observed, 0), observed, rng)
-    assert len(asked) == 2
+    answer = sharpened(observed)
+    assert len(asked) == 1
     assert answer.covariance[1, 1] == pytest.approx(0.2**2)
 
 
 @pytest.mark.parametrize(
-    ("stds", "rounds"),
-    [
-        ([0.07] * 50, 8), ([0.07] * 6 + [0.059] * 50, 6), ([0.07] * 3 + [0.055] * 50, 5),
-        ([0.07] * 2 + [0.03], 2),
-    ],
-)  # fmt: skip
+    ("stds", "rounds"), [([0.07] * 50, 6), ([0.07] * 4 + [0.024] * 50, 4), ([0.07, 0.02], 1)]
+)
 def test_a_ratio_that_is_hardly_known_gets_all_rounds(monkeypatch, asked, stds, rounds):
+    """However little they bring: what is told of it then is chance of where runs lie."""
     observed = observed_at(0)
     monkeypatch.setattr(sharpening, "size_candidate", sized(stds))
-    rng = np.random.default_rng(0)
-    sharpening.sharpen_candidate(synthetic.ADSS, found(observed, 0), observed, rng)
+    monkeypatch.setattr(sharpening, "_ENOUGH", 10_000)
+    sharpened(observed)
+    assert asked == [8] * rounds
+
+
+def test_it_gets_no_more_runs_than_are_enough(monkeypatch, asked):
+    observed = observed_at(0)
+    monkeypatch.setattr(sharpening, "size_candidate", sized([0.07] * 50))
+    known = len(found(observed, 0).population)
+    monkeypatch.setattr(sharpening, "_ENOUGH", known + 160)
+    sharpened(observed)
+    assert len(asked) == 2
+
+
+@pytest.mark.parametrize(("share", "rounds"), [(0.06, 4), (0.3, 1), (1e-9, 6)])
+def test_it_takes_no_more_than_a_share_of_what_a_search_may(monkeypatch, asked, share, rounds):
+    """A round that is begun is finished; what was simulated before does not count."""
+    observed, made = observed_at(0), sharpening.simulate_groups
+    granted_s = Purse.for_observation(observed, Effort()).granted_s
+
+    def spending(*given):
+        spend(1.0, share * granted_s)
+        return made(*given)
+
+    monkeypatch.setattr(sharpening, "size_candidate", sized([0.07] * 50))
+    monkeypatch.setattr(sharpening, "_ENOUGH", 10_000)
+    monkeypatch.setattr(sharpening, "simulate_groups", spending)
+    with counting():
+        spend(1.0, granted_s)
+        sharpened(observed)
     assert len(asked) == rounds
 
 
 @pytest.mark.parametrize(
     ("stds", "rounds"),
     [
-        ([0.085, 0.077, 0.076, 0.063, 0.062, 0.054], 5),
-        ([0.085, 0.080, 0.079, 0.060, 0.050, 0.040], 2),
-        ([0.085, 0.077, 0.068, 0.067, 0.066, 0.065], 4),
+        ([0.085, 0.076, 0.063, 0.054, 0.045, 0.036, 0.035], 6),
+        ([0.085, 0.077, 0.060, 0.050, 0.040, 0.03], 1),
+        ([0.085, 0.068, 0.066, 0.03], 2),
+        ([0.085, 0.034], 1),
     ],
 )
-def test_one_round_that_seems_worthless_does_not_end_it_and_two_do(
-    monkeypatch, asked, stds, rounds
-):
+def test_a_round_that_brought_little_to_a_size_is_the_last(monkeypatch, asked, stds, rounds):
     observed = observed_at(0)
-    monkeypatch.setattr(sharpening, "size_candidate", sized(stds, 0.03))
+    monkeypatch.setattr(sharpening, "size_candidate", sized(stds, 0.02))
     monkeypatch.setattr(sharpening, "_APART", 0.0)
-    rng = np.random.default_rng(0)
-    sharpening.sharpen_candidate(synthetic.ADSS, found(observed, 0), observed, rng)
+    sharpened(observed)
     assert len(asked) == rounds
+
+
+def test_all_runs_take_part_in_what_is_told(monkeypatch, asked):
+    observed, took_part = observed_at(0), []
+    size = sharpening.size_candidate
+
+    def sizing(candidate, observation, rng, nearest):
+        took_part.append((nearest, len(candidate.population)))
+        return size(candidate, observation, rng, nearest)
+
+    monkeypatch.setattr(sharpening, "size_candidate", sizing)
+    monkeypatch.setattr(sharpening, "_BLUNT", 0.0)
+    sharpened(observed)
+    assert all(nearest >= runs for nearest, runs in took_part)
+    assert took_part[-1][1] > 2 * took_part[0][1]
 
 
 @pytest.mark.parametrize(("reach", "rounds"), [(0.17, 0), (0.14, 1)])
@@ -147,7 +190,7 @@ def test_a_sharp_answer_of_runs_that_lie_close_together_is_looked_at_again(
     candidate = replace(candidate, population=made)
     error = 0.1 / np.sqrt(3.0)
 
-    def size(candidate, observation, rng):
+    def size(candidate, observation, rng, nearest):
         told = 0.03 if len(candidate.population) > 40 else error
         return Calibrated(np.array([0.5, 0.5]), np.diag([0.001**2, told**2]))
 
@@ -159,9 +202,8 @@ def test_a_sharp_answer_of_runs_that_lie_close_together_is_looked_at_again(
 
 def test_it_goes_on_as_long_as_it_pays_but_not_for_ever(monkeypatch, asked):
     observed = observed_at(0)
-    monkeypatch.setattr(sharpening, "size_candidate", sized(0.5 * 0.8 ** np.arange(50)))
-    rng = np.random.default_rng(0)
-    sharpening.sharpen_candidate(synthetic.ADSS, found(observed, 0), observed, rng)
+    monkeypatch.setattr(sharpening, "size_candidate", sized(0.5 * 0.8 ** np.arange(50), 0.02))
+    sharpened(observed)
     assert 3 < len(asked) < 10
 
 

@@ -24,8 +24,8 @@ def test_what_is_hardly_known_with_caution_is_told_with_it(monkeypatch, wider, t
     monkeypatch.setattr(module, "calibrate", calibrate)
     one = SimpleNamespace(population=None, surface=SimpleNamespace(chart=None, width=None))
     found = Calibrated(np.array([0.3]), np.array([[0.05**2]]))
-    assert widen_if_open(found, one, None, None).mean[0] == told
-    assert asked == [{"cautious": True}]
+    assert widen_if_open(found, one, None, None, 400).mean[0] == told
+    assert asked == [{"nearest": 400, "cautious": True}]
 
 
 @pytest.mark.parametrize("seed", range(3))
