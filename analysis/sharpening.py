@@ -25,11 +25,12 @@ from sim.unit import Unit
 
 __all__ = ["sharpen_candidate"]
 
-_ROUNDS, _GROUPS = 6, 8
+_ROUNDS, _GROUPS = 12, 4
 _SHARP = 0.035
 """Standard deviation of every coordinate from which on nothing more is simulated."""
-_WORTHWHILE = 0.9
-"""Nor where a round left the largest of them above this share of what it was."""
+_WORTHWHILE, _BACK = 0.9, 2
+"""Nor where two rounds left the largest of them above this share of what it was. What few runs say
+of their error is uncertain itself, so that a single round may seem worthless by chance."""
 
 _BLUNT, _ENOUGH = 0.025, 720
 """While the contribution ratio is known no better than this neither counts, up to so many runs.
@@ -72,7 +73,7 @@ def sharpen_candidate(
             if std[0] > _BLUNT:
                 learned = len(candidate.population) >= _ENOUGH
             else:
-                stalled = len(widest) > 1 and widest[-1] > _WORTHWHILE * widest[-2]
+                stalled = len(widest) > _BACK and widest[-1] > _WORTHWHILE * widest[-1 - _BACK]
                 learned = widest[-1] <= _SHARP or stalled
             if learned and np.all(candidate.population.places.std(axis=0) > _APART * std):
                 break
