@@ -154,7 +154,9 @@ def test_it_takes_no_more_than_a_share_of_what_a_search_may(monkeypatch, asked, 
         ([0.085, 0.034], 1),
     ],
 )
-def test_one_round_that_brought_little_to_a_size_does_not_end_it_and_two_do(monkeypatch, asked, stds, rounds):
+def test_one_round_that_brought_little_to_a_size_does_not_end_it_and_two_do(
+    monkeypatch, asked, stds, rounds
+):
     observed = observed_at(0)
     monkeypatch.setattr(sharpening, "size_candidate", sized(stds, 0.02))
     monkeypatch.setattr(sharpening, "_APART", 0.0)
