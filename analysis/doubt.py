@@ -19,6 +19,7 @@ __all__ = [
     "is_doubtful_at_once",
     "is_doubtful_still",
     "is_given_up",
+    "is_hardly_missing",
     "is_nothing_missing",
     "is_refused_now",
 ]
@@ -49,6 +50,10 @@ still decide either way."""
 _COMMON = 0.2
 """Share of the baseline's own runs that the leader explains better by as much, from which on there
 is nothing to be found, and nothing more is simulated."""
+
+_NAMED = 38.0
+"""Log-likelihood by which a single cause leads the plain model at least where it is named: what it
+and a size cost, and what must be left (`analysis.verdict`)."""
 
 
 def is_doubtful(
@@ -99,6 +104,18 @@ def is_nothing_missing(fine: Hunt, rng: np.random.Generator) -> bool:
     if is_doubtful(baseline, rng):
         return False
     return fine.best is baseline or judge_chance(baseline, fine.best, rng) > _COMMON
+
+
+def is_hardly_missing(fine: Hunt, rng: np.random.Generator) -> bool:
+    """Whether the plain model will do by itself, and what leads it does so by too little to count.
+
+    Then a second cause behind that leader is no question.
+    """
+    baseline = fine.found[()]
+    if fine.best.best.log_likelihood - baseline.best.log_likelihood > _NAMED:
+        return False
+    # Chance of its own: all else comes out as if it had not been asked.
+    return not is_doubtful(baseline, rng.spawn(1)[0])
 
 
 def is_refused_now(fine: Hunt, rng: np.random.Generator) -> bool:

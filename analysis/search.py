@@ -35,6 +35,7 @@ from analysis.doubt import (
     is_doubtful_at_once,
     is_doubtful_still,
     is_given_up,
+    is_hardly_missing,
     is_refused_now,
 )
 from analysis.executor import Executor
@@ -211,7 +212,7 @@ def _look_at_all(
         missing = compare(fine, rng)
         if doubted or not is_doubtful(fine.best, rng):
             break
-    if missing and not doubted and not fine.purse.is_spent:
+    if missing and not (doubted or fine.purse.is_spent or is_hardly_missing(fine, rng)):
         look_for_second(rough, fine, atlas)
     return missing, doubted
 

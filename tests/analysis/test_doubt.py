@@ -91,6 +91,25 @@ def test_a_leader_that_may_explain_is_looked_at_whatever_was_spent(
     assert doubt.is_given_up(fine, None) is refused
 
 
+@pytest.mark.parametrize(
+    ("lead", "doubtful", "hardly"),
+    [(37.0, False, True), (39.0, False, False), (37.0, True, False), (0.0, False, True)],
+)
+def test_what_leads_a_plain_model_that_will_do_by_little_is_hardly_missing(
+    monkeypatch, lead, doubtful, hardly
+):
+    asked = []
+    plain = SimpleNamespace(best=SimpleNamespace(log_likelihood=700.0))
+    best = SimpleNamespace(best=SimpleNamespace(log_likelihood=700.0 + lead))
+    monkeypatch.setattr(doubt, "is_doubtful", lambda one, _: asked.append(one) or doubtful)
+    fine = SimpleNamespace(best=best, found={(): plain, ("load-inertia",): best})
+    rng = np.random.default_rng(0)
+    assert doubt.is_hardly_missing(fine, rng) is hardly
+    assert asked in ([], [plain])
+    # What comes after it has the chance that it had.
+    assert rng.random() == np.random.default_rng(0).random()
+
+
 def swept(duration_s):
     """An observation of two levels that take so long together."""
     plans = [(SimpleNamespace(duration_s=share * duration_s), None) for share in (0.25, 0.75)]

@@ -213,9 +213,15 @@ def test_pairs_are_searched_late_where_a_single_cause_would_be_refused_after_all
     assert given == (["the pair"] if refused else [])
 
 
-@pytest.mark.parametrize(("doubted", "spent"), [(False, False), (True, False), (False, True)])
-def test_whether_pairs_were_searched_is_told(monkeypatch, doubted, spent):
-    """A second cause is looked for behind one that nobody doubts, where it may be paid for."""
+@pytest.mark.parametrize(
+    ("doubted", "spent", "hardly"),
+    [(False, False, False), (True, False, False), (False, True, False), (False, False, True)],
+)
+def test_whether_pairs_were_searched_is_told(monkeypatch, doubted, spent, hardly):
+    """A second cause is looked for behind one that nobody doubts, where it may be paid for.
+
+    But for one that leads a plain model that will do by too little to be named.
+    """
     fine = SimpleNamespace(
         found={}, best=None, take_over=lambda *_: None, hear=lambda: None,
         purse=SimpleNamespace(is_spent=spent),
@@ -225,7 +231,8 @@ def test_whether_pairs_were_searched_is_told(monkeypatch, doubted, spent):
     monkeypatch.setattr(search, "is_doubtful_still", lambda *_: False)
     monkeypatch.setattr(search, "is_doubtful", lambda *_: False)
     monkeypatch.setattr(search, "compare", lambda *_: True)
+    monkeypatch.setattr(search, "is_hardly_missing", lambda *_: hardly)
     monkeypatch.setattr(search, "look_for_second", lambda *_: beside.append(True))
     rough = SimpleNamespace(found={})
     assert search._look_at_all(rough, fine, {}, None, doubted) == (True, doubted)
-    assert bool(beside) == (not doubted and not spent)
+    assert bool(beside) == (not doubted and not spent and not hardly)
