@@ -144,6 +144,7 @@ class Rough:
     """A hunt on few rows that tells what was looked at beside which causes, and how."""
 
     observation = None
+    spared = False
 
     def __init__(self, monkeypatch, placed, purse=None, costs=lambda: None):
         self.found = {part: SimpleNamespace(hypothesis=part) for part in placed}
@@ -204,6 +205,7 @@ def test_all_that_is_not_hopeless_is_looked_at_where_it_was_placed_the_likeliest
     assert list(then[1].items()) == [*list(near.items())[4:], (("b", "z"), "near z")]
     assert rest == [("look_closer_beside", sorted(closer, reverse=True)), ("hear", None)]
     assert closer == set(sorted([*first[1], *then[1]], reverse=True)[:8])
+    assert not rough.spared
 
 
 def test_a_closer_look_is_about_the_best_place_so_far_and_as_far_as_usual():
@@ -221,6 +223,8 @@ def test_no_more_are_looked_at_than_the_likeliest(monkeypatch, pairs_placed, loo
     rough.look_beside_all()
     looks = [what for name, what in rough.looks if name == "look_beside"]
     assert [key for some in looks for key in some] == list(placed)[:looked_at]
+    # As many as are ever looked at were.
+    assert not rough.spared
 
 
 @pytest.mark.parametrize(("spent", "looked_at"), [(0.0, 13), (0.5, 12), (0.6, 6), (2.0, 6)])
@@ -236,6 +240,7 @@ def test_no_more_are_looked_at_once_most_of_the_purse_is_spent(monkeypatch, spen
     looks = [what for name, what in rough.looks if name == "look_beside"]
     assert [key for some in looks for key in some] == list(placed)[:looked_at]
     assert len(closer) == min(looked_at, 8)
+    assert rough.spared == (looked_at < len(placed))
 
 
 @pytest.mark.parametrize(
