@@ -13,6 +13,7 @@ from analysis.adequacy import judge_adequacy, judge_chance
 from analysis.candidate import Candidate
 from analysis.holdout import hold_out
 from analysis.hunt import Hunt
+from analysis.verdict import LEAST_LEAD
 
 __all__ = [
     "is_doubtful",
@@ -50,10 +51,6 @@ still decide either way."""
 _COMMON = 0.2
 """Share of the baseline's own runs that the leader explains better by as much, from which on there
 is nothing to be found, and nothing more is simulated."""
-
-_NAMED = 38.0
-"""Log-likelihood by which a single cause leads the plain model at least where it is named: what it
-and a size cost, and what must be left (`analysis.verdict`)."""
 
 
 def is_doubtful(
@@ -112,7 +109,7 @@ def is_hardly_missing(fine: Hunt, rng: np.random.Generator) -> bool:
     Then a second cause behind that leader is no question.
     """
     baseline = fine.found[()]
-    if fine.best.best.log_likelihood - baseline.best.log_likelihood > _NAMED:
+    if fine.best.best.log_likelihood - baseline.best.log_likelihood > LEAST_LEAD:
         return False
     # Chance of its own: all else comes out as if it had not been asked.
     return not is_doubtful(baseline, rng.spawn(1)[0])

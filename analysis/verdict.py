@@ -22,7 +22,7 @@ from analysis.objection import FEW, OUT_OF_SIGHT, UNLIKE, find_objection
 from analysis.observation import Observation
 from analysis.plausibility import EDGE, may_be_within_tolerance
 
-__all__ = ["Judged", "Verdict", "judge_candidates"]
+__all__ = ["LEAST_LEAD", "Judged", "Verdict", "judge_candidates"]
 
 Word = Literal["consistent", "explained", "ambiguous", "unexplained"]
 
@@ -48,6 +48,9 @@ which of two that do alike is named first; no belief about benches rules the oth
 
 _FALSE_ALARM = 20.0
 """By so much must a cause beat the baseline beyond its costs."""
+
+LEAST_LEAD = _PER_CAUSE + _PER_PARAMETER + _FALSE_ALARM
+"""So much must one of one size lead by, in all, to be named."""
 
 _FURTHER = 10.0
 """By so much must a further cause beat a part that has it not, beyond its costs: what it brings in
