@@ -26,6 +26,16 @@ NOISE_V = 5e-4
 SHARES = (0.06, 0.4)
 """By how much a datasheet value is off, up or down."""
 
+LARGE = (
+    "load-inertia:J_L=0.0045",
+    "cable-stiffness:K_c=900",
+    "amplifier-saturation:V_sat=7",
+    "motor-resistance:R_m=6",
+    "load-viscous-damping:B_L=0.06",
+    "filter-corner:scale=0.6",
+)
+"""Effects on an ADSS that no short sweep may miss."""
+
 GROWTH = (0.4, 1.4)
 """Logarithm of the factor by which a friction of the datasheet has grown."""
 

@@ -6,6 +6,7 @@ import synthetic
 
 import analysis.diagnosis as diagnosis_module
 from analysis.search import Searched
+from analysis.sizing import size_candidate
 from daq.frf import FrequencyResponse
 from sim.unit import load_unit
 
@@ -69,7 +70,10 @@ def diagnosis(
     given_up: bool = False,
     spared: bool = False,
 ):
-    """A real diagnosis of a synthetic world in which some effects are hidden."""
+    """A real diagnosis of a synthetic world in which some effects are hidden.
+
+    But for further runs of what is named: these would be simulated, and of another world.
+    """
     rng = np.random.default_rng(3)
     place = np.array([0.5, *([0.6] if hidden else [])])
     seen = synthetic.observation(synthetic.read(hidden, place, rng))
@@ -78,4 +82,9 @@ def diagnosis(
     monkeypatch.setattr(diagnosis_module, "observe", lambda response: seen)
     monkeypatch.setattr(diagnosis_module, "search_causes", lambda *_, **__: searched)
     monkeypatch.setattr(diagnosis_module, "propose_measurement", lambda *_, **__: None)
+    monkeypatch.setattr(
+        diagnosis_module,
+        "sharpen_candidate",
+        lambda _, candidate, observation, rng, *__: size_candidate(candidate, observation, rng),
+    )
     return diagnosis_module.diagnose_response(response(), load_unit("adss"))

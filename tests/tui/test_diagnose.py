@@ -1,11 +1,15 @@
 """The verb diagnose: what it refuses, what it hands on, and a cause hidden behind the analyser."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
+import hidden
+import numpy as np
 import pytest
 
+from analysis.ensemble import TOLERANCES
 from analysis.swept import check_together
 from daq.configs import config_path
 from daq.errors import InputError
@@ -114,27 +118,60 @@ def test_the_papers_row_is_answered_with_json_and_a_picture(capsys, monkeypatch,
     assert (tmp_path / "out").is_dir()
 
 
-def test_an_effect_hidden_behind_the_simulated_analyser_is_found(tmp_path, monkeypatch, capsys):
+def test_a_large_effect_hidden_behind_the_simulated_analyser_is_found(
+    tmp_path, monkeypatch, capsys
+):
     monkeypatch.chdir(tmp_path)
     for place in ("CACHE", "DATA"):
         monkeypatch.setenv(f"XDG_{place}_HOME", str(tmp_path))
-    bench = "sim:?ratio=0.45&seed=3&effect=amplifier-saturation:V_sat=6"
+    # A true cause is refused where a motion happens to be unlike its own runs: in one draw of 25
+    # (4.7 standard deviations, four are allowed). Two in a row are one in six hundred.
+    if diagnose_a_large_effect(capsys) == "unexplained":
+        assert diagnose_a_large_effect(capsys) != "unexplained"
+    assert not list(tmp_path.rglob("atlas-*"))
+
+
+def machine_off_its_datasheet(rng):
+    """The text of an ADSS within tolerance."""
+
+    def off(entry):
+        return f"{entry[1]} = {float(entry[2]) * (1.0 + rng.normal(0.0, TOLERANCES[entry[1]]))}"
+
+    text = config_path("units", "adss").read_text()
+    found, count = re.subn(rf"(?m)^({'|'.join(TOLERANCES)}) = (\S+)", off, text)
+    assert count == len(TOLERANCES)
+    return found
+
+
+def diagnose_a_large_effect(capsys):
+    """Draw one and return the verdict's word; what is asked here holds of one refused, too."""
+    seed = int(np.random.SeedSequence().entropy % 10**9)
+    rng = np.random.default_rng(seed)
+    text = hidden.LARGE[seed % len(hidden.LARGE)]
+    # Whoever diagnoses knows the datasheet alone.
+    Path("machine.toml").write_text(machine_off_its_datasheet(rng))
+    bench = f"sim:?ratio={rng.uniform(0.1, 0.9)}&seed={seed}&effect={text}"
     levels = [word for level in ("1.5", "2.5", "4") for word in ("--level", level)]
     # A third of the points of the usual sweep: its atlas serves them, too.
     plan = [*levels, "--start", "100", "--stop", "180", "--points", "21"]
-    words = ["measure", "--unit", "adss", "--instrument", bench, *plan, "--yes", "--json"]
+    words = ["measure", "--unit", "machine.toml", "--instrument", bench, *plan, "--yes", "--json"]
+    capsys.readouterr()
     assert main(words) == 0
     number = json.loads(capsys.readouterr().out)["id"]
-    assert main(["export", str(number), "--out", "hidden.csv"]) == 0
+    assert main(["export", str(number), "--out", f"{seed}.csv"]) == 0
     capsys.readouterr()
-    assert main(["diagnose", "hidden.csv", "--unit", "adss", "--json"]) == 0
+    assert main(["diagnose", f"{seed}.csv", "--unit", "adss", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
+    # So few points leave ties, in one draw of about ten with the cause in a pair only; it is among
+    # the sets judged.
     sets = [[c["effect"] for c in found["causes"]], *(r["causes"] for r in found["rivals"])]
-    assert found["verdict"] in ("explained", "ambiguous")
-    # So few points leave room for rivals, but not for missing it.
-    assert any("amplifier-saturation" in names for names in sets[:3])
-    assert found["gain"]["held_out_rms_ratio"] < 0.8
-    assert not list(tmp_path.rglob("atlas-*"))
+    assert found["verdict"] in ("explained", "ambiguous", "unexplained"), bench
+    assert any(text.partition(":")[0] in names for names in sets), bench
+    assert found["gain"]["held_out_rms_ratio"] < 0.8, bench
+    assert abs(found["residual"][0]["sigma"]) > 3.0, bench
+    if found["verdict"] == "ambiguous":
+        assert found["next_measurement"] is not None
+    return found["verdict"]
 
 
 def test_further_sweeps_are_handed_on_together_and_none_if_one_is_bad(calls, capsys, tmp_path):
