@@ -8,6 +8,7 @@ and what they say together is worded elsewhere; this module puts them together.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Collection, Sequence
 from dataclasses import replace
@@ -16,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from analysis.calibration import Calibrated
+from analysis.candidate import Candidate
 from analysis.diagnosis_document import Cause, Diagnosis, Size
 from analysis.executor import Executor
 from analysis.misfit import describe_departures, find_departures
@@ -128,7 +130,7 @@ def _diagnose(
     return Diagnosis(
         unit=unit.name,
         verdict=verdict,
-        causes=_causes(verdict, best) if named else (),
+        causes=_causes(verdict, best, candidates) if named else (),
         ratio_baseline=_ratio(base if named else best),
         ratio_extended=_ratio(best),
         departures=departures,
@@ -136,7 +138,7 @@ def _diagnose(
         shape=describe_departures(departures, observation),
         next_measurement=proposal,
         observation=observation,
-        given_up=searched.given_up or (searched.spared and verdict.word == "unexplained"),
+        cut_short=searched.given_up or (searched.spared and verdict.word == "unexplained"),
     )
 
 
@@ -144,7 +146,10 @@ def _ratio(found: Calibrated) -> tuple[float, float]:
     return float(found.mean[0]), float(np.sqrt(found.covariance[0, 0]))
 
 
-def _causes(verdict: Verdict, found: Calibrated) -> tuple[Cause, ...]:
+def _causes(
+    verdict: Verdict, found: Calibrated, candidates: Sequence[Candidate]
+) -> tuple[Cause, ...]:
+    """What is named, first what costs most to leave out."""
     hypothesis = verdict.best.candidate.hypothesis
     values = hypothesis.values(found.mean)
     # Coordinates are logarithms of the values, stretched over their range.
@@ -155,8 +160,15 @@ def _causes(verdict: Verdict, found: Calibrated) -> tuple[Cause, ...]:
         known = parameter.nominal(hypothesis.unit)
         size = Size(parameter.name, float(value), float(std), parameter.unit_symbol, known)
         sizes.setdefault(effect, []).append(size)
-    probability = verdict.probability
-    return tuple(Cause(e, tuple(of), probability) for e, of in sizes.items())
+    likelihood = {c.hypothesis.effects: c.best.log_likelihood for c in candidates}
+
+    def without(effect: str) -> float:
+        # What was not simulated, as nobody thought it near, is behind all that was.
+        rest = tuple(e for e in hypothesis.effects if e != effect)
+        return likelihood.get(rest, -math.inf)
+
+    strongest_first = sorted(sizes, key=without)
+    return tuple(Cause(e, tuple(sizes[e]), verdict.probability) for e in strongest_first)
 
 
 def _proposal(
@@ -184,10 +196,9 @@ def _proposal(
 
 def _warnings(diagnosis: Diagnosis) -> tuple[str, ...]:
     found, observation = [], diagnosis.observation
-    if diagnosis.given_up:
+    if diagnosis.cut_short:
         found.append(
-            "the search was left with no explanation, as it may simulate no more motion: "
-            "not every set of causes was tried"
+            "not every set of causes was tried, as a search may simulate only so much motion"
         )
     if len(observation.blocks) == 1:
         found.append(

@@ -49,8 +49,8 @@ class Diagnosis:
     `ratio_baseline`, `ratio_extended`: contribution ratio and its standard
     deviation under the plain and the extended model. `departures`: of the
     measurement from the plain model; `left`: from the extended one.
-    `given_up`: whether the search was left with no explanation, having tried no more sets than it
-    may simulate. `simulated_s`: seconds of motion that were simulated for it.
+    `cut_short`: whether a search that found no explanation did not try every set that was worth
+    it, for what it may simulate. `simulated_s`: seconds of motion that were simulated for it.
     """
 
     unit: str
@@ -63,7 +63,7 @@ class Diagnosis:
     shape: str
     next_measurement: NextMeasurement | None
     observation: Observation
-    given_up: bool = False
+    cut_short: bool = False
     warnings: tuple[str, ...] = ()
     elapsed_s: float = 0.0
     simulated_s: float = 0.0

@@ -1,7 +1,8 @@
-"""Whether the leader of a search is to be doubted, and so whether several causes are looked for.
+"""Whether the leader of a search is to be doubted, and what follows: to go on, or to leave it.
 
 Owns when a leader looks too little like its own runs, or predicts too badly, for the search to
-leave it at that. Chance doubts a true one now and then, which costs time, and few runs are blind.
+leave it at that; when a plain model will do; and when so much is spent that a search is left with
+no explanation. Chance doubts a true one now and then, which costs time, and few runs are blind.
 It passes no verdict (`analysis.verdict` has its own limits).
 """
 
@@ -106,7 +107,8 @@ def is_nothing_missing(fine: Hunt, rng: np.random.Generator) -> bool:
 def is_hardly_missing(fine: Hunt, rng: np.random.Generator) -> bool:
     """Whether the plain model will do by itself, and what leads it does so by too little to count.
 
-    Then a second cause behind that leader is no question.
+    By less than what a cause of one size needs to be named, that is; several sizes need more. Then
+    a second cause behind that leader is no question.
     """
     baseline = fine.found[()]
     if fine.best.best.log_likelihood - baseline.best.log_likelihood > LEAST_LEAD:

@@ -80,7 +80,6 @@ class Judged:
 class Belief:
     """Every simulated set, most probable first, under one state of knowledge."""
 
-    knowledge: Knowledge
     judged: tuple[Judged, ...]
 
     @property
@@ -192,9 +191,7 @@ def believe(explored: Sequence[Explored], reading: Reading, knowledge: Knowledge
     )
     weight = _probabilities(score)
     order = np.argsort(-weight)
-    return Belief(
-        knowledge, tuple(Judged(agreements[int(k)], float(weight[int(k)])) for k in order)
-    )
+    return Belief(tuple(Judged(agreements[int(k)], float(weight[int(k)])) for k in order))
 
 
 def _probabilities(score: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -142,15 +142,21 @@ def _causes(belief: Belief) -> list[dict[str, Any]]:
     if belief.word not in ("explained", "ambiguous"):
         return []
     fitted = parameters(belief.best.agreement)
+    probability = {one.effects: one.probability for one in belief.judged}
+
+    def without(effect: str) -> float:
+        return probability.get(tuple(e for e in fitted if e != effect), 0.0)
+
     return [
         {
             "effect": effect,
-            "parameters": values,
+            "parameters": fitted[effect],
             "probability": belief.best.probability,
             "site": CATALOGUE[effect].site,
             "meaning": CATALOGUE[effect].meaning,
         }
-        for effect, values in fitted.items()
+        # First what costs most to leave out.
+        for effect in sorted(fitted, key=without)
     ]
 
 

@@ -1,8 +1,8 @@
 """Where the next simulations of a hypothesis go.
 
-Owns how groups are placed: evenly about a place from the coarse look, over all
-places that agree about as well as the best, or at a few sizes of a cause beside
-known ones. It simulates nothing.
+Owns how groups are placed: evenly about a place from the coarse look or about an
+answer that was learned from runs, over all places that agree about as well as the
+best, or at a few sizes of a cause beside known ones. It simulates nothing.
 """
 
 from __future__ import annotations

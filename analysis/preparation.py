@@ -1,7 +1,7 @@
 """Simulating ahead what a sweep's estimate and its diagnosis will be held against.
 
 Owns which of it does not depend on what will be measured, and in which order it
-is made: runs at every place that an estimate may ask for, then what a search
+is made: runs at every place that an estimate of it alone may ask for, then what a search
 starts from. It judges nothing; what it makes lies where both look for it.
 """
 

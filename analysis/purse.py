@@ -1,7 +1,7 @@
-"""How much motion a search may simulate for a leader that explains nothing.
+"""How much motion a search may simulate, and how much of it is spent.
 
-Owns the limit, and the count that is held against it. Whether a leader explains
-is not its question (`analysis.doubt`).
+Owns the limit, and the count that is held against it. What is spared when how much
+of it is spent is for those to say who ask.
 """
 
 from __future__ import annotations

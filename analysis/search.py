@@ -1,8 +1,9 @@
 """The search for what a model lacks: from every cause to a few that are looked at closely.
 
 Owns which hypotheses are simulated: an atlas of every single cause, then
-rounds with fewer and fewer of them, pairs where no single cause will do, and
-a third cause where no pair will.
+rounds with fewer and fewer of them, pairs where no single cause will do, a
+second cause behind one that nobody doubts, a third where no pair will do, and
+rare causes beside whatever leads.
 It compares hypotheses to decide where to look next, and passes no verdict.
 """
 
@@ -98,7 +99,7 @@ def search_causes(
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Searched:
-    """Candidates, the most likely first; the baseline is always among them.
+    """What is left of every set of causes; the baseline is always among the candidates.
 
     Their surfaces hold the observation with the reading noise that was found along with them.
 

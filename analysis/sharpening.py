@@ -33,7 +33,8 @@ _WORTHWHILE, _BACK = 0.9, 2
 of their error is uncertain itself, so that a single round may seem worthless by chance."""
 
 _BLUNT, _ENOUGH = 0.025, 720
-"""While the contribution ratio is known no better than this neither counts, up to so many runs.
+"""While the contribution ratio is known no better than this neither counts, up to so many runs:
+from then on it ends as soon as these lie far enough apart.
 Little of it is in the data then, and what is told is as much chance of where runs lie: of sixteen
 hundred about the answer to one practice set, hundreds told ratios 0.04 apart in standard deviation,
 or 0.01 where all of them took part."""

@@ -1,9 +1,16 @@
 """What a diagnosis says in words, and in its document: each rival for what it is."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import report_makings as makings
+
+from analysis.calibration import Calibrated
+from analysis.causes import Hypothesis
+from analysis.diagnosis import _causes
+from sim.unit import load_unit
 
 STIFF = ("shaft-stiffness",)
 
@@ -58,6 +65,35 @@ def test_an_answer_without_a_rival_says_how_probable_it_is(explained):
 def test_a_diagnosis_says_that_not_all_was_tried(monkeypatch, judged, given_up, spared, warned):
     found = makings.diagnosis(monkeypatch, ("load-inertia",), [judged], given_up, spared)
     assert (found.verdict.word == "unexplained") == (judged == STIFF)
-    said = [text for text in found.to_json()["warnings"] if "the search was left" in text]
+    said = [t for t in found.to_json()["warnings"] if "not every set of causes was tried" in t]
     assert len(said) == warned
     assert all(any(text in line for line in found.summary()) for text in said)
+
+
+PAIR = ("cable-stiffness", "load-inertia")
+
+
+def known(effects, log_likelihood):
+    best = SimpleNamespace(log_likelihood=log_likelihood)
+    return SimpleNamespace(hypothesis=Hypothesis(load_unit("adss"), effects), best=best)
+
+
+@pytest.mark.parametrize(
+    ("alone", "first"),
+    [
+        ({PAIR[:1]: 20.0, PAIR[1:]: 80.0}, PAIR[1]),
+        ({PAIR[:1]: 80.0, PAIR[1:]: 20.0}, PAIR[0]),
+        # What nobody simulated alone is further behind than all that was.
+        ({PAIR[1:]: -500.0}, PAIR[1]),
+        ({PAIR[:1]: -500.0}, PAIR[0]),
+    ],
+)
+def test_the_cause_that_costs_most_to_leave_out_comes_first(alone, first):
+    pair = known(PAIR, 100.0)
+    verdict = SimpleNamespace(best=SimpleNamespace(candidate=pair), probability=0.9)
+    found = Calibrated(np.array([0.4, 0.2, 0.7]), 1e-4 * np.eye(3))
+    candidates = [pair, *(known(effects, value) for effects, value in alone.items())]
+    causes = _causes(verdict, found, candidates)
+    assert [cause.effect for cause in causes] == [first, *(e for e in PAIR if e != first)]
+    values = dict(zip(PAIR, pair.hypothesis.values(found.mean), strict=True))
+    assert {cause.effect: cause.sizes[0].value for cause in causes} == pytest.approx(values)
