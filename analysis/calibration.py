@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dpotrf, dpotri
 
 from analysis.emulator import GAIN_TOLERANCE
 from analysis.observation import Observation, channels_of_readings
@@ -88,6 +89,8 @@ def calibrate(
         reach = _WITHIN * np.sqrt(np.diag(first.covariance))
         possible = np.all(np.abs(runs.places - first.mean) <= reach, axis=1)
         count = max(count, int(np.count_nonzero(possible)))
+    if count >= len(runs):
+        return first
     near = np.sort(np.argsort(distance, kind="stable")[:count])
     return _regress(observation, readings[near], runs.places[near], kin[near])
 
@@ -147,7 +150,7 @@ def _regress(
     families = [np.flatnonzero(kin == label) for label in np.unique(kin)]
 
     def fitted(ridge: float) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
-        inverse = np.linalg.inv(kernel + ridge * np.eye(count))
+        inverse = _inverse(kernel + ridge * np.eye(count))
         dual = inverse @ (places - centre)
         # What a regression without a machine and its kin gets wrong about it, in
         # closed form: machines with the same deviations would give them away.
@@ -162,6 +165,15 @@ def _regress(
     covariance = (error * weight[:, None]).T @ error / weight.sum()
     inflation = _MARGIN**2 * (1.0 + 2.0 / effective)
     return Calibrated(mean, np.atleast_2d(covariance * inflation) + np.diag((1e-3 * spread) ** 2))
+
+
+def _inverse(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Inverse of a symmetric, positive matrix: half of what one costs that takes it for any."""
+    factor, failed = dpotrf(matrix, lower=True)
+    half, _ = dpotri(factor, lower=True)
+    if failed:
+        raise np.linalg.LinAlgError("the kernel of the runs is not positive")
+    return np.asarray(half + np.tril(half, -1).T)
 
 
 def _features(

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from analysis.arithmetic import on_one_core
 from analysis.calibration import Calibrated
 from analysis.candidate import Candidate
 from analysis.diagnosis_document import Cause, Diagnosis, Size
@@ -37,6 +38,7 @@ from sim.unit import Unit
 __all__ = ["Cause", "Diagnosis", "Size", "diagnose_response"]
 
 
+@on_one_core()
 def diagnose_response(
     response: FrequencyResponse,
     unit: Unit,

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arithmetic import on_one_core
 from analysis.ensemble import Machine
 from analysis.executor import Executor
 from analysis.fit import Posterior, fit_posterior
@@ -107,6 +108,7 @@ class Estimate:
         return lines
 
 
+@on_one_core()
 def estimate_response(
     response: FrequencyResponse,
     unit: Unit,
@@ -166,6 +168,7 @@ def estimate_response(
     return replace(found, sweeps=tuple(sweep_document(plan) for plan, _ in observation.plans))
 
 
+@on_one_core()
 def estimate_features(
     arf_hz: float, rf_hz: float, unit: Unit, progress: Progress | None = None, seed: int = 0
 ) -> Estimate:

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arithmetic import on_one_core
 from analysis.paper_damping import Section5, section_5
 from analysis.paper_features import Compared, compare, read_grid
 from analysis.paper_index import IndexCurve, index_curves
@@ -127,6 +128,7 @@ class Reproduction:
         return draw(self, Path(directory))
 
 
+@on_one_core()
 def reproduce(
     progress: Progress | None = None,
     seed: int = 0,

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from analysis.arithmetic import on_one_core
 from analysis.causes import Hypothesis
 from analysis.next_measurement import NextMeasurement
 from analysis.paper_belief import Belief, Knowledge, believe
@@ -172,6 +173,7 @@ def diagnose_paper(
     )
 
 
+@on_one_core()
 def diagnose_features(
     reading: Reading,
     unit: Unit,

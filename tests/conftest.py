@@ -1,6 +1,13 @@
-"""What holds for every test: Ctrl-C interrupts, wherever the tests were started from."""
+"""What holds for every test: Ctrl-C interrupts, and linear algebra keeps to one core.
 
+Tests run side by side: threads of a library that wait for each other would keep cores from them.
+"""
+
+import os
 import signal
+
+# Before anything loads numpy; what a test starts inherits it.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def pytest_configure():
