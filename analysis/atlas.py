@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -25,6 +23,7 @@ from analysis.executor import Executor
 from analysis.observation import Observation
 from analysis.population import Group, Population, simulate_groups
 from daq.configs import atlas_folder
+from daq.formats.atomic import keeping
 from sim.unit import Unit
 
 __all__ = ["Atlas", "atlas_name", "coarse_stride", "make_atlas", "simulate_atlas", "write_atlas"]
@@ -194,22 +193,18 @@ def write_atlas(file: Path, atlas: Atlas) -> None:
     """Keep an atlas; a cache that cannot be written costs time later and nothing else."""
     names = {f"{'+'.join(key)}|{field}": getattr(one, field)
              for key, one in atlas.items() for field in Population.__slots__}  # fmt: skip
-    part = file.with_suffix(f".{os.getpid()}.part")
-    with suppress(OSError):
-        file.parent.mkdir(parents=True, exist_ok=True)
-        with part.open("wb") as stream:
-            np.savez_compressed(stream, **names)
-        part.replace(file)
+    with keeping(file) as part, part.open("wb") as stream:
+        np.savez_compressed(stream, **names)
 
 
 def _read(file: Path) -> Atlas | None:
     """A kept atlas, or None where there is none that can be read."""
-    try:
+    # Damage is told by zip, zlib and numpy, each in many ways: what it hit is made anew.
+    with suppress(Exception):
         with file.open("rb") as stream, np.load(stream, allow_pickle=False) as kept:
             fields: dict[tuple[str, ...], dict[str, NDArray]] = {}
             for name in kept.files:
                 key, _, field = name.rpartition("|")
                 fields.setdefault(tuple(filter(None, key.split("+"))), {})[field] = kept[name]
         return {key: Population(**parts) for key, parts in fields.items()}
-    except (OSError, ValueError, TypeError, EOFError, KeyError, zipfile.BadZipFile):
-        return None
+    return None

@@ -28,7 +28,7 @@ from analysis.progress import Progress, part_of
 from analysis.search import search_causes
 from analysis.sharpening import sharpen_candidate
 from analysis.sizing import size_candidate, widen_if_open
-from analysis.swept import check_together
+from analysis.swept import check_together, unit_doubts
 from analysis.verdict import Verdict, judge_candidates
 from daq.errors import AnalysisError
 from daq.frf import FrequencyResponse
@@ -90,7 +90,7 @@ def diagnose_response(
         found = _diagnose(observe(*responses), unit, without, cache, seed, executor, progress)
     return replace(
         found,
-        warnings=_warnings(found),
+        warnings=(*unit_doubts(responses, unit), *_warnings(found)),
         elapsed_s=time.perf_counter() - started,
         simulated_s=effort.simulated_s,
     )

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import zipfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -25,6 +24,7 @@ from analysis.executor import Executor
 from analysis.family import Family, Readings, read_families
 from analysis.observation import Observation
 from daq.configs import kept_runs
+from daq.formats.atomic import keeping
 from sim.unit import Unit
 
 __all__ = ["run_families", "run_name", "write_runs"]
@@ -99,18 +99,15 @@ def _shipped() -> Folder | None:
 
 def _keep(file: Path, readings: Readings) -> None:
     """Keep runs; a cache that cannot be written costs time later and nothing else."""
-    part = file.with_suffix(f".{os.getpid()}.part")
-    with suppress(OSError):
-        file.parent.mkdir(parents=True, exist_ok=True)
-        with part.open("wb") as stream:
-            write_runs(stream, readings)
-        part.replace(file)
+    with keeping(file) as part, part.open("wb") as stream:
+        write_runs(stream, readings)
 
 
 def _find(folders: Sequence[Folder], name: str, shape: tuple[int, int]) -> Readings | None:
     """Kept runs, or None where there are none that can be read whole."""
     for folder in folders:
-        with suppress(OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile):
+        # Damage is told by zip, zlib and numpy, each in many ways: what it hit is made anew.
+        with suppress(Exception):
             with (folder / name).open("rb") as stream, np.load(stream, allow_pickle=False) as kept:
                 mean, variance = kept["mean"], kept["variance"]
             whole = mean.shape == variance.shape == shape and mean.dtype == complex

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.errors import AnalysisError
+from daq.errors import AnalysisError, InputError
 from daq.frf import DB_PER_NEPER, GAIN_STD_COMPONENTS, FrequencyResponse, PointFlag
 from daq.plan import SweepPlan
 
@@ -49,6 +49,9 @@ servo that friction holds, whose simulation moves by nothing, reads as what it i
 LEAST_NOISE = 3e-5
 """What any analyser adds, as a share of the largest voltage that it reads: 90 dB below its range.
 Digits beyond, which a simulated file has, tell no machines apart that a bench could."""
+
+_LONGEST_S = 14_400.0
+"""Longest sweep of a response; a bench drives none for longer if not told otherwise."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -143,7 +146,7 @@ def observe(*responses: FrequencyResponse) -> Observation:
     AnalysisError
         If one holds no usable point, or does not know a source level.
     InputError
-        If one states a DC offset that is no voltage.
+        If one states a DC offset that is no voltage, or a sweep that lasts too long.
     """
     swept = [level for number, one in enumerate(responses) for level in _levels(number, one)]
     # Levels that are alike keep their order: sweeps stay as they were given.
@@ -266,9 +269,22 @@ def _plans(swept: Sequence[_Level]) -> tuple[tuple[SweepPlan, NDArray[np.int64]]
             from_rest=bool(response.from_rest),
             dc_offset_v=response.dc_offset_v,
         )
+        _refuse_endless(plan)
         rows = [np.arange(first[place], first[place + 1]) for place in places]
         plans.append((plan, np.concatenate(rows)))
     return tuple(plans)
+
+
+def _refuse_endless(plan: SweepPlan) -> None:
+    """Hundreds of machines are taken through every sweep: one that lasts for days is a slip."""
+    if plan.duration_s > _LONGEST_S:
+        low, high = plan.frequencies_hz[0], plan.frequencies_hz[-1]
+        raise InputError(
+            f"the response says that {plan.settle_cycles} and {plan.integrate_cycles} cycles were "
+            f"waited for and averaged at each of {plan.points} points from {low:g} to {high:g} Hz, "
+            f"which takes {plan.duration_s:.3g} s; up to {_LONGEST_S:g} s can be simulated: "
+            "see whether frequencies are in Hz, and cycles right"
+        )
 
 
 def _stretches(*columns: NDArray[np.float64]) -> tuple[slice, ...]:

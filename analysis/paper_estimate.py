@@ -29,6 +29,9 @@ __all__ = ["FeatureFit", "IndexCurve", "fit_features", "index_curve_of_response"
 PAPER_LEVEL_VPK = 2.5
 """The source level of the paper's sweeps."""
 
+_LOWEST_HZ, _HIGHEST_HZ = 2.0, 2000.0
+"""Features that are looked for in steps of 1 Hz."""
+
 _READING_STD_HZ = 0.5
 """A frequency that comes without an error bar was read off a grid of 1 Hz."""
 
@@ -161,13 +164,18 @@ def fit_features(
     Raises
     ------
     InputError
-        If the frequencies are not positive or not in order.
+        If the frequencies are not positive, not in order, or beyond what is looked for.
     AnalysisError
         If the simulated unit shows no such features near them.
     """
     if not (np.isfinite(arf_hz) and np.isfinite(rf_hz) and 0 < arf_hz < rf_hz):
         raise InputError(
             f"ARF {arf_hz:g} Hz and RF {rf_hz:g} Hz: both must be above 0, and ARF below RF"
+        )
+    if arf_hz < _LOWEST_HZ or rf_hz > _HIGHEST_HZ:
+        raise InputError(
+            f"ARF {arf_hz:g} Hz and RF {rf_hz:g} Hz: both must lie from {_LOWEST_HZ:g} to "
+            f"{_HIGHEST_HZ:g} Hz, as they are looked for in steps of 1 Hz; give them in Hz"
         )
     band = np.arange(np.floor(0.75 * arf_hz), np.ceil(1.35 * rf_hz) + 1.0)
     plan = SweepPlan(

@@ -15,8 +15,12 @@ import numpy as np
 from daq.errors import InputError
 from daq.frf import FrequencyResponse
 from daq.plan import SweepPlan
+from sim.unit import Unit
 
-__all__ = ["check_together", "sweep_document", "sweep_lines"]
+__all__ = ["check_together", "sweep_document", "sweep_lines", "unit_doubts"]
+
+_NO_UNIT = {"", "unknown"}
+"""What a response says that names none."""
 
 
 def check_together(responses: Sequence[FrequencyResponse]) -> None:
@@ -31,7 +35,7 @@ def check_together(responses: Sequence[FrequencyResponse]) -> None:
         ("units", [one.unit for one in responses]),
         ("specimens", [str(one.provenance.get("serial") or "") for one in responses]),
     ):
-        different = sorted(set(said) - {"", "unknown"})
+        different = sorted(set(said) - _NO_UNIT)
         if len({one.lower() for one in different}) > 1:
             raise InputError(
                 f"the responses are of different {what}, {' and '.join(different)}; "
@@ -40,6 +44,13 @@ def check_together(responses: Sequence[FrequencyResponse]) -> None:
     for one, other in combinations(responses, 2):
         if np.array_equal(one.gain, other.gain):
             raise InputError("a response was given twice; it says no more than once")
+
+
+def unit_doubts(responses: Sequence[FrequencyResponse], unit: Unit) -> list[str]:
+    """What is to be said where responses are said to be of another unit than the one given."""
+    said = {one.unit for one in responses if one.unit.lower() not in _NO_UNIT}
+    others = sorted(name for name in said if name.lower() != unit.name.lower())
+    return [f"the response is of unit {other}, not of {unit.name}" for other in others]
 
 
 def sweep_document(plan: SweepPlan) -> dict[str, Any]:

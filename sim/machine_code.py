@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
-import os
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cache
@@ -18,6 +17,8 @@ from typing import Any
 import llvmlite
 import llvmlite.binding as llvm
 from platformdirs import user_cache_path
+
+from daq.formats.atomic import keeping
 
 __all__ = ["architecture", "code_folder", "compiled", "multiplies_and_adds"]
 
@@ -121,8 +122,5 @@ def _read(file: Path) -> bytes | None:
 
 def _keep(file: Path, program: bytes) -> None:
     """Keep what was compiled; a folder that cannot be written costs time later and nothing else."""
-    part = file.with_suffix(f".{os.getpid()}.part")
-    with suppress(OSError):
-        file.parent.mkdir(parents=True, exist_ok=True)
+    with keeping(file) as part:
         part.write_bytes(_MARK(program).digest() + program)
-        part.replace(file)

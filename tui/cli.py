@@ -154,7 +154,7 @@ def _log_level(words: list[str]) -> tuple[str | None, list[str]]:
 
 def _verdict(error: BaseException, words: list[str]) -> tuple[str, int]:
     """The line and the exit code that an error means."""
-    if isinstance(error, KeyboardInterrupt):
+    if _is_interrupted(error):
         return "interrupted", _INTERRUPTED
     if isinstance(error, LashbenchError):
         return str(error), error.exit_code
@@ -162,6 +162,13 @@ def _verdict(error: BaseException, words: list[str]) -> tuple[str, int]:
         verb = f"{words[0]} " if words and words[0] in VERBS else ""
         return f"{_usage(error).rstrip('. ')}; see lashbench {verb}--help", _USAGE
     return f"internal error: {type(error).__name__}: {error}; run with --debug and report it", 1
+
+
+def _is_interrupted(error: BaseException | None) -> bool:
+    """Whether an interrupt is at the root of it: compiled code wraps one that meets it."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def _usage(error: CycloptsError) -> str:

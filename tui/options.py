@@ -1,7 +1,7 @@
 """Options that several verbs share, and the strict reading of their values.
 
-Owns how text on a command line becomes a number or a setting. It loads no
-unit, opens no file and decides nothing about physical limits.
+Owns how text on a command line becomes a number, a setting or a folder to fill. It
+loads no unit, reads no file and decides nothing about physical limits.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Annotated
 
 from cyclopts import Parameter, Token
@@ -109,10 +110,13 @@ def prepare_directory(path: Path) -> Path:
     Raises
     ------
     InputError
-        If there is a file of that name, or it cannot be made.
+        If there is a file of that name, or it cannot be made or filled.
     """
     try:
         path.mkdir(parents=True, exist_ok=True)
+        # Whether it may be filled shows only where something is put there.
+        with TemporaryFile(dir=path):
+            pass
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot be used as a directory ({reason})") from error

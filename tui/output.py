@@ -13,11 +13,13 @@ import math
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Annotated, Any
+from typing import Annotated, Any, TextIO
 
 from cyclopts import Parameter
 
+from daq.errors import LashbenchError
 from tui.pace import Pace, duration
 
 __all__ = ["Console", "Injected", "as_json"]
@@ -56,7 +58,15 @@ class Console:
     def data(self, text: str) -> None:
         """Print a line or block of the result to stdout."""
         self._clear()
-        print(text, flush=True)  # noqa: T201
+        try:
+            print(text, flush=True)  # noqa: T201
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            self._give_up(sys.stdout)
+            raise LashbenchError(
+                f"the output could not be written ({error.strerror}); send it where there is room"
+            ) from error
 
     def document(self, content: Mapping[str, Any]) -> None:
         """Print the one JSON document of a run to stdout."""
@@ -67,13 +77,13 @@ class Console:
         _LOG.info("%s", text)
         if not self.quiet:
             self._clear()
-            print(text, file=sys.stderr, flush=True)  # noqa: T201
+            self._narrate(f"{text}\n")
 
     def error(self, text: str) -> None:
         """Print an error to stderr, as one line whatever it holds."""
         _LOG.error("%s", " ".join(text.split()))
         self._clear()
-        print(f"error: {' '.join(text.split())}", file=sys.stderr, flush=True)  # noqa: T201
+        self._narrate(f"error: {' '.join(text.split())}\n")
 
     @property
     def watched(self) -> bool:
@@ -98,14 +108,14 @@ class Console:
             remaining_s = self._live.pace.remaining_s(fraction)
         left = "" if remaining_s is None else f"{duration(remaining_s)} left  "
         line = f"{100 * fraction:3.0f} %  {left}{text}"
-        print(f"\r\x1b[K{line[:78]}", end="", file=sys.stderr, flush=True)  # noqa: T201
+        self._narrate(f"\r\x1b[K{line[:78]}")
 
     def picture(self, lines: Sequence[str]) -> None:
         """Draw lines in place of those drawn before; only where they fit on a terminal."""
         if not self.watched or self._height() < len(lines) + 2:
             return
         drawn = "".join(f"{line}\n" for line in lines)
-        print(f"{self._erasure()}{drawn}", end="", file=sys.stderr, flush=True)  # noqa: T201
+        self._narrate(f"{self._erasure()}{drawn}")
         self._live.lines = len(lines)
 
     def ask(self, question: str) -> str | None:
@@ -113,7 +123,7 @@ class Console:
         if not (self.watched and sys.stdin.isatty()):
             return None
         self._clear()
-        print(question, end="", file=sys.stderr, flush=True)  # noqa: T201
+        self._narrate(question)
         return sys.stdin.readline().strip()
 
     def _height(self) -> int:
@@ -125,8 +135,20 @@ class Console:
 
     def _clear(self) -> None:
         if self.watched:
-            print(self._erasure(), end="", file=sys.stderr, flush=True)  # noqa: T201
+            self._narrate(self._erasure())
             self._live.lines = 0
+
+    def _narrate(self, text: str) -> None:
+        """Write to stderr; whoever stopped listening there does not stop the work."""
+        try:
+            print(text, end="", file=sys.stderr, flush=True)  # noqa: T201
+        except OSError:
+            self._give_up(sys.stderr)
+
+    def _give_up(self, stream: TextIO) -> None:
+        """Send what is left for a stream nowhere: Python would complain of it at its end."""
+        with suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
     def _erasure(self) -> str:
         """What takes picture and progress off the terminal."""

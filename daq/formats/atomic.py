@@ -15,7 +15,7 @@ from pathlib import Path
 
 from daq.errors import InputError, LashbenchError
 
-__all__ = ["checked_target", "file_stem", "replacing", "write_text"]
+__all__ = ["checked_target", "file_stem", "keeping", "replacing", "write_text"]
 
 
 @contextmanager
@@ -47,6 +47,25 @@ def replacing(path: Path) -> Iterator[Path]:
     finally:
         with suppress(FileNotFoundError):
             partial.unlink()
+
+
+@contextmanager
+def keeping(path: Path) -> Iterator[Path]:
+    """Give a name to write to what can be made again; it becomes `path` when the block ends well.
+
+    Where that fails nothing is left, and nothing is said: it costs time later.
+    """
+    partial = path.with_suffix(f".{os.getpid()}.part")
+    with suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        yield partial
+        os.replace(partial, path)
+    except OSError:
+        pass
+    finally:
+        with suppress(OSError):
+            partial.unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str) -> None:

@@ -211,7 +211,9 @@ def _text(path: Path) -> str:
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise FileFormatError(f"{path}: is not text (byte {error.start}); give a CSV") from error
+        raise FileFormatError(
+            f"{path}: is not text in UTF-8 (byte {error.start}); save it as a CSV in UTF-8"
+        ) from error
     if "\x00" in text:
         raise FileFormatError(f"{path}: is not text (it holds zero bytes); give a CSV")
     return text
@@ -226,7 +228,8 @@ def _add_comment(comments: dict[str, Any], text: str, place: str) -> None:
         entry = parse_toml(text)
     except ValueError as error:
         raise FileFormatError(
-            f"{place}: comment {_shown(text)} is not 'key = value' in TOML ({error})"
+            f"{place}: comment {_shown(text)} is not 'key = value' in TOML ({error}); "
+            "write '# notes = \"...\"', or leave it out"
         ) from error
     for key, value in entry.items():
         if key in comments:

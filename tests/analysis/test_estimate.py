@@ -204,6 +204,14 @@ def test_the_papers_adss_frequencies_agree_with_the_microscope():
     assert "error index" in "\n".join(found.summary())
 
 
+@pytest.mark.parametrize(
+    ("arf_hz", "rf_hz"), [(0.12, 0.14), (1e9, 2e9), (1.2e5, 1.4e5), (1.9, 100.0), (100.0, 2001.0)]
+)
+def test_frequencies_in_another_unit_are_refused(arf_hz, rf_hz):
+    with pytest.raises(InputError, match="both must lie from 2 to 2000 Hz, .*; give them in Hz"):
+        fit_features(arf_hz, rf_hz, load_unit("adss"))
+
+
 def test_the_papers_edss_frequencies_are_warned_about():
     # No ratio brings the paper's model near 40 and 75 Hz: the least index is about 20 Hz.
     found = fit_features(40.0, 75.0, load_unit("edss"))

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from analysis import library
 from analysis.ensemble import Draws, Machine, safe_cycles
 from analysis.executor import LocalExecutor
 from analysis.library import run_families
@@ -137,3 +138,30 @@ def test_a_cache_that_cannot_be_written_costs_time_only(tmp_path):
     (tmp_path / "file").write_text("")
     draws = run_families(ADSS, FAMILIES[:1], SEEN, cache=tmp_path / "file" / "below")
     np.testing.assert_array_equal(draws.channels(SEEN), one_by_one(FAMILIES[0]).channels(SEEN))
+
+
+def test_no_damaged_byte_of_a_kept_file_ends_the_work(tmp_path):
+    """Every one of sixty-four places, spoilt by itself: read whole or made anew."""
+    whole = run_families(ADSS, FAMILIES[:1], SEEN, cache=tmp_path)
+    (file,) = tmp_path.glob("runs-*.npz")
+    content = file.read_bytes()
+    anew = 0
+    for at in np.linspace(0, len(content) - 1, 64).astype(int):
+        file.write_bytes(content[:at] + bytes([content[at] ^ 0xAA]) + content[at + 1 :])
+        executor = Counting()
+        again = run_families(ADSS, FAMILIES[:1], SEEN, cache=tmp_path, executor=executor)
+        np.testing.assert_array_equal(again.channels(SEEN), whole.channels(SEEN))
+        anew += executor.given
+    # What packs the numbers fills most of a file.
+    assert anew > 32
+
+
+def test_a_disk_that_fills_up_is_left_no_fuller(tmp_path, monkeypatch):
+    def full(stream, _):
+        stream.write(b"half of it")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(library, "write_runs", full)
+    draws = run_families(ADSS, FAMILIES[:1], SEEN, cache=tmp_path)
+    assert len(draws.machines) == len(FAMILIES[0])
+    assert not list(tmp_path.iterdir())

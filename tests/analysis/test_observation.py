@@ -77,6 +77,28 @@ def test_a_dc_offset_that_is_no_voltage_is_refused(stated):
         observe(response(provenance={"dc_offset_v": stated}))
 
 
+@pytest.mark.parametrize(
+    "slip",
+    [
+        # Its frequencies are in kHz; a cycle count has some noughts too many, or no end.
+        {"frequencies": (0.001, 0.0011, 0.0012)},
+        {"settle_cycles": 10**9},
+        {"integrate_cycles": 10**24},
+    ],
+)
+def test_a_sweep_without_end_is_refused(slip):
+    with pytest.raises(InputError, match="up to 14400 s can be simulated: see whether freq"):
+        observe(response(**slip))
+
+
+def test_a_long_sweep_is_not(monkeypatch):
+    # 61 points at three levels, an hour and a half: from 2 Hz on with fifty cycles each.
+    grid = tuple(np.geomspace(2.0, 200.0, 61))
+    slow = response((1.0, 2.0, 4.0), grid, settle_cycles=20, integrate_cycles=100)
+    ((plan, _),) = observe(slow).plans
+    assert plan.duration_s > 1000.0
+
+
 def test_sweeps_of_one_unit_stand_together_by_level_each_with_its_own_plan():
     high, low = (100.0, 105.0, 115.0, 120.0), (100.0, 120.0)
     first = response()

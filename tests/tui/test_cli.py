@@ -107,6 +107,24 @@ def test_an_error_is_one_line_and_its_exit_code(broken_verb, capsys, error, code
     assert err.startswith("narration\n")
 
 
+def wrapped(error):
+    """What compiled code makes of an error that meets it."""
+    outer = SystemError("<function agree> returned a result with an exception set")
+    outer.__cause__ = SystemError("<built-in method> returned a result with an exception set")
+    outer.__cause__.__cause__ = error
+    return outer
+
+
+@pytest.mark.parametrize(
+    ("root", "said", "code"),
+    [(KeyboardInterrupt(), "interrupted", 130), (ValueError("x"), "internal error: SystemErr", 1)],
+)
+def test_an_interrupt_that_meets_compiled_code_is_one(broken_verb, capsys, root, said, code):
+    broken_verb(wrapped(root))
+    assert cli.main(["broken", "--quiet"]) == code
+    assert capsys.readouterr().err.startswith(f"error: {said}")
+
+
 @pytest.mark.parametrize(
     "line",
     [
@@ -164,6 +182,38 @@ def test_a_reader_that_has_seen_enough_is_no_error():
         run.stdout.close()
         assert run.stderr.read() == b""
         assert run.wait() == 0
+
+
+TALK = (
+    "import sys, types; from tui import cli, output;"
+    "talk = types.ModuleType('talk'); sys.modules['talk'] = talk;"
+    'exec(\'def talk(*, console: Injected): [console.note("n" * 100) for _ in range(5000)];'
+    " console.data(\"the answer\")', {'Injected': output.Injected}, talk.__dict__);"
+    "cli.VERBS['talk'] = ('talk:talk', 'Talk.'); sys.exit(cli.main(['talk']))"
+)
+
+
+def test_nobody_listening_to_the_narration_does_not_stop_the_work():
+    with subprocess.Popen(
+        [sys.executable, "-c", TALK], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as run:
+        run.stderr.close()
+        assert run.stdout.read() == b"the answer\n"
+        assert run.wait() == 0
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no disk that is always full")
+def test_a_full_disk_is_said_in_words():
+    with Path("/dev/full").open("w") as full:
+        run = subprocess.run(
+            [sys.executable, "-c", TALK], stdout=full, stderr=subprocess.PIPE, check=False
+        )
+    assert run.returncode == 1
+    last = run.stderr.decode().splitlines()[-1]
+    assert last == (
+        "error: the output could not be written (No space left on device); "
+        "send it where there is room"
+    )
 
 
 def test_json_has_null_for_what_is_no_number():

@@ -12,7 +12,7 @@ import pytest
 from analysis.ensemble import TOLERANCES
 from analysis.swept import check_together
 from daq.configs import config_path
-from daq.errors import InputError
+from daq.errors import InputError, LashbenchError
 from daq.formats import read_response
 from tui.cli import main
 
@@ -84,6 +84,37 @@ def test_the_whole_response_is_handed_on_and_the_atlas_kept_where_caches_are(
     assert (len(response), unit.name, cache) == (183, "ADSS", tmp_path / "lashbench")
     assert main(["diagnose", SWEEP, "--unit", "adss"]) == 0
     assert capsys.readouterr().out == "ADSS: consistent.\n  nothing\n"
+
+
+def test_a_response_of_another_unit_is_said_to_be_one(calls, capsys):
+    assert main(["diagnose", SWEEP, "--unit", "edss"]) == 0
+    assert "warning: the response is of unit ADSS, not of EDSS\n" in capsys.readouterr().err
+    main(["diagnose", SWEEP, "--unit", "adss"])
+    assert "warning" not in capsys.readouterr().err
+
+
+def test_a_figure_that_cannot_be_made_does_not_cost_the_answer(
+    calls, capsys, monkeypatch, tmp_path
+):
+    import analysis.diagnosis_figures
+
+    def full(result, folder):
+        raise LashbenchError("a.png: could not be written (No space left on device)")
+
+    monkeypatch.setattr(analysis.diagnosis_figures, "draw_diagnosis", full)
+    words = ["diagnose", SWEEP, "--unit", "adss", "--json", "--plots", str(tmp_path / "out")]
+    assert main(words) == 1
+    told = capsys.readouterr()
+    assert json.loads(told.out) == {"verdict": "consistent"}
+    assert told.err.splitlines()[-1].startswith("error: a.png: could not be written")
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="no folder that nobody may fill")
+def test_a_folder_that_cannot_be_filled_is_refused_before_the_work(calls, capsys):
+    assert main(["diagnose", SWEEP, "--unit", "adss", "--plots", "/proc"]) == 2
+    assert not calls
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert line.startswith("error: /proc: cannot be used as a directory")
 
 
 def test_figures_go_where_they_are_asked_for(calls, capsys, monkeypatch, tmp_path):

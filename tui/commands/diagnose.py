@@ -15,6 +15,8 @@ from tui.output import Console, Injected
 from tui.places import cache_folder
 
 if TYPE_CHECKING:
+    from analysis.diagnosis import Diagnosis
+    from analysis.paper_diagnosis import PaperDiagnosis
     from sim.unit import Unit
 
 __all__ = ["diagnose"]
@@ -63,30 +65,37 @@ def diagnose(
 
     response, *others = (read_response(path) for path in (file, *further))
     from analysis.diagnosis import diagnose_response
+    from analysis.swept import check_together, unit_doubts
 
+    check_together((response, *others))
+    for doubt in unit_doubts((response, *others), subject):
+        # Now, as well as with the answer: it may be a slip, and the answer takes a minute.
+        console.note(f"warning: {doubt}")
     with executor_at(cluster) as executor:
         result = diagnose_response(
             response, subject, further=others, cache=cache_folder(), executor=executor,
             progress=console.progress,
         )  # fmt: skip
+    _tell(result, json, console)
     if plots is not None:
         from analysis.diagnosis_figures import draw_diagnosis
 
         for path in draw_diagnosis(result, plots):
             console.note(f"wrote {path}")
-    if json:
-        console.document(result.to_json())
-    else:
-        console.data("\n".join(result.summary()))
 
 
 def _diagnose_paper(unit: Unit, plots: Path | None, json: bool, console: Console) -> None:
     from analysis.paper_diagnosis import diagnose_paper
 
     result = diagnose_paper(unit, progress=console.progress)
+    _tell(result, json, console)
     if plots is not None:
         for path in result.plot(plots):
             console.note(f"wrote {path}")
+
+
+def _tell(result: Diagnosis | PaperDiagnosis, json: bool, console: Console) -> None:
+    """The answer itself, before any picture of it: that may fail, and must not cost it."""
     if json:
         console.document(result.to_json())
     else:

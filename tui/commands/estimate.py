@@ -6,7 +6,6 @@ its uncertainty are the analysis's.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -74,13 +73,14 @@ def estimate(
             raise InputError(f"{file}: give either a response or --arf-hz and --rf-hz, not both")
         subject, responses = _unit(unit), [_response(path) for path in (file, *further)]
         from analysis.estimate import estimate_response
+        from analysis.swept import unit_doubts
 
+        warnings = unit_doubts(responses, subject)
         with executor_at(cluster) as executor:
             result = estimate_response(
                 responses[0], subject, total_backlash_unknown, progress=console.progress,
                 cache=cache_folder(), executor=executor, further=responses[1:],
             )  # fmt: skip
-        warnings = _doubts(responses, subject)
     if json:
         document = result.to_json()
         console.document(document | {"warnings": warnings + document["warnings"]})
@@ -98,8 +98,3 @@ def _response(file: Path) -> FrequencyResponse:
     from daq.formats import read_response
 
     return read_response(file)
-
-
-def _doubts(responses: Sequence[FrequencyResponse], unit: Unit) -> list[str]:
-    others = {one.unit for one in responses if one.unit.lower() != unit.name.lower()}
-    return [f"the response is of unit {other}, not of {unit.name}" for other in sorted(others)]
