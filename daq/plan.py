@@ -15,7 +15,10 @@ from numpy.typing import NDArray
 
 from daq.errors import InputError
 
-__all__ = ["Direction", "Spacing", "SweepPlan", "spaced_frequencies"]
+__all__ = ["MOST_POINTS", "Direction", "Spacing", "SweepPlan", "spaced_frequencies"]
+
+MOST_POINTS = 100_000
+"""Points of a sweep: at a tenth of a second each they take three hours."""
 
 Direction = Literal["up", "down"]
 Spacing = Literal["lin", "log"]
@@ -110,7 +113,7 @@ def spaced_frequencies(
     ------
     InputError
         If the band is empty, not positive, or holds fewer than two points
-        (one point is allowed where start and stop are equal).
+        (one point is allowed where start and stop are equal) or too many.
     """
     if not (np.isfinite(start_hz) and np.isfinite(stop_hz)) or start_hz <= 0:
         raise InputError(f"band {start_hz} to {stop_hz} Hz: the start must be above 0 Hz")
@@ -120,6 +123,8 @@ def spaced_frequencies(
         raise InputError(f"band {start_hz} to {stop_hz} Hz: the stop must lie above the start")
     if points < 2:
         raise InputError(f"{points} points cannot span a band; use 2 or more")
+    if points > MOST_POINTS:
+        raise InputError(f"{points} points are more than a sweep holds; use up to {MOST_POINTS}")
     if spacing == "lin":
         grid = np.linspace(start_hz, stop_hz, points)
     elif spacing == "log":

@@ -165,10 +165,13 @@ def _verdict(error: BaseException, words: list[str]) -> tuple[str, int]:
 
 
 def _is_interrupted(error: BaseException | None) -> bool:
-    """Whether an interrupt is at the root of it: compiled code wraps one that meets it."""
-    while error is not None and not isinstance(error, KeyboardInterrupt):
+    """Whether it is an interrupt, or what compiled code makes of one that meets it.
+
+    What else went wrong on the way out of one is told: it may be that the source is not off.
+    """
+    while isinstance(error, SystemError):
         error = error.__cause__ or error.__context__
-    return error is not None
+    return isinstance(error, KeyboardInterrupt)
 
 
 def _usage(error: CycloptsError) -> str:

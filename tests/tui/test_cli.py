@@ -125,6 +125,14 @@ def test_an_interrupt_that_meets_compiled_code_is_one(broken_verb, capsys, root,
     assert capsys.readouterr().err.startswith(f"error: {said}")
 
 
+def test_what_goes_wrong_on_the_way_out_of_an_interrupt_is_told(broken_verb, capsys):
+    error = errors.LinkError("the source may be on")
+    error.__context__ = KeyboardInterrupt()
+    broken_verb(error)
+    assert cli.main(["broken", "--quiet"]) == 3
+    assert capsys.readouterr().err == "error: the source may be on\n"
+
+
 @pytest.mark.parametrize(
     "line",
     [
