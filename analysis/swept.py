@@ -19,7 +19,7 @@ from sim.unit import Unit
 
 __all__ = ["check_together", "sweep_document", "sweep_lines", "unit_doubts"]
 
-_NO_UNIT = {"", "unknown"}
+_NAMELESS = {"", "unknown"}
 """What a response says that names none."""
 
 
@@ -35,7 +35,7 @@ def check_together(responses: Sequence[FrequencyResponse]) -> None:
         ("units", [one.unit for one in responses]),
         ("specimens", [str(one.provenance.get("serial") or "") for one in responses]),
     ):
-        different = sorted(set(said) - _NO_UNIT)
+        different = sorted(set(said) - _NAMELESS)
         if len({one.lower() for one in different}) > 1:
             raise InputError(
                 f"the responses are of different {what}, {' and '.join(different)}; "
@@ -48,7 +48,7 @@ def check_together(responses: Sequence[FrequencyResponse]) -> None:
 
 def unit_doubts(responses: Sequence[FrequencyResponse], unit: Unit) -> list[str]:
     """What is to be said where responses are said to be of another unit than the one given."""
-    said = {one.unit for one in responses if one.unit.lower() not in _NO_UNIT}
+    said = {one.unit for one in responses if one.unit.lower() not in _NAMELESS}
     others = sorted(name for name in said if name.lower() != unit.name.lower())
     return [f"the response is of unit {other}, not of {unit.name}" for other in others]
 

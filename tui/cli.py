@@ -8,7 +8,6 @@ help costs none of the scientific libraries. Nothing here computes.
 from __future__ import annotations
 
 import logging
-import os
 import sys
 import traceback
 from collections.abc import Sequence
@@ -19,7 +18,7 @@ from cyclopts import App, CycloptsError, MissingArgumentError, Parameter
 from daq.errors import InputError, LashbenchError
 from tui.commands.bench import is_terminal
 from tui.logs import LEVELS, logging_to_file, silence
-from tui.output import Console
+from tui.output import Console, hush
 
 __all__ = ["VERBS", "build_app", "main"]
 
@@ -109,9 +108,8 @@ def _guarded(words: list[str], console: Console, debug: bool) -> int:
     try:
         return _run(words, console)
     except BrokenPipeError:
-        # Whoever read our output has seen enough; keep the interpreter from
-        # complaining about it once more at its end.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # Whoever read our output has seen enough.
+        hush(sys.stdout)
         return 0
     except (KeyboardInterrupt, Exception) as error:
         if debug:

@@ -22,7 +22,7 @@ from cyclopts import Parameter
 from daq.errors import LashbenchError
 from tui.pace import Pace, duration
 
-__all__ = ["Console", "Injected", "as_json"]
+__all__ = ["Console", "Injected", "as_json", "hush"]
 
 _LOG = logging.getLogger("lashbench.console")
 
@@ -63,7 +63,7 @@ class Console:
         except BrokenPipeError:
             raise
         except OSError as error:
-            self._give_up(sys.stdout)
+            hush(sys.stdout)
             raise LashbenchError(
                 f"the output could not be written ({error.strerror}); send it where there is room"
             ) from error
@@ -143,12 +143,7 @@ class Console:
         try:
             print(text, end="", file=sys.stderr, flush=True)  # noqa: T201
         except OSError:
-            self._give_up(sys.stderr)
-
-    def _give_up(self, stream: TextIO) -> None:
-        """Send what is left for a stream nowhere: Python would complain of it at its end."""
-        with suppress(OSError, ValueError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+            hush(sys.stderr)
 
     def _erasure(self) -> str:
         """What takes picture and progress off the terminal."""
@@ -158,6 +153,12 @@ class Console:
 
 Injected = Annotated[Console, Parameter(parse=False, show=False)]
 """A parameter of a verb that `tui.cli` fills in; it is no option."""
+
+
+def hush(stream: TextIO) -> None:
+    """Send what is left for a stream nowhere: Python would complain of it once more at its end."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def as_json(content: Mapping[str, Any]) -> str:

@@ -58,13 +58,11 @@ def keeping(path: Path) -> Iterator[Path]:
     partial = path.with_suffix(f".{os.getpid()}.part")
     with suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        yield partial
-        os.replace(partial, path)
-    except OSError:
-        pass
-    finally:
-        with suppress(OSError):
+    with suppress(OSError):
+        try:
+            yield partial
+            os.replace(partial, path)
+        finally:
             partial.unlink(missing_ok=True)
 
 

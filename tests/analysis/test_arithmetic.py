@@ -8,6 +8,7 @@ import analysis.diagnosis
 import analysis.estimate
 import analysis.paper
 import analysis.paper_diagnosis
+import analysis.paper_estimate
 from analysis.arithmetic import on_one_core
 from sim.unit import load_unit
 
@@ -48,6 +49,12 @@ class Asked(Exception):
     [
         (analysis.diagnosis, "check_together", lambda m: m.diagnose_response(None, None)),
         (analysis.estimate, "check_together", lambda m: m.estimate_response(None, None)),
+        (
+            analysis.paper_estimate,
+            "fit_features",
+            lambda _: analysis.estimate.estimate_features(128.0, 137.0, load_unit("adss")),
+        ),
+        (analysis.paper, "load_paper", lambda m: m.reproduce()),
         (analysis.paper_diagnosis, "search_sets", lambda m: m.diagnose_paper(load_unit("adss"))),
     ],
 )

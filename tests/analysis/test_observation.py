@@ -91,12 +91,12 @@ def test_a_sweep_without_end_is_refused(slip):
         observe(response(**slip))
 
 
-def test_a_long_sweep_is_not(monkeypatch):
-    # 61 points at three levels, an hour and a half: from 2 Hz on with fifty cycles each.
-    grid = tuple(np.geomspace(2.0, 200.0, 61))
+def test_a_long_sweep_is_not():
+    # Of a slow machine, three hours: 61 points at three levels from 0.5 Hz on.
+    grid = tuple(np.geomspace(0.5, 50.0, 61))
     slow = response((1.0, 2.0, 4.0), grid, settle_cycles=20, integrate_cycles=100)
     ((plan, _),) = observe(slow).plans
-    assert plan.duration_s > 1000.0
+    assert 9000.0 < plan.duration_s < 14_400.0
 
 
 def test_sweeps_of_one_unit_stand_together_by_level_each_with_its_own_plan():

@@ -176,34 +176,33 @@ def test_what_a_line_lacks_is_said_plainly(line, said, capsys):
     assert capsys.readouterr().err == f"error: {said}\n"
 
 
-def test_a_reader_that_has_seen_enough_is_no_error():
+def talking(body):
+    """The command of a program whose one verb does that with its console."""
     program = (
         "import sys, types; from tui import cli, output;"
         "talk = types.ModuleType('talk'); sys.modules['talk'] = talk;"
-        "exec('def talk(*, console: Injected): console.data(\"x\" * 10**6)',"
+        f"exec('def talk(*, console: Injected): {body}',"
         "{'Injected': output.Injected}, talk.__dict__);"
         "cli.VERBS['talk'] = ('talk:talk', 'Talk.'); sys.exit(cli.main(['talk']))"
     )
+    return [sys.executable, "-c", program]
+
+
+def test_a_reader_that_has_seen_enough_is_no_error():
     with subprocess.Popen(
-        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        talking('console.data("x" * 10**6)'), stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as run:
         run.stdout.close()
         assert run.stderr.read() == b""
         assert run.wait() == 0
 
 
-TALK = (
-    "import sys, types; from tui import cli, output;"
-    "talk = types.ModuleType('talk'); sys.modules['talk'] = talk;"
-    'exec(\'def talk(*, console: Injected): [console.note("n" * 100) for _ in range(5000)];'
-    " console.data(\"the answer\")', {'Injected': output.Injected}, talk.__dict__);"
-    "cli.VERBS['talk'] = ('talk:talk', 'Talk.'); sys.exit(cli.main(['talk']))"
-)
+NARRATION = '[console.note("n" * 100) for _ in range(5000)]; console.data("the answer")'
 
 
 def test_nobody_listening_to_the_narration_does_not_stop_the_work():
     with subprocess.Popen(
-        [sys.executable, "-c", TALK], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        talking(NARRATION), stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as run:
         run.stderr.close()
         assert run.stdout.read() == b"the answer\n"
@@ -213,9 +212,7 @@ def test_nobody_listening_to_the_narration_does_not_stop_the_work():
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no disk that is always full")
 def test_a_full_disk_is_said_in_words():
     with Path("/dev/full").open("w") as full:
-        run = subprocess.run(
-            [sys.executable, "-c", TALK], stdout=full, stderr=subprocess.PIPE, check=False
-        )
+        run = subprocess.run(talking(NARRATION), stdout=full, stderr=subprocess.PIPE, check=False)
     assert run.returncode == 1
     last = run.stderr.decode().splitlines()[-1]
     assert last == (
