@@ -15,8 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.candidate import Candidate
+from analysis.executor import side_by_side
 from analysis.holdout import HeldOut, hold_out_surface
-from analysis.own_runs import MOST_RUNS, own_runs
+from analysis.own_runs import MOST_RUNS, OwnRun, own_runs
 from analysis.structure import credited, judge_structure
 
 __all__ = ["Adequacy", "judge_adequacy", "judge_chance", "judge_gain", "misses_alike"]
@@ -47,7 +48,7 @@ def judge_adequacy(candidate: Candidate, rng: np.random.Generator) -> Adequacy:
     otherwise (`analysis.own_runs`). In both numbers the lowest level has a credit (see
     `analysis.structure.credited`).
     """
-    fits = [run.alone.climb(run.place, tries=1) for run in own_runs(candidate, rng)]
+    fits = side_by_side(lambda run: run.alone.climb(run.place, tries=1), own_runs(candidate, rng))
     if len(fits) < _FEW:
         # Nearly every run did alone what it did: nothing speaks against the observation.
         return Adequacy(0.0, 0.0)
@@ -92,11 +93,12 @@ def judge_gain(
     compared.
     """
     seen = alleged.best.log_likelihood - simpler.best.log_likelihood
-    gains = [
-        run.seen_by(alleged.surface).climb(alleged.best.place, tries=_TRIES).log_likelihood
-        - run.alone.climb(run.place, tries=_TRIES).log_likelihood
-        for run in own_runs(simpler, rng)
-    ]
+
+    def gain(run: OwnRun) -> float:
+        there = run.seen_by(alleged.surface).climb(alleged.best.place, tries=_TRIES)
+        return there.log_likelihood - run.alone.climb(run.place, tries=_TRIES).log_likelihood
+
+    gains = side_by_side(gain, own_runs(simpler, rng))
     if len(gains) < _FEW:
         return 0.0, float("inf")
     beyond = (seen - np.mean(gains)) / max(float(np.std(gains)), 1e-9)

@@ -199,7 +199,7 @@ def solve_plane(offset, weight, reach, values, tailed, value, variance):
         variance[c] = widened * _spread(squares, w, total, tailed)
 
 
-@part(fastmath={"contract"})
+@part(fastmath=_ANY_ORDER)
 def _weigh_at(squares, alike, enough, weight):
     """Weights (n,) of runs at squared distances, by the first reach that suffices, or the last.
 
@@ -209,9 +209,9 @@ def _weigh_at(squares, alike, enough, weight):
     reach, total = _REACHES[0], 0.0
     for pick in range(len(_REACHES)):
         reach = _REACHES[pick]
-        total = 0.0
+        per_square, total = 1.0 / (4.0 * reach * reach), 0.0
         for i in range(n):
-            inside = max(1.0 - squares[i] / (4.0 * reach * reach), 0.0)
+            inside = max(1.0 - squares[i] * per_square, 0.0)
             weight[i] = inside * inside * alike[i]
             total += weight[i]
         if total >= enough:
@@ -230,25 +230,41 @@ def weigh(squares, enough):
 @njit(nogil=True, cache=True, fastmath={"contract"}, error_model="numpy")
 def log_shares(weight, before, both, prior):
     """Logarithm (rows,) of the share of weighted runs that do as was observed; see `Readings`."""
-    found = np.empty(len(prior))
-    for row in range(len(prior)):
-        did, do = 1.0, prior[row]
-        for i in range(len(weight)):
-            did += weight[i] * before[i, row]
-            do += weight[i] * both[i, row]
-        found[row] = np.log(do / did)
-    return found
+    runs, rows = before.shape
+    did, do = np.ones(rows), np.empty(rows)
+    for row in range(rows):
+        do[row] = prior[row]
+    # Run by run, as they lie in memory.
+    for i in range(runs):
+        for row in range(rows if weight[i] > 0.0 else 0):
+            did[row] += weight[i] * before[i, row]
+            do[row] += weight[i] * both[i, row]
+    for row in range(rows):
+        do[row] = np.log(do[row] / did[row])
+    return do
 
 
 @part(fastmath={"contract"})
-def _offsets(charted, point, width, offset, squares):
-    """How far (n, k) runs are from a point in one chart, in widths, and the squares (n,) of it."""
-    n, k = charted.shape
+def _squares_off(charted, point, width, squares):
+    """How far (n,) runs are from a point in one chart (k, n), in widths squared."""
+    k, n = charted.shape
     for i in range(n):
         squares[i] = 0.0
-        for j in range(k):
-            offset[i, j] = (charted[i, j] - point[j]) / width[j]
-            squares[i] += offset[i, j] ** 2
+    for j in range(k):
+        at, per_width = point[j], 1.0 / width[j]
+        for i in range(n):
+            off = (charted[j, i] - at) * per_width
+            squares[i] += off * off
+
+
+@part()
+def _offsets(charted, point, width, runs, offset):
+    """How far (count, k) some runs are from a point, in widths."""
+    k = len(charted)
+    for j in range(k):
+        at, per_width = point[j], 1.0 / width[j]
+        for i in range(len(runs)):
+            offset[i, j] = (charted[j, runs[i]] - at) * per_width
 
 
 @part()
@@ -287,9 +303,10 @@ def _nearest(far, most, scratch, near):
 @part()
 def _alike(runs, point, mean, variance, distance):
     """Means and variances (3, rows) where runs are as near at one row as at any other."""
-    _, n, k = runs.charted.shape
+    _, k, n = runs.charted.shape
     offset, weight, all_alike = np.empty((n, k)), np.empty(n), np.ones(n)
-    _offsets(runs.charted[0], point[0], runs.width, offset, distance)
+    _squares_off(runs.charted[0], point[0], runs.width, distance)
+    _offsets(runs.charted[0], point[0], runs.width, np.arange(n), offset)
     plain = len(runs.plain_rows)
     shown, spread = np.empty(max(3 * plain, 3)), np.empty(max(3 * plain, 3))
     # The plain rows are one problem, which comes first, if there are any.
@@ -309,9 +326,9 @@ def _alike(runs, point, mean, variance, distance):
 @part()
 def _by_row(runs, point, mean, variance, distance):
     """The same where every row has its own neighbours, those in another motion last."""
-    rows, n, k = runs.charted.shape
+    rows, k, n = runs.charted.shape
     most = min(runs.most, n)
-    offset, squares, far, scratch = np.empty((n, k)), np.empty(n), np.empty(n), np.empty(n)
+    squares, far, scratch = np.empty(n), np.empty(n), np.empty(n)
     near = np.empty(most, np.int64)
     near_squares, alike, weight = np.empty(most), np.empty(most), np.empty(most)
     near_offset, values = np.empty((most, k)), np.empty((3, most), runs.values.dtype)
@@ -319,23 +336,22 @@ def _by_row(runs, point, mean, variance, distance):
     for i in range(n):
         distance[i] = 0.0
     for row in range(rows):
-        _offsets(runs.charted[row], point[row], runs.width, offset, squares)
-        whole = True
+        _squares_off(runs.charted[row], point[row], runs.width, squares)
+        least = 1.0
         for i in range(n):
             distance[i] += squares[i] / rows
             far[i] = squares[i] / runs.alike[row, i]
-            whole &= runs.alike[row, i] == 1.0
+            least = min(least, runs.alike[row, i])
         _nearest(far, most, scratch, near)
+        _offsets(runs.charted[row], point[row], runs.width, near, near_offset)
         for at in range(most):
             i = near[at]
             near_squares[at], alike[at] = squares[i], runs.alike[row, i]
-            for j in range(k):
-                near_offset[at, j] = offset[i, j]
             for c in range(3):
                 values[c, at] = runs.values[row, c, i]
         reach, rested = _weigh_at(near_squares, alike, runs.enough, weight)
         solve_plane(near_offset, weight, reach, values, runs.tailed, three, spreads)
-        lacking = 0.0 if whole else min(max(1.0 - rested, 0.0), 1.0)
+        lacking = 0.0 if least == 1.0 else min(max(1.0 - rested, 0.0), 1.0)
         for c in range(3):
             mean[c, row], variance[c, row] = three[c], spreads[c] + lacking * _UNKNOWN[c] ** 2
 
@@ -343,7 +359,7 @@ def _by_row(runs, point, mean, variance, distance):
 @part()
 def _expect(runs, point):
     """Mean and scatter of a single run (3, rows) at a point, and how far (n,) runs are from it."""
-    rows, n = runs.least.shape[1], runs.charted.shape[1]
+    rows, n = runs.least.shape[1], runs.charted.shape[2]
     mean, variance, distance = np.empty((3, rows)), np.empty((3, rows)), np.empty(n)
     if len(runs.charted) > 1:
         _by_row(runs, point, mean, variance, distance)

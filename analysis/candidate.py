@@ -17,6 +17,7 @@ from analysis.branches import find_motions
 from analysis.causes import Hypothesis
 from analysis.chart import Chart
 from analysis.ensemble import TOLERANCES
+from analysis.executor import side_by_side
 from analysis.observation import Observation
 from analysis.population import DEVIATING, Population
 from analysis.surface import Fit, Surface, differences
@@ -53,15 +54,15 @@ def form_candidates(
         for key, population in fine.items()
     }
     slopes = _pooled_slopes(observation, fine, raw)
-    found = {}
-    for key, population in fine.items():
-        surface = _without_deviations(raw[key], population, slopes)
+
+    def formed(key: Effects) -> Candidate:
+        surface = _without_deviations(raw[key], fine[key], slopes)
         charts = surface.on_chart(surface.places), surface.on_chart(starts[key][None])
         width = learn_width(charts[0], surface.difference, surface.width, charts[1])
         surface = replace(surface, width=width)
-        best = surface.climb(starts[key])
-        found[key] = Candidate(Hypothesis(unit, key), population, surface, best)
-    return found
+        return Candidate(Hypothesis(unit, key), fine[key], surface, surface.climb(starts[key]))
+
+    return dict(zip(fine, side_by_side(formed, fine), strict=True))
 
 
 def _surface(observation: Observation, population: Population, hypothesis: Hypothesis) -> Surface:

@@ -3,18 +3,22 @@
 Owns the interface that ensembles are written against, and the executor of this
 machine. A task is a value, its work a function of the module level that takes
 one core and gives the same result wherever it runs; nothing here knows what
-either is about.
+either is about. What is computed between simulations is shared out among the cores of
+this machine as well, whoever simulates.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextvars import copy_context
 from typing import Protocol, TypeVar
 
-__all__ = ["Executor", "LocalExecutor"]
+__all__ = ["Executor", "LocalExecutor", "side_by_side"]
+
+_MOST_BESIDE = 4
+"""Threads that share out arithmetic: part of it is the interpreter's, one thread at a time."""
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -69,6 +73,18 @@ class LocalExecutor:
                 pool.shutdown(wait=False, cancel_futures=True)
                 raise
         return [future.result() for future in futures]
+
+
+def side_by_side(work: Callable[[T], R], tasks: Iterable[T]) -> list[R]:
+    """Results in the order of the tasks, computed on the cores of this machine.
+
+    For work of some milliseconds or more that is compiled for the most part, and lets go of the
+    interpreter meanwhile. It may share out its own.
+    """
+    known = list(tasks)
+    if len(known) < 2:
+        return [work(one) for one in known]
+    return LocalExecutor(min(_cores(), _MOST_BESIDE)).each(work, known)
 
 
 def _cores() -> int:

@@ -25,7 +25,7 @@ __all__ = ["Readings", "Runs", "compile_all"]
 class Runs(NamedTuple):
     """Runs of one hypothesis; rows are those of an observation, k coordinates of its chart.
 
-    `charted` (1 or rows, n, k): where they are, one for all rows where they are alike.
+    `charted` (1 or rows, k, n): where they are, one for all rows where they are alike.
     `width` (k,). `enough`: weight of the runs that a regression takes; `most`: how many
     of the nearest take part, where every row has its own. `tailed`: see
     `analysis.agreement.solve_plane`. `plain` (3 len(plain_rows), n): what they show minus what
@@ -83,8 +83,8 @@ def compile_all() -> None:
     values, alike = np.zeros((rows, 3, n), np.float32), np.ones((rows, n))
     every, none = np.arange(rows), np.arange(0)
     runs = Runs(
-        line[None], np.ones(k), 1.0, n, True, values.reshape(-1, n), every, values[:0], none,
-        values, alike, Runs.smoothed_over([slice(0, rows)]), np.ones((3, rows)),
+        line.T[None].copy(), np.ones(k), 1.0, n, True, values.reshape(-1, n), every, values[:0],
+        none, values, alike, Runs.smoothed_over([slice(0, rows)]), np.ones((3, rows)),
     )  # fmt: skip
     observed, one, many = np.ones((3, rows), bool), np.ones(3 * rows), np.ones((2, 3 * rows))
     share = np.ones((n, rows))

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.candidate import Candidate
+from analysis.executor import side_by_side
 from analysis.observation import Observation
-from analysis.surface import Surface
+from analysis.surface import Fit, Surface
 from daq.frf import DB_PER_NEPER
 
 __all__ = ["AT_NOISE", "HeldOut", "hold_out", "hold_out_surface"]
@@ -80,10 +81,14 @@ def hold_out_surface(
     shape = (3, len(observation))
     residual, std = np.full(shape, np.nan), np.full(shape, np.nan)
     score = 0.0
-    for fold in _folds(observation):
+    folds = _folds(observation)
+
+    def others_only(fold: slice) -> list[Fit]:
         rows = np.ones(len(observation), dtype=bool)
         rows[fold] = False
-        fits = surface.walk(start, rows, tries=_TRIES)
+        return surface.walk(start, rows, tries=_TRIES)
+
+    for fold, fits in zip(folds, side_by_side(others_only, folds), strict=True):
         share = surface.shares(fits)
         left = np.stack([fit.residual[:, fold] for fit in fits])
         spread = np.stack([fit.std[:, fold] for fit in fits])

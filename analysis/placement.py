@@ -78,7 +78,7 @@ def groups_along(candidate: Candidate, groups: int, rng: np.random.Generator) ->
     margin = _BEYOND * (high - low)
     bottom, top = np.clip([low - margin, high + margin], 0.0, 1.0)
     cloud = np.vstack([rng.uniform(bottom, top, (_CLOUD, len(low))), candidate.best.place])
-    likelihood = np.array([surface.fit(place).log_likelihood for place in cloud])
+    likelihood = surface.scan(cloud, leaning=True)
     weight = np.exp((likelihood - likelihood.max()) / HEAT)
     order = np.argsort(cloud[:, min(1, cloud.shape[1] - 1)])
     share = np.cumsum(weight[order]) / weight.sum()

@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.executor import side_by_side
 from analysis.likelihood import HEAT
 from analysis.observation import USUAL_NOISE_V, Observation
 
@@ -68,7 +69,11 @@ def likeliest_noise(
     """
     if len(observations) == 1:
         return observations[0]
-    return max(observations, key=lambda seen: log_likelihood(seen) / HEAT + _log_prior(seen))
+    found = side_by_side(log_likelihood, observations)
+    believed = [
+        one / HEAT + _log_prior(seen) for one, seen in zip(found, observations, strict=True)
+    ]
+    return observations[int(np.argmax(believed))]
 
 
 def _log_prior(observation: Observation) -> float:

@@ -23,6 +23,7 @@ from analysis.atlas import Atlas
 from analysis.atlas_surfaces import felt_pairs, felt_singles, surfaces_of
 from analysis.candidate import Candidate, Effects
 from analysis.causes import Hypothesis
+from analysis.executor import side_by_side
 from analysis.observation import Observation
 from analysis.surface import Surface
 from sim.unit import Unit
@@ -203,8 +204,10 @@ def add_causes(unit: Unit, coarse: Observation, atlas: Atlas) -> Additions:
     surfaces = surfaces_of(unit, coarse, atlas)
     ratios = ratios_of_pairs()
     plain = np.array([surfaces[()].expected(np.array([ratio]))[0] for ratio in ratios])
-    added = {e: _added(surface, plain) for e, surface in surfaces.items() if e}
-    return Additions(coarse, plain, added, felt_pairs(unit, coarse, atlas))
+    causes = [e for e in surfaces if e]
+    added = side_by_side(lambda e: _added(surfaces[e], plain), causes)
+    felt = felt_pairs(unit, coarse, atlas)
+    return Additions(coarse, plain, dict(zip(causes, added, strict=True)), felt)
 
 
 def _added(surface: Surface, plain: NDArray[np.float64]) -> _Added:

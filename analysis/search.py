@@ -67,6 +67,11 @@ _THIRD, _THIRD_GROUPS, _SINGLES = 4, 4, 3
 """How many hypotheses are looked at in each round, and in how many groups of runs each; at first
 in more where one has many sizes. So many single causes that are close are always in the third."""
 
+_ONE_SIZE, _BEHIND, _BEHIND_GROUPS = 2, 60.0, 2
+"""A cause of one size (coordinates, the ratio is the first) that is so far behind the leader on few
+rows is looked at in fewer groups in the third round: it is there to be held against, and three
+times the rows put it three times as far behind."""
+
 _TRIPLES, _TRIPLES_CLOSER, _TRIPLE_GROUPS, _TRIPLES_AFTER = 8, 4, (2, 4), 2
 """How many sets with a third cause beside a leading pair that is doubted are tried, and looked at
 closer, in how many groups each time; and how many of them on all rows."""
@@ -201,8 +206,7 @@ def _look_at_all(
 
     Returns whether something is missing from the plain model, and whether pairs were searched.
     """
-    fine.take_over([rough.found[key] for key in _third(rough)], _THIRD_GROUPS)
-    fine.hear()
+    _look_on_all(rough, fine, _third(rough))
     while True:
         if not doubted and is_doubtful_still(fine, rng):
             # More rows, or more runs, show that a single cause will not do after all.
@@ -233,8 +237,17 @@ def _search_late(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator
 def _bring_pairs(rough: Hunt, fine: Hunt, atlas: Atlas) -> None:
     """Search pairs on few rows, and look at those that lead there on all."""
     search_pairs(rough, atlas)
-    pairs = [key for key in _third(rough) if key not in fine.found]
-    fine.take_over([rough.found[key] for key in pairs], _THIRD_GROUPS)
+    _look_on_all(rough, fine, [key for key in _third(rough) if key not in fine.found])
+
+
+def _look_on_all(rough: Hunt, fine: Hunt, keys: Sequence[Effects]) -> None:
+    """Look at hypotheses on all rows, where few left them."""
+    near = set(rough.leading(len(rough.found), _BEHIND))
+    one_size = [key for key in keys if rough.found[key].hypothesis.d == _ONE_SIZE]
+    behind = [key for key in one_size if key not in near]
+    fine.take_over([rough.found[key] for key in keys if key not in behind], _THIRD_GROUPS)
+    if behind:
+        fine.take_over([rough.found[key] for key in behind], _BEHIND_GROUPS)
     fine.hear()
 
 

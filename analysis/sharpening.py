@@ -39,7 +39,7 @@ Little of it is in the data then, and what is told is as much chance of where ru
 hundred about the answer to one practice set, hundreds told ratios 0.04 apart in standard deviation,
 or 0.01 where all of them took part."""
 
-_FOR_THE_ANSWER = 0.2
+_FOR_THE_ANSWER = 0.12
 """Share from which on there is no further round, of what a search may simulate beside it."""
 
 _APART = 1.5

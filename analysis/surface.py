@@ -21,6 +21,7 @@ from analysis.agreement import agree, weigh
 from analysis.branches import Motions
 from analysis.chart import Chart
 from analysis.emulator import GAIN_TOLERANCE
+from analysis.executor import side_by_side
 from analysis.expectation import Readings, Runs
 from analysis.likelihood import HEAT
 from analysis.observation import Observation
@@ -33,6 +34,9 @@ _FLOOR = np.array([0.003, 0.003, 0.15])
 
 _STRIDES = (0.5, 0.25, 0.12, 0.06)
 """Reach of the random steps of a climb, as shares of what was simulated."""
+
+_AT_ONCE = 64
+"""Places that are looked at on one core before it takes the next ones."""
 
 _UNALIKE = 1e-4
 """Weight of runs in another state of motion: they count only where there are no others."""
@@ -108,11 +112,18 @@ class Surface:
     chart: Chart | None = None
     coordinates: NDArray[np.float64] | None = None
 
-    def scan(self, grid: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Log-likelihood (count,) at places (count, d), deviations left in the scatter."""
+    def scan(self, grid: NDArray[np.float64], leaning: bool = False) -> NDArray[np.float64]:
+        """Log-likelihood (count,) at places (count, d).
+
+        `leaning`: whether deviations are fitted; else they are left in the scatter.
+        """
         charted = np.ascontiguousarray(self.on_chart(grid).swapaxes(0, 1))
-        likelihoods, *_ = agree(self._runs, self._readings, charted, self._every_row, False)
-        return np.asarray(likelihoods)
+        known = self._runs, self._readings
+        found = side_by_side(
+            lambda part: agree(*known, part, self._every_row, leaning)[0],
+            np.array_split(charted, -(-len(charted) // _AT_ONCE)),
+        )
+        return np.concatenate(found)
 
     def expected(self, place: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
         """Mean difference (3, rows) of runs at a place, and the scatter of a single run there."""
@@ -208,7 +219,7 @@ class Surface:
         """The runs in the form that is computed with."""
         noise, mixed = self.observation.noise, self.motions.mixed
         return Runs(
-            charted=np.ascontiguousarray(self._charted, dtype=float),
+            charted=np.ascontiguousarray(self._charted.swapaxes(1, 2), dtype=float),
             width=np.asarray(self.width, dtype=float),
             enough=float(self.enough),
             most=int(_MOST * self.enough),
@@ -233,7 +244,8 @@ class Surface:
         slopes = np.concatenate([self.slopes, gain]).reshape(len(self.sigmas) + 1, -1)
         return Readings(
             np.isfinite(self.observation.values),
-            slopes,
+            # Solved slopes lie column by column, and what is computed goes along rows.
+            np.ascontiguousarray(slopes),
             np.append(self.sigmas, GAIN_TOLERANCE),
             *self.motions.course,
         )

@@ -163,7 +163,7 @@ def looked_at(surface, place, leaning):
     for rows in (1, len(surface.observation)):
         charted = np.tile(surface._runs.charted[:1], (rows, 1, 1))
         points = np.tile(place, (1, rows, 1))
-        runs = surface._runs._replace(charted=charted, most=charted.shape[1])
+        runs = surface._runs._replace(charted=charted, most=charted.shape[2])
         every = np.ones(len(surface.observation), dtype=bool)
         results.append(agreement.agree(runs, surface._readings, points, every, leaning))
     return results

@@ -199,7 +199,10 @@ def test_pairs_are_searched_late_where_a_single_cause_would_be_refused_after_all
         take_over=lambda candidates, groups: done.append("taken over") or given.extend(candidates),
         hear=lambda: None,
     )
-    rough, given = SimpleNamespace(found={pair: "the pair", single: "the single"}), []
+    found = {
+        key: SimpleNamespace(hypothesis=Hypothesis(synthetic.ADSS, key)) for key in (pair, single)
+    }
+    rough, given = SimpleNamespace(found=found, leading=lambda *_: [pair, single]), []
     monkeypatch.setattr(search, "_third", lambda _: [pair, single])
     monkeypatch.setattr(search, "is_refused_now", lambda *_: refused)
     for name, step in {
@@ -210,7 +213,33 @@ def test_pairs_are_searched_late_where_a_single_cause_would_be_refused_after_all
     search._search_late(rough, fine, {}, None)
     assert done == steps
     # Who is looked at on all rows already is not taken over once more.
-    assert given == (["the pair"] if refused else [])
+    assert given == ([found[pair]] if refused else [])
+
+
+def test_a_cause_of_one_size_that_few_rows_leave_far_behind_gets_fewer_runs():
+    """The baseline is what all is held against, and who has many sizes needs runs to fit."""
+    behind = {
+        ("load-coulomb-friction",): 0.0,
+        ("load-inertia",): 59.0,
+        ("total-backlash",): 61.0,
+        ("payload-flexibility",): 90.0,
+        ("cable-stiffness", "load-inertia"): 90.0,
+        (): 150.0,
+    }
+    found = {key: SimpleNamespace(hypothesis=Hypothesis(synthetic.ADSS, key)) for key in behind}
+    rough = SimpleNamespace(
+        found=found, leading=lambda most, far: [key for key in behind if behind[key] <= far]
+    )
+    groups, heard = {}, []
+    fine = SimpleNamespace(
+        take_over=lambda candidates, count: groups.update(
+            {one.hypothesis.effects: count for one in candidates}
+        ),
+        hear=lambda: heard.append(len(groups)),
+    )
+    search._look_on_all(rough, fine, list(behind))
+    assert groups == {key: 2 if key == ("total-backlash",) else 4 for key in behind}
+    assert heard == [len(behind)]
 
 
 @pytest.mark.parametrize(
@@ -233,6 +262,6 @@ def test_whether_pairs_were_searched_is_told(monkeypatch, doubted, spent, hardly
     monkeypatch.setattr(search, "compare", lambda *_: True)
     monkeypatch.setattr(search, "is_hardly_missing", lambda *_: hardly)
     monkeypatch.setattr(search, "look_for_second", lambda *_: beside.append(True))
-    rough = SimpleNamespace(found={})
+    rough = SimpleNamespace(found={}, leading=lambda *_: [])
     assert search._look_at_all(rough, fine, {}, None, doubted) == (True, doubted)
     assert bool(beside) == (not doubted and not spent and not hardly)
