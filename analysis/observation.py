@@ -53,6 +53,9 @@ Digits beyond, which a simulated file has, tell no machines apart that a bench c
 _LONGEST_S = 14_400.0
 """Longest sweep of a response; a bench drives none for longer if not told otherwise."""
 
+_HIGHEST_V = 1000.0
+"""Highest voltage of a response at either channel: an analyser takes tens, with a divider more."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observation:
@@ -146,7 +149,8 @@ def observe(*responses: FrequencyResponse) -> Observation:
     AnalysisError
         If one holds no usable point, or does not know a source level.
     InputError
-        If one states a DC offset that is no voltage, or a sweep that lasts too long.
+        If one states a DC offset that is no voltage, a sweep that lasts too long, or voltages that
+        no bench has.
     """
     swept = [level for number, one in enumerate(responses) for level in _levels(number, one)]
     # Levels that are alike keep their order: sweeps stay as they were given.
@@ -156,6 +160,7 @@ def observe(*responses: FrequencyResponse) -> Observation:
     level = np.concatenate([one.readings.source_vpk for one in swept])
     scatter = np.concatenate([one.scatter for one in swept])
     volts = np.abs(gain) * level
+    _refuse_unbelievable(level, volts)
     noise_v = _reading_noise(scatter * volts)
     noise, floor = noise_and_floor(np.abs(gain), level, noise_v)
     drowned = floor > 0.0
@@ -285,6 +290,16 @@ def _refuse_endless(plan: SweepPlan) -> None:
             f"which takes {plan.duration_s:.3g} s; up to {_LONGEST_S:g} s can be simulated: "
             "see whether frequencies are in Hz, and cycles right"
         )
+
+
+def _refuse_unbelievable(source_vpk: NDArray[np.float64], volts: NDArray[np.float64]) -> None:
+    """A level or a gain with some noughts too many would be searched for all the same."""
+    for channel, values in (("the source drove", source_vpk), ("the response is", volts)):
+        if values.max() > _HIGHEST_V:
+            raise InputError(
+                f"{channel} {values.max():.3g} V at one point; up to {_HIGHEST_V:g} V can be "
+                "believed: see whether levels are in V, and gains in dB"
+            )
 
 
 def _stretches(*columns: NDArray[np.float64]) -> tuple[slice, ...]:

@@ -91,6 +91,29 @@ def test_a_sweep_without_end_is_refused(slip):
         observe(response(**slip))
 
 
+@pytest.mark.parametrize(
+    ("slip", "said"),
+    [
+        ({"levels": (1.5, 2500.0)}, "the source drove 2.5e[+]03 V at one point; up to 1000 V"),
+        ({"levels": (1e30,)}, "the source drove 1e[+]30 V"),
+        # 6000 dB, and gains that were given in dB as if they were ratios of a thousand and more.
+        (
+            {"gain": 1e300},
+            "the response is 2.5e[+]300 V at one point; up to 1000 V can be believed",
+        ),
+        ({"gain": 500.0}, "the response is 1.25e[+]03 V"),
+    ],
+)
+def test_voltages_that_no_bench_has_are_refused(slip, said):
+    with pytest.raises(InputError, match=f"{said}.*"):
+        observe(response(**slip))
+
+
+def test_voltages_up_to_a_kilovolt_are_not():
+    seen = observe(response((999.0,), gain=1.0))
+    assert list(seen.source_vpk) == [999.0] * 3
+
+
 def test_a_long_sweep_is_not():
     # Of a slow machine, three hours: 61 points at three levels from 0.5 Hz on.
     grid = tuple(np.geomspace(0.5, 50.0, 61))
