@@ -81,10 +81,10 @@ def side_by_side(work: Callable[[T], R], tasks: Iterable[T]) -> list[R]:
     For work of some milliseconds or more that is compiled for the most part, and lets go of the
     interpreter meanwhile. It may share out its own.
     """
-    known = list(tasks)
-    if len(known) < 2:
+    known, cores = list(tasks), min(_cores(), _MOST_BESIDE)
+    if min(cores, len(known)) < 2:
         return [work(one) for one in known]
-    return LocalExecutor(min(_cores(), _MOST_BESIDE)).each(work, known)
+    return LocalExecutor(cores).each(work, known)
 
 
 def _cores() -> int:

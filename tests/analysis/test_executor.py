@@ -33,6 +33,11 @@ def test_one_piece_of_work_is_done_here(two_cores):
     assert side_by_side(lambda _: pytest.fail("asked"), []) == []
 
 
+def test_one_core_does_all_of_it_here(monkeypatch):
+    monkeypatch.setattr(executor, "_cores", lambda: 1)
+    assert side_by_side(lambda _: current_thread(), [1, 2]) == [main_thread()] * 2
+
+
 def test_an_error_ends_the_whole_and_what_has_not_begun_is_dropped(two_cores):
     begun = []
 

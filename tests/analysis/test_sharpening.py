@@ -126,7 +126,7 @@ def test_it_gets_no_more_runs_than_are_enough(monkeypatch, asked):
     assert len(asked) == 2
 
 
-@pytest.mark.parametrize(("share", "rounds"), [(0.06, 4), (0.3, 1), (1e-9, 12)])
+@pytest.mark.parametrize(("share", "rounds"), [(0.05, 3), (0.3, 1), (1e-9, 12)])
 def test_it_takes_no_more_than_a_share_of_what_a_search_may(monkeypatch, asked, share, rounds):
     """A round that is begun is finished; what was simulated before does not count."""
     observed, made = observed_at(0), sharpening.simulate_groups
