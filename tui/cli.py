@@ -17,6 +17,7 @@ from cyclopts import App, CycloptsError, MissingArgumentError, Parameter
 
 from daq.errors import InputError, LashbenchError
 from tui.commands.bench import is_terminal
+from tui.entry import INTERRUPTED
 from tui.logs import LEVELS, logging_to_file, silence
 from tui.output import Console, hush
 
@@ -50,7 +51,6 @@ _EPILOGUE = (
 )
 _USAGE = 2
 _LOG = logging.getLogger("lashbench.command")
-_INTERRUPTED = 130
 
 
 def build_app() -> App:
@@ -153,7 +153,7 @@ def _log_level(words: list[str]) -> tuple[str | None, list[str]]:
 def _verdict(error: BaseException, words: list[str]) -> tuple[str, int]:
     """The line and the exit code that an error means."""
     if _is_interrupted(error):
-        return "interrupted", _INTERRUPTED
+        return "interrupted", INTERRUPTED
     if isinstance(error, LashbenchError):
         return str(error), error.exit_code
     if isinstance(error, CycloptsError):

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import sys
 
-__all__ = ["main"]
+__all__ = ["INTERRUPTED", "main"]
 
-_INTERRUPTED = 130
+INTERRUPTED = 130
+"""Exit code of what was interrupted, as shells have it."""
 
 
 def main() -> int:
@@ -19,5 +20,5 @@ def main() -> int:
         from tui.cli import main as run
     except KeyboardInterrupt:
         sys.stderr.write("error: interrupted\n")
-        return _INTERRUPTED
+        return INTERRUPTED
     return run()

@@ -96,7 +96,7 @@ def test_a_sweep_without_end_is_refused(slip):
     [
         ({"levels": (1.5, 2500.0)}, "the source drove 2.5e[+]03 V at one point; up to 1000 V"),
         ({"levels": (1e30,)}, "the source drove 1e[+]30 V"),
-        # 6000 dB, and gains that were given in dB as if they were ratios of a thousand and more.
+        # A gain of 6000 dB, and one of 54 dB at 2.5 V.
         (
             {"gain": 1e300},
             "the response is 2.5e[+]300 V at one point; up to 1000 V can be believed",
@@ -105,7 +105,7 @@ def test_a_sweep_without_end_is_refused(slip):
     ],
 )
 def test_voltages_that_no_bench_has_are_refused(slip, said):
-    with pytest.raises(InputError, match=f"{said}.*"):
+    with pytest.raises(InputError, match=said):
         observe(response(**slip))
 
 

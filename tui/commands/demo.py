@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from daq.errors import InputError
+from tui.entry import INTERRUPTED
 from tui.options import Json, Whole, prepare_directory
 from tui.output import Console, Injected
 from tui.places import cache_folder
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
 __all__ = ["demo"]
 
-_INTERRUPTED = 130
 _TOLD = 5
 """Lines that a long job prints where nobody watches a terminal."""
 
@@ -65,7 +65,7 @@ def demo(
     finished = _measure(unit, hidden, out / "bench.db", tell, console)
     if finished.state != "complete":
         console.note(f"{finished.state}: {finished.reason}")
-        return _INTERRUPTED
+        return INTERRUPTED
     response = _features(out, finished.measurement, tell)
     guess = _guess(console) if surprise else None
     document = _judge(response, unit, hidden, out, finished.measurement, guess, tell, console)

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from daq.errors import InputError, LashbenchError, MeasurementError
+from tui.entry import INTERRUPTED
 from tui.measure_options import PlanOptions, read_band, session_request
 from tui.options import Json, Real, UnitName, Whole
 from tui.output import Console, Injected
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
     from sim.unit import Unit
 
 __all__ = ["measure"]
-
-_INTERRUPTED = 130
 
 
 def measure(
@@ -295,4 +294,4 @@ def _exit_code(finished: Finished) -> int:
     state = _contract_state(finished)
     if state != "confirmed-off":
         raise MeasurementError(f"SOURCE OFF {state.upper()}: switch it off by hand")
-    return 0 if finished.state == "complete" else _INTERRUPTED
+    return 0 if finished.state == "complete" else INTERRUPTED
