@@ -89,8 +89,9 @@ def judge_gain(
     """That share, and by how many of their standard deviations the gain exceeds own runs' mean one.
 
     Where few own runs are on the branch that was observed, their share says little, and gains that
-    differ by hundreds from run to run say that such a gain is none. Infinite where no runs can be
-    compared.
+    differ by hundreds from run to run say that such a gain is none. Nor does it say more than a
+    standard deviation that own runs lose: what the other adds can be none, and its own runs, made
+    for the observation, may not reach them. Infinite where no runs can be compared.
     """
     seen = alleged.best.log_likelihood - simpler.best.log_likelihood
 
@@ -101,8 +102,9 @@ def judge_gain(
     gains = side_by_side(gain, own_runs(simpler, rng))
     if len(gains) < _FEW:
         return 0.0, float("inf")
-    beyond = (seen - np.mean(gains)) / max(float(np.std(gains)), 1e-9)
-    return float(np.mean(np.array(gains) >= seen)), float(beyond)
+    scatter = max(float(np.std(gains)), 1e-9)
+    beyond = (seen - max(float(np.mean(gains)), -scatter)) / scatter
+    return float(np.mean(np.array(gains) >= seen)), beyond
 
 
 def misses_alike(

@@ -267,37 +267,51 @@ def _offsets(charted, point, width, runs, offset):
             offset[i, j] = (charted[j, runs[i]] - at) * per_width
 
 
-@part()
-def _nearest(far, most, scratch, near):
-    """Which runs (most,) are the nearest, in any order: quickselect, then all within."""
-    low, high = 0, len(far) - 1
-    # Item by item: what assigns whole arrays takes seconds to compile.
+@part(fastmath=_ANY_ORDER)
+def _count(far, limit):
+    """How many lie within a limit."""
+    count = 0
     for i in range(len(far)):
-        scratch[i] = far[i]
-    while low < high:
-        pivot = scratch[(low + high) // 2]
-        i, j = low, high
-        while i <= j:
-            while scratch[i] < pivot:
-                i += 1
-            while pivot < scratch[j]:
-                j -= 1
-            if i <= j:
-                scratch[i], scratch[j] = scratch[j], scratch[i]
-                i += 1
-                j -= 1
-        if most - 1 <= j:
-            high = j
-        elif most - 1 >= i:
-            low = i
+        count += 1 if far[i] <= limit else 0
+    return count
+
+
+@part(fastmath=_ANY_ORDER)
+def _farthest(far):
+    most = far[0]
+    for i in range(len(far)):
+        most = max(most, far[i])
+    return most
+
+
+@part()
+def _nearest(far, most, guess, near):
+    """Which runs (most,) are the nearest, in any order; the limit that they lie within.
+
+    By halving what may be the limit, as counting goes in vectors and sorting does not. `guess`: a
+    limit to begin with, or 0.
+    """
+    low, high, held = 0.0, _farthest(far), len(far)
+    limit = guess if 0.0 < guess < high else 0.5 * high
+    while held > most and low < limit < high:
+        count = _count(far, limit)
+        if count < most:
+            low = limit
         else:
-            break
-    limit, taken = scratch[most - 1], 0
-    for strictly in (True, False):
-        for i in range(len(far)):
-            if taken < most and (far[i] < limit if strictly else far[i] == limit):
-                near[taken] = i
-                taken += 1
+            high, held = limit, count
+        # A guess is not far off.
+        limit = 2.0 * limit if held == len(far) and 2.0 * limit < high else 0.5 * (low + high)
+    # Some may be as far as each other, so that no limit parts them.
+    sure, taken = high if held == most else low, 0
+    for i in range(len(far)):
+        if far[i] <= sure and taken < most:
+            near[taken] = i
+            taken += 1
+    for i in range(len(far) if taken < most else 0):
+        if sure < far[i] <= high and taken < most:
+            near[taken] = i
+            taken += 1
+    return high
 
 
 @part()
@@ -328,7 +342,7 @@ def _by_row(runs, point, mean, variance, distance):
     """The same where every row has its own neighbours, those in another motion last."""
     rows, k, n = runs.charted.shape
     most = min(runs.most, n)
-    squares, far, scratch = np.empty(n), np.empty(n), np.empty(n)
+    squares, far, limit = np.empty(n), np.empty(n), 0.0
     near = np.empty(most, np.int64)
     near_squares, alike, weight = np.empty(most), np.empty(most), np.empty(most)
     near_offset, values = np.empty((most, k)), np.empty((3, most), runs.values.dtype)
@@ -342,7 +356,7 @@ def _by_row(runs, point, mean, variance, distance):
             distance[i] += squares[i] / rows
             far[i] = squares[i] / runs.alike[row, i]
             least = min(least, runs.alike[row, i])
-        _nearest(far, most, scratch, near)
+        limit = _nearest(far, most, limit, near)
         _offsets(runs.charted[row], point[row], runs.width, near, near_offset)
         for at in range(most):
             i = near[at]

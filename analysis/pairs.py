@@ -52,9 +52,14 @@ _FOLLOWED, _EDGE = 2, 0.03
 about there, and how near to that end. A weak amplifier alone was best at a ratio of 0.17; with
 damped teeth, placed at 0.3 and hidden at 0.52, it went from 65 to 258 in two steps, and alone."""
 
-_BESIDE, _AT_ONCE, _BESIDE_CLOSER = 24, 6, 8
-"""How many are looked at beside what is known, how many before the purse is asked again, and how
-many of all of them closer: of 28 true pairs none was placed farther back than twelfth."""
+_BESIDE, _AT_ONCE = 24, 6
+"""How many are looked at beside what is known, and how many before the purse is asked again: of 28
+true pairs none was placed farther back than twelfth."""
+
+_CLOSER, _MOST_CLOSER, _AS_GOOD = 6, 14, 40.0
+"""How many of them are looked at closer at least, and at most of those that are no farther behind
+the best: twenty runs rank by chance. Damped teeth with a soft shaft stood twelfth, 33 behind, and
+led by 39 with forty runs more."""
 
 _STRANGER = 60.0
 """Log-likelihood behind the leading pair within which others are also looked at beside the causes
@@ -193,7 +198,10 @@ def _look_beside_all(rough: Hunt, additions: Additions, kept: Starts) -> set[Eff
                 look_beside(rough, now)
         looked_at += some
     rough.spared |= bool(worth)
-    closer = rough.among(looked_at)[:_BESIDE_CLOSER]
+    ranked_now = rough.among(looked_at)
+    least = rough.found[ranked_now[0]].best.log_likelihood - _AS_GOOD
+    as_good = [key for key in ranked_now if rough.found[key].best.log_likelihood > least]
+    closer = ranked_now[: max(_CLOSER, min(len(as_good), _MOST_CLOSER))]
     look_closer_beside(rough, closer)
     rough.hear()
     return set(closer)

@@ -218,7 +218,7 @@ def _look_at_all(
         if doubted or not is_doubtful(fine.best, rng):
             break
     if missing and not (doubted or fine.purse.is_spent or is_hardly_missing(fine, rng)):
-        look_for_second(rough, fine, atlas)
+        look_for_second(rough, fine, atlas, rng)
     return missing, doubted
 
 

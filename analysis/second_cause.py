@@ -2,24 +2,27 @@
 
 Owns which others are tried beside such a leader, and how closely. A cause may look like the
 measurement, predict it, and still not be all: what is left beside it is then told by runs of
-both, made where the leader is, and by nothing that was seen before. It passes no verdict
-(`analysis.verdict` says what a second cause must bring).
+both, made where the leader is, and by nothing that was seen before. What a second cause must
+bring is said by `analysis.verdict`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from analysis.atlas import Atlas
 from analysis.beside import place_beside
 from analysis.candidate import Candidate, Effects
 from analysis.causes import Hypothesis
 from analysis.chart import Chart
-from analysis.contest import CLOSE, catch_up, settle
+from analysis.contest import catch_up, settle
 from analysis.hunt import Hunt
 from analysis.pairs import at_few_frequencies, look_at_felt, look_beside, look_closer_beside
 from analysis.parts import earns
 from analysis.screening import Additions, add_causes, near, ranked, screen_felt, screen_singles
+from analysis.verdict import earns_its_name
 
 __all__ = ["look_for_second"]
 
@@ -31,16 +34,22 @@ _BEHIND = 20.0
 """Log-likelihood on few rows behind the leader from which none goes on: few runs rank them by
 chance, and true ones lay 1 behind."""
 
-_ON_ALL, _ALL_GROUPS, _NEARLY = 4, 4, 15.0
-"""How many are simulated on all rows, in how many groups, and the log-likelihood behind the leader
-within which they get as many again: true ones led by 7 to 40 with the first of these runs."""
+_ON_ALL, _ALL_GROUPS, _NEARLY, _BEHIND_BEST = 4, 4, 15.0, 30.0
+"""How many are simulated on all rows, in how many groups, and the log-likelihoods behind the leader
+and behind the best of them within which they get as many again: true ones led by 7 to 86 with the
+first of these runs, and were 11 behind the best at most."""
 
-_CALLED_FOR, _ROUNDS = 15.0, 2
-"""By so much must one then lead to be left in the contest, and in how many rounds of runs it and
-the leader then are: of false ones the best led by 15 to 24 with 80 runs, true ones by 38 to 50."""
+_CALLED_FOR = 15.0
+"""By so much must one then lead to be left in the contest: of false ones the best led by 15 to 24
+with 80 runs, true ones by 38 to 50."""
+
+_ROUNDS = 2
+"""Rounds of runs of the best of them and of the leader after which it is asked whether it brings
+more than chance does. True ones were among the best two by then, and the others get as many runs
+only where one does: behind a cause that is alone all do about as well, and none does."""
 
 
-def look_for_second(rough: Hunt, fine: Hunt, atlas: Atlas) -> None:
+def look_for_second(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator) -> None:
     """See whether a second cause hides behind a single one that is not doubted.
 
     Parameters
@@ -49,6 +58,8 @@ def look_for_second(rough: Hunt, fine: Hunt, atlas: Atlas) -> None:
         Hunts on few and on all rows; the second one's leader is what others are tried beside.
     atlas
         On the rows of `rough`.
+    rng
+        For the reading's noise in runs that are taken as observed.
 
     Raises
     ------
@@ -64,16 +75,39 @@ def look_for_second(rough: Hunt, fine: Hunt, atlas: Atlas) -> None:
     if not beside and not others or fine.purse.is_spent:
         return
     fine.take_over([rough.found[key] for key in (*beside, *others)], _ALL_GROUPS)
-    settle(fine, [key for key, lead in _leads(fine, beside, leader).items() if lead > -_NEARLY])
+    leads = _leads(fine, beside, leader)
+    least = max(-_NEARLY, max(leads.values(), default=0.0) - _BEHIND_BEST)
+    settle(fine, [key for key, lead in leads.items() if lead > least])
     catch_up(fine, others, leader)
     leads = _leads(fine, beside, leader)
     # They would only take the place of rivals among those that are judged.
     fine.leave_out([key for key, lead in leads.items() if lead < _CALLED_FOR])
+    _contest(fine, leader, rng)
+
+
+def _contest(fine: Hunt, leader: Effects, rng: np.random.Generator) -> None:
+    """Keep sets with a second cause if one brings more than chance does, with as many runs."""
     for _ in range(_ROUNDS):
-        if fine.best.hypothesis.effects == leader or fine.purse.is_spent:
+        best = fine.best.hypothesis.effects
+        if best == leader or fine.purse.is_spent:
             break
-        settle(fine, [leader, *(key for key in fine.leading(_ON_ALL, CLOSE) if key != leader)])
+        settle(fine, [leader, best])
         fine.hear()
+    further = {key for key in fine.found if set(key) > set(leader)}
+    while (best := fine.best.hypothesis.effects) in further:
+        if _leads(fine, [best], leader)[best] < _CALLED_FOR:
+            break
+        # Few runs fit by chance.
+        catch_up(fine, [best], leader)
+        if fine.best.hypothesis.effects != best:
+            continue
+        if earns_its_name(fine.best, fine.found[leader], rng.spawn(1)[0]):
+            catch_up(fine, further, best)
+            return
+        further.remove(best)
+        fine.leave_out([best])
+    if best in (leader, *further):
+        fine.leave_out(further)
 
 
 def _leads(fine: Hunt, keys: Sequence[Effects], leader: Effects) -> dict[Effects, float]:

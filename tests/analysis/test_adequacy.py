@@ -80,11 +80,21 @@ def test_where_every_run_did_alone_what_it_did_nothing_speaks_against_the_observ
 
 
 @pytest.mark.parametrize(
-    ("ahead", "share", "beyond"),
-    # By chance -3 to 1 in this world, -1 in the mean, with a standard deviation of sqrt(2).
-    [(0.0, 0.4, 1.0 / np.sqrt(2.0)), (1.0, 0.2, np.sqrt(2.0)), (6.0, 0.0, 7.0 / np.sqrt(2.0))],
+    ("ahead", "mean", "share", "beyond"),
+    # By chance two less to two more than a mean in this world, a standard deviation of sqrt(2).
+    [
+        (0.0, -1.0, 0.4, 1.0 / np.sqrt(2.0)),
+        (1.0, -1.0, 0.2, np.sqrt(2.0)),
+        (6.0, -1.0, 0.0, 7.0 / np.sqrt(2.0)),
+        (6.0, 4.0, 0.2, np.sqrt(2.0)),
+        # Losing by more says no more.
+        (6.0, -1.5, 0.0, 6.0 / np.sqrt(2.0) + 1.0),
+        (6.0, -99.0, 0.0, 6.0 / np.sqrt(2.0) + 1.0),
+    ],
 )
-def test_a_gain_is_held_against_what_own_runs_bring_by_chance(monkeypatch, ahead, share, beyond):
+def test_a_gain_is_held_against_what_own_runs_bring_by_chance(
+    monkeypatch, ahead, mean, share, beyond
+):
     def standing(likelihood):
         best = SimpleNamespace(log_likelihood=likelihood, place=None)
         climbs = SimpleNamespace(climb=lambda place, tries: best)
@@ -96,7 +106,7 @@ def test_a_gain_is_held_against_what_own_runs_bring_by_chance(monkeypatch, ahead
         seen = standing(50.0 + gain)
         return SimpleNamespace(seen_by=lambda _: seen, alone=standing(50.0), place=None)
 
-    runs = [run(gain) for gain in (-3.0, -2.0, -1.0, 0.0, 1.0)]
+    runs = [run(gain) for gain in mean + np.arange(-2.0, 3.0)]
     monkeypatch.setattr(adequacy, "own_runs", lambda *_: iter(runs))
     assert adequacy.judge_gain(simpler, alleged, None) == pytest.approx((share, beyond))
     assert adequacy.judge_chance(simpler, alleged, None) == pytest.approx(share)

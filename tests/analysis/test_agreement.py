@@ -145,16 +145,30 @@ def test_the_nearest_are_those_that_sorting_finds(most):
     rng = np.random.default_rng(most)
     for _ in range(20):
         far = rng.integers(0, 15, 40).astype(float)
+        for guess in (0.0, 1e-9, far.max(), 1e9, rng.uniform(0.0, 15.0)):
+            near = np.full(most, -1)
+            limit = nearest(far, most, guess, near)
+            assert len(set(near.tolist())) == most
+            assert np.sort(far[near]) == pytest.approx(np.sort(far)[:most])
+            # Nothing that was left out lies within it, but for what is as far as the last.
+            last = far[near].max()
+            assert last <= limit
+            assert not np.any((far > last) & (far <= limit))
+
+
+@pytest.mark.parametrize("far", [np.zeros(9), np.full(9, 7.0), np.array([1e-300, 1e300, 2.0, 2.0])])
+def test_the_nearest_are_found_among_what_no_limit_parts(far):
+    for most in range(1, len(far) + 1):
         near = np.full(most, -1)
-        nearest(far, most, near)
+        nearest(far, most, 0.0, near)
         assert len(set(near.tolist())) == most
-        assert np.sort(far[near]) == pytest.approx(np.sort(far)[:most])
+        assert np.sort(far[near]).tolist() == np.sort(far)[:most].tolist()
 
 
 @njit
-def nearest(far, most, near):
+def nearest(far, most, guess, near):
     """Calls what only compiled code can call."""
-    agreement._nearest(far, most, np.empty(len(far)), near)
+    return agreement._nearest(far, most, guess, near)
 
 
 def looked_at(surface, place, leaning):

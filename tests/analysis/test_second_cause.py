@@ -11,17 +11,18 @@ from analysis.causes import Hypothesis
 from analysis.screening import Place
 
 ADSS = synthetic.ADSS
+RNG = np.random.default_rng(0)
 
 
 class Beside:
     """A hunt that takes over what it is given, and whose leader is who is likeliest.
 
-    Its purse is spent after so many looks.
+    Its purse is spent after so many looks; more runs fit better by so much.
     """
 
-    def __init__(self, leader, looks=99):
+    def __init__(self, leader, looks=99, gains=None):
         self.found, self.settled = {leader.hypothesis.effects: leader}, []
-        self.looks = looks
+        self.looks, self.gains = looks, gains or {}
 
     @property
     def purse(self):
@@ -39,6 +40,9 @@ class Beside:
 
     def settle(self, chosen, groups):
         self.settled.append(chosen)
+        for key in chosen:
+            self.found[key].population = range(len(self.found[key].population) + 10 * groups)
+            self.found[key].best.log_likelihood += self.gains.get(key, 0.0)
 
     def hear(self):
         pass
@@ -152,31 +156,39 @@ def test_a_payload_is_held_against_two_causes_at_the_load_that_it_may_stand_for(
     monkeypatch.setattr(second_cause, "_worth", lambda *_: [])
     monkeypatch.setattr(second_cause, "screen_felt", lambda additions: additions.felt)
     monkeypatch.setattr(second_cause, "look_at_felt", look)
-    second_cause.look_for_second(rough, fine, {key: None})
+    second_cause.look_for_second(rough, fine, {key: None}, RNG)
     assert looked == ([pair] if looked_at else [])
     assert list(fine.found) == ([key, pair] if taken_over else [key])
     assert fine.settled == ([[key, pair]] * 2 if taken_over else [])
 
 
 LEADER, PAIR = ("load-inertia",), ("amplifier-lag", "load-inertia")
+OTHER = ("load-inertia", "shaft-damping")
 
 
-def looked_behind(monkeypatch, ahead, looks=99):
-    """The hunt on all rows after one pair was worth it, so far ahead of its leader."""
+def looked_behind(monkeypatch, ahead, looks=99, *, earning=(PAIR, OTHER), gains=None):
+    """The hunt on all rows after pairs were worth it, so far ahead of their leader."""
     found = {
         key: SimpleNamespace(
             hypothesis=Hypothesis(ADSS, key),
             population=range(40),
             best=SimpleNamespace(place=None, log_likelihood=likelihood),
         )
-        for key, likelihood in ((LEADER, 100.0), (PAIR, 100.0 + ahead))
+        for key, likelihood in ((LEADER, 100.0), *((k, 100.0 + a) for k, a in ahead.items()))
     }
-    fine = Beside(found[LEADER], looks)
+    fine = Beside(found[LEADER], looks, gains or {})
     rough = SimpleNamespace(unit=ADSS, observation=SimpleNamespace(frequency_hz=None), found=found)
     monkeypatch.setattr(second_cause, "add_causes", lambda *_: None)
-    monkeypatch.setattr(second_cause, "_worth", lambda *_: [PAIR])
+    monkeypatch.setattr(second_cause, "_worth", lambda *_: list(ahead))
     monkeypatch.setattr(second_cause, "_stood_for", lambda *_: [])
-    second_cause.look_for_second(rough, fine, {LEADER: None})
+
+    def asked(whole, part, _):
+        assert part.hypothesis.effects == LEADER
+        assert len(whole.population) >= len(part.population)
+        return whole.hypothesis.effects in earning
+
+    monkeypatch.setattr(second_cause, "earns_its_name", asked)
+    second_cause.look_for_second(rough, fine, {LEADER: None}, RNG)
     return fine
 
 
@@ -192,9 +204,34 @@ def looked_behind(monkeypatch, ahead, looks=99):
 def test_who_takes_the_lead_behind_a_cause_gets_more_runs_and_the_cause_as_many(
     monkeypatch, ahead, hopeful, more, stays
 ):
-    fine = looked_behind(monkeypatch, ahead)
+    fine = looked_behind(monkeypatch, {PAIR: ahead})
     assert fine.settled == [[PAIR]] * hopeful + [[LEADER, PAIR]] * more
     assert (PAIR in fine.found) == stays
+
+
+def test_who_brings_no_more_than_chance_behind_a_cause_is_left_out(monkeypatch):
+    ahead = {PAIR: 60.0, OTHER: 55.0, ("load-inertia", "x"): 52.0, ("load-inertia", "y"): 51.0}
+    fine = looked_behind(monkeypatch, ahead, earning=(("load-inertia", "x"),))
+    # The next is asked with as many runs; who is behind one that earns its name may be a rival.
+    both = [[LEADER, PAIR]] * 2
+    assert fine.settled[1:] == [*both, [OTHER], [("load-inertia", "x")], [("load-inertia", "y")]]
+    assert list(fine.found) == [LEADER, ("load-inertia", "x"), ("load-inertia", "y")]
+    fine = looked_behind(monkeypatch, ahead, earning=())
+    assert list(fine.found) == [LEADER]
+
+
+def test_a_further_cause_that_leads_by_less_is_not_asked(monkeypatch):
+    """It would be left out before, but the leader gets runs meanwhile."""
+    fine = looked_behind(monkeypatch, {PAIR: 60.0, OTHER: 55.0}, earning=(), gains={LEADER: 21.0})
+    assert fine.settled == [[PAIR, OTHER], [LEADER, PAIR], [LEADER, PAIR]]
+    assert list(fine.found) == [LEADER]
+
+
+def test_who_brings_more_is_compared_with_others_that_have_as_many_runs(monkeypatch):
+    """Those far behind the best get no more than the first."""
+    fine = looked_behind(monkeypatch, {PAIR: 60.0, OTHER: 35.0, ("load-inertia", "x"): 29.0})
+    assert fine.settled == [[PAIR, OTHER], [LEADER, PAIR], [LEADER, PAIR], [OTHER], [OTHER]]
+    assert [len(one.population) for one in fine.found.values()] == [120, 160, 160, 40]
 
 
 @pytest.mark.parametrize(
@@ -202,7 +239,7 @@ def test_who_takes_the_lead_behind_a_cause_gets_more_runs_and_the_cause_as_many(
 )
 def test_what_may_be_simulated_ends_where_it_is_spent(monkeypatch, looks, taken_over, settled):
     """Before anything comes to all rows, or after that with those runs alone."""
-    fine = looked_behind(monkeypatch, 16.0, looks)
+    fine = looked_behind(monkeypatch, {PAIR: 16.0}, looks)
     assert (PAIR in fine.found) == taken_over
     assert len(fine.settled) == settled
 
@@ -211,4 +248,4 @@ def test_nothing_is_looked_for_behind_a_pair_or_behind_nothing():
     for effects in ((), ("amplifier-lag", "load-inertia")):
         leader = SimpleNamespace(hypothesis=Hypothesis(ADSS, effects), best=None)
         # Neither hunt would bear being asked for anything else.
-        second_cause.look_for_second(None, SimpleNamespace(best=leader), {})
+        second_cause.look_for_second(None, SimpleNamespace(best=leader), {}, RNG)
