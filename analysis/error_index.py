@@ -50,6 +50,9 @@ def error_index(
     arf_std = np.hypot(arf_s_std_hz, arf_e_std_hz)
     rf_std = np.hypot(rf_s_std_hz, rf_e_std_hz)
     value = _index(arf_misfit, rf_misfit)
+    if not (np.any(arf_std) or np.any(rf_std)):
+        # Nothing to spread: a diagnosis asks for the index alone, of thousands of runs.
+        return ErrorIndex(value, np.zeros(np.shape(value)))
     spread = _index(
         arf_misfit[..., None, None] + arf_std[..., None, None] * _NODES[:, None],
         rf_misfit[..., None, None] + rf_std[..., None, None] * _NODES,

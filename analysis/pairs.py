@@ -58,8 +58,8 @@ true pairs none was placed farther back than twelfth."""
 
 _CLOSER, _MOST_CLOSER, _AS_GOOD = 6, 14, 40.0
 """How many of them are looked at closer at least, and at most of those that are no farther behind
-the best: twenty runs rank by chance. Damped teeth with a soft shaft stood twelfth, 33 behind, and
-led by 39 with forty runs more."""
+the best: twenty runs rank by chance. Damped teeth with a soft shaft stood thirteenth, 33 behind,
+and led by 39 with forty runs more."""
 
 _STRANGER = 60.0
 """Log-likelihood behind the leading pair within which others are also looked at beside the causes

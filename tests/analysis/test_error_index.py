@@ -62,3 +62,12 @@ def test_arrays_broadcast_and_an_unknown_error_stays_unknown():
     assert got.value_hz.shape == got.std_hz.shape == (3,)
     assert np.isnan(got.std_hz).tolist() == [False, True, False]
     assert error_index(ratios, 80.0, 40.0, 75.0).std_hz.shape == (3,)
+
+
+def test_the_index_alone_of_very_many_runs_has_no_error_and_takes_no_room():
+    """Spread over 24 nodes each way it would take gigabytes, and did take most of a diagnosis."""
+    arf_hz = np.linspace(120.0, 130.0, 1_000_000)
+    index = error_index(arf_hz, 137.0, 125.0, 137.0)
+    assert index.value_hz == pytest.approx(2.0 * np.abs(arf_hz - 125.0))
+    assert index.std_hz.shape == arf_hz.shape
+    assert not index.std_hz.any()

@@ -39,7 +39,7 @@ def test_three_causes_are_found_together(runs, seed):
     assert verdict.best.candidate.best.place == pytest.approx([0.4, 0.8, 0.3, 0.7], abs=0.15)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.study)])
 def test_a_search_that_has_spent_all_is_left_with_a_leader_that_explains_nothing(
     runs, monkeypatch, seed
 ):
