@@ -167,6 +167,7 @@ def practice_cache(tmp_path_factory):
     return tmp_path_factory.mktemp("practice-atlas")
 
 
+@pytest.mark.study
 def test_a_sweep_with_an_offset_is_diagnosed_together_with_what_it_follows(cache, monkeypatch):
     """A cable of 900 N.m/rad at one level: each sweep alone is short, and leans or does not."""
     asked = {"cable-stiffness", "load-inertia", "shaft-stiffness"}
