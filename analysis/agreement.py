@@ -278,6 +278,7 @@ def _count(far, limit):
 
 @part(fastmath=_ANY_ORDER)
 def _farthest(far):
+    """The largest of them."""
     most = far[0]
     for i in range(len(far)):
         most = max(most, far[i])

@@ -198,10 +198,10 @@ def _look_beside_all(rough: Hunt, additions: Additions, kept: Starts) -> set[Eff
                 look_beside(rough, now)
         looked_at += some
     rough.spared |= bool(worth)
-    ranked_now = rough.among(looked_at)
-    least = rough.found[ranked_now[0]].best.log_likelihood - _AS_GOOD
-    as_good = [key for key in ranked_now if rough.found[key].best.log_likelihood > least]
-    closer = ranked_now[: max(_CLOSER, min(len(as_good), _MOST_CLOSER))]
+    leading = rough.among(looked_at)[:_MOST_CLOSER]
+    least = rough.found[leading[0]].best.log_likelihood - _AS_GOOD
+    as_good = [key for key in leading if rough.found[key].best.log_likelihood > least]
+    closer = leading[: max(_CLOSER, len(as_good))]
     look_closer_beside(rough, closer)
     rough.hear()
     return set(closer)
