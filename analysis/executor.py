@@ -48,11 +48,12 @@ class LocalExecutor:
     Parameters
     ----------
     cores
-        How many to use; all that the process may run on if not given.
+        How many to use; all that the process may run on if not given. They are known afterwards
+        as `cores`.
     """
 
     def __init__(self, cores: int | None = None) -> None:
-        self._cores = cores or _cores()
+        self.cores = cores or _cores()
 
     def each(
         self,
@@ -61,7 +62,7 @@ class LocalExecutor:
         progress: Callable[[float], None] | None = None,
     ) -> list[R]:
         """See `Executor`."""
-        with ThreadPoolExecutor(self._cores) as pool:
+        with ThreadPoolExecutor(self.cores) as pool:
             # Each in a copy of the context, through which motion is counted.
             futures = [pool.submit(copy_context().run, work, task) for task in tasks]
             try:

@@ -1,13 +1,15 @@
-"""Families: machines that share their linear part, the tasks that every ensemble is made of.
+"""Families: machines that share their linear part, what every ensemble is made of.
 
 Owns what travels to a worker and what comes back: machines and plans, readings
-free of any bench's noise. It chooses no machines, keeps no runs and judges none.
+free of any bench's noise; and which families are a task together. It chooses no machines, keeps
+no runs and judges none.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,7 @@ from analysis.ensemble import Machine, safe_cycles
 from analysis.executor import Executor, LocalExecutor
 from analysis.observation import readings_of_cycles
 from daq.plan import SweepPlan
+from sim.stepping import shared_out
 from sim.unit import Unit
 
 __all__ = ["Family", "Readings", "read_families", "read_family"]
@@ -26,7 +29,7 @@ Readings = tuple[NDArray[np.complex128], NDArray[np.float64]]
 
 @dataclass(frozen=True, slots=True)
 class Family:
-    """Machines that share their linear part, and so fill the lanes of one call: a task.
+    """Machines that share their linear part, and so fill the lanes of one call.
 
     `rows` are where each plan's points stand among the rows of the readings.
     """
@@ -44,15 +47,8 @@ def read_family(family: Family) -> Readings:
     AnalysisError
         If a motion grew without bound even at the shortest step.
     """
-    servos = [machine.servo(family.unit) for machine in family.machines]
-    count = sum(len(rows) for _, rows in family.plans)
-    mean = np.empty((len(servos), count), dtype=complex)
-    variance = np.empty((len(servos), count))
-    for plan, rows in family.plans:
-        for i, cycles in enumerate(safe_cycles(servos, plan, workers=1)):
-            first = cycles[..., 1].reshape(len(rows), -1)
-            mean[i, rows], variance[i, rows] = readings_of_cycles(first)
-    return mean, variance
+    (readings,) = _read_together([family])
+    return readings
 
 
 def read_families(
@@ -64,14 +60,39 @@ def read_families(
 
     Parameters
     ----------
+    families
+        All of them go through the same plans.
     executor
         Where they are simulated; this machine's cores if not given.
     progress
-        Told the share done after each family.
+        Told the share done after each task.
 
     Raises
     ------
     AnalysisError
         If a motion grew without bound even at the shortest step.
     """
-    return (executor or LocalExecutor()).each(read_family, families, progress) if families else []
+    if not families:
+        return []
+    executor = executor or LocalExecutor()
+    if not isinstance(executor, LocalExecutor):
+        return executor.each(read_family, families, progress)
+    levels = max(len(plan.levels_vpk) for plan, _ in families[0].plans)
+    lanes = levels * max(len(one.machines) for one in families)
+    lots = shared_out(families, executor.cores, lanes)
+    return [one for lot in executor.each(_read_together, lots, progress) for one in lot]
+
+
+def _read_together(families: Sequence[Family]) -> list[Readings]:
+    """Take families that go through the same plans there side by side, on one core."""
+    servos = [[m.servo(one.unit) for m in one.machines] for one in families]
+    plans = families[0].plans
+    count = sum(len(rows) for _, rows in plans)
+    mean = np.empty((sum(map(len, servos)), count), dtype=complex)
+    variance = np.empty(mean.shape)
+    for plan, rows in plans:
+        for i, cycles in enumerate(safe_cycles(list(chain(*servos)), plan, workers=1)):
+            first = cycles[..., 1].reshape(len(rows), -1)
+            mean[i, rows], variance[i, rows] = readings_of_cycles(first)
+    ends = np.cumsum([len(some) for some in servos])[:-1]
+    return list(zip(np.split(mean, ends), np.split(variance, ends), strict=True))

@@ -18,17 +18,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from daq.errors import AnalysisError
 from sim.assembly import PiecewiseLinearSystem
-from sim.kernel import MOST_VECTORS, step_cycles
-from sim.layout import SUMS, Layout, Structure
+from sim.layout import STEPS_SEEN, Layout, Structure
 from sim.propagator import Modes, Propagator, build_propagator, find_modes
-from sim.solving import kinds_of, law_coefficients, order_of
+from sim.solving import kinds_of, law_coefficients, law_parameters, order_of
+from sim.stepping import Asking, Steps, step_together
 
 __all__ = ["HARMONICS", "LONGEST_STEP_S", "Motion", "Stretch", "advance", "carry"]
 
@@ -112,7 +112,7 @@ def advance(
     """
     moving = _Moving(system, find_modes(system), single)
     for stretch in stretches:
-        motion = _dwell(moving, parameters, state, stretch, longest_step_s)
+        (motion,) = step_together([_dwell(moving, parameters, state, stretch, longest_step_s)])
         state = motion.state
         yield motion
 
@@ -125,8 +125,11 @@ def carry(
     steps_s: Sequence[float],
     single: bool = False,
     done: Callable[[], None] = lambda: None,
-) -> list[Motion]:
+) -> Asking[list[Motion]]:
     """Carry trajectories through stretches, at shorter steps where they grow without bound.
+
+    It asks for what is to be stepped and goes on with what came of it; `step_together` of
+    `sim.stepping` sees to that, for several systems side by side.
 
     Parameters
     ----------
@@ -137,37 +140,42 @@ def carry(
     done
         Called after each stretch.
 
+    Returns
+    -------
+    list of Motion
+        One for each stretch.
+
     Raises
     ------
     AnalysisError
         If a motion grew without bound, at the last of the steps.
     """
     longest, *shorter = steps_s
+    moving = _Moving(system, find_modes(system), single)
     motions: list[Motion] = []
     grew = 0
     while len(motions) < len(stretches):
         begin = motions[-1].state if motions else state
         if grew > _SELDOM * len(stretches):
             rest = stretches[len(motions) :]
-            return motions + carry(system, parameters, begin, rest, shorter, single, done)
-        for motion in advance(
-            system, parameters, begin, stretches[len(motions) :], longest, single
-        ):
-            if not np.all(np.isfinite(motion.coefficients)):
-                if not shorter:
-                    raise AnalysisError(
-                        f"the simulated motion at {stretches[len(motions)].frequency_hz:g} Hz grew "
-                        "without bound; check the parameters, or take a shorter step"
-                    )
-                back = max(len(motions) - 1, 0)
-                begin = motions[back - 1].state if back else state
-                again = stretches[back : len(motions) + 1]
-                motions[back:] = carry(system, parameters, begin, again, shorter, single)
-                grew += 1
-                done()
-                break
+            again = carry(system, parameters, begin, rest, shorter, single, done)
+            return motions + (yield from again)
+        stretch = stretches[len(motions)]
+        motion = yield from _dwell(moving, parameters, begin, stretch, longest)
+        if np.all(np.isfinite(motion.coefficients)):
             motions.append(motion)
-            done()
+        elif shorter:
+            back = max(len(motions) - 1, 0)
+            begin = motions[back - 1].state if back else state
+            some = stretches[back : len(motions) + 1]
+            motions[back:] = yield from carry(system, parameters, begin, some, shorter, single)
+            grew += 1
+        else:
+            raise AnalysisError(
+                f"the simulated motion at {stretch.frequency_hz:g} Hz grew "
+                "without bound; check the parameters, or take a shorter step"
+            )
+        done()
     return motions
 
 
@@ -213,7 +221,8 @@ def _dwell(
     state: NDArray[np.float64],
     stretch: Stretch,
     longest_step_s: float,
-) -> Motion:
+) -> Asking[Motion]:
+    """What comes of one stretch; asks for its steps."""
     system, modes = moving.system, moving.modes
     propagator = build_propagator(system, modes, stretch.frequency_hz, longest_step_s)
     drift = propagator.drift[:, None] + propagator.offset_drift[:, None] * stretch.offset
@@ -222,35 +231,47 @@ def _dwell(
     # Im(Y exp(i theta)) = Re(Y) sin(theta) + Im(Y) cos(theta), plus a constant.
     through = _times(moving.rows, forced) + moving.through * phasor
     waves = np.stack([through.real, through.imag, moving.through * stretch.offset], axis=1)
-    values = {
-        "q": _times(modes.weights, state - forced.imag),
-        "seen": _times(moving.rows, state) + moving.through * (phasor.imag + stretch.offset),
-        "force": np.zeros((len(moving.kinds), state.shape[1])),
-        "drift": drift,
-        "waves": waves.reshape(-1, state.shape[1]),
-        "parameters": parameters.reshape(-1, state.shape[1]),
-    }
-    layout, coefficients = _program(moving, propagator, bool(drift.any() or stretch.offset.any()))
-    sums, peak = _step(layout, coefficients, values, propagator.steps_per_cycle, stretch)
+    gain = moving.look @ propagator.push
+    layout, coefficients = _program(
+        moving, propagator, gain, bool(drift.any() or stretch.offset.any())
+    )
+    stepped = yield Steps(
+        layout,
+        coefficients,
+        {
+            "q": _times(modes.weights, state - forced.imag),
+            "seen": _times(moving.rows, state) + moving.through * (phasor.imag + stretch.offset),
+            "force": np.zeros((len(moving.kinds), state.shape[1])),
+            "drift": drift,
+            "waves": waves.reshape(-1, state.shape[1]),
+            "parameters": law_parameters(moving.kinds, parameters, gain),
+        },
+        propagator.steps_per_cycle,
+        stretch.settle_cycles,
+        stretch.integrate_cycles,
+    )
     turn = np.exp(-1j * np.outer(np.arange(HARMONICS), stretch.phase))
     turn[0] = 1.0
     # The last forces push the coordinates in the step that is not made any more.
-    end = values["q"] + _times(propagator.push, values["force"])
+    end = stepped.q + _times(propagator.push, stepped.force)
     # The kernel counts the phase from the start of the stretch; results count
     # it from the drive.
     return Motion(
-        _coefficients(sums, propagator.steps_per_cycle) * turn,
-        peak,
+        _coefficients(stepped.sums, propagator.steps_per_cycle) * turn,
+        stepped.peak,
         _times(modes.shapes, end) + forced.imag,
         propagator.step_s,
     )
 
 
 def _program(
-    moving: _Moving, propagator: Propagator, steady: bool
+    moving: _Moving, propagator: Propagator, gain: NDArray[np.float64], steady: bool
 ) -> tuple[Layout, NDArray[np.float64]]:
-    """What steps a system at one drive frequency, and with which numbers."""
-    laws, gain = moving.system.nonlinearities, moving.look @ propagator.push
+    """What steps a system at one drive frequency, and with which numbers.
+
+    `gain` (m + 1, m): what laws and output see of forces at the end of a step.
+    """
+    laws = moving.system.nonlinearities
     fixed = [(law.stiffness, law.damping / propagator.step_s) for law in laws]
     structure = Structure(
         kinds=moving.kinds,
@@ -272,53 +293,6 @@ def _program(
     return Layout(structure), np.concatenate([part.ravel() for part in parts])
 
 
-def _step(
-    layout: Layout,
-    coefficients: NDArray[np.float64],
-    values: dict[str, NDArray[np.float64]],
-    steps: int,
-    stretch: Stretch,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Sums (cycles, 7, lanes) and largest magnitude (lanes,) of the output over a stretch.
-
-    `values`: the rows of the lanes by name; they are overwritten by how they end.
-    """
-    count, rows = stretch.amplitude.size, layout.lanes
-    sums, peak = np.empty((stretch.integrate_cycles, SUMS, count)), np.empty(count)
-    for of in _calls(count, layout.width):
-        lanes = layout.blank(rows["peak"].stop, of.size)
-        for name, known in values.items():
-            lanes[rows[name]] = known[:, of]
-        sums[..., of] = step_cycles(
-            layout, coefficients, lanes, _waves(steps), stretch.settle_cycles,
-            stretch.integrate_cycles,
-        )  # fmt: skip
-        # Lanes that are repeated end alike, and are written twice.
-        peak[of] = lanes[rows["peak"][0]]
-        for name in ("q", "force"):
-            values[name][:, of] = lanes[rows[name]]
-    return sums, peak
-
-
-def _calls(count: int, width: int) -> Iterator[NDArray[np.intp]]:
-    """Lanes of each call: four vectors of them, and what is left in two and one.
-
-    A vector that is not full repeats a lane: idle lanes of zeros would run into denormals.
-    """
-    at, vectors = 0, -(-count // width)
-    while vectors:
-        taken = min(MOST_VECTORS, 1 << (vectors.bit_length() - 1))
-        yield np.resize(np.arange(at, min(at + taken * width, count)), taken * width)
-        at, vectors = at + taken * width, vectors - taken
-
-
-@lru_cache(maxsize=256)
-def _waves(steps: int) -> NDArray[np.float64]:
-    """(steps, 6): cosine and sine of harmonics 1 to 3 over a cycle."""
-    angle = 2.0 * np.pi * np.arange(steps) / steps
-    return np.stack([wave(k * angle) for k in (1, 2, 3) for wave in (np.cos, np.sin)], axis=1)
-
-
 def _times(matrix: NDArray[np.float64], columns: NDArray) -> NDArray:
     """Product in one order of additions; BLAS would choose it by the number of columns."""
     total = np.zeros((len(matrix), columns.shape[1]), dtype=columns.dtype)
@@ -329,6 +303,6 @@ def _times(matrix: NDArray[np.float64], columns: NDArray) -> NDArray:
 
 def _coefficients(sums: NDArray[np.float64], steps: int) -> NDArray[np.complex128]:
     """Sums over a cycle to amplitudes C_k with V = Im(C_k exp(i k theta)), C_0 the mean."""
-    cosine, sine = sums[:, 1::2], sums[:, 2::2]
-    harmonics = (2.0 / steps) * (sine + 1j * cosine)
-    return np.concatenate([sums[:, :1] / steps + 0j, harmonics], axis=1)
+    cosine, sine, seen = sums[:, 1::2], sums[:, 2::2], steps // STEPS_SEEN
+    harmonics = (2.0 / seen) * (sine + 1j * cosine)
+    return np.concatenate([sums[:, :1] / seen + 0j, harmonics], axis=1)

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from sim import laws
 from sim.assembly import Law
 from sim.lanes import VECTOR_BYTES, Code, Lanes, greatest
-from sim.layout import PAIR, STRIBECK, SUMS, Layout, Structure
+from sim.layout import PAIR, STEPS_SEEN, STRIBECK, SUMS, Layout, Structure
 from sim.machine_code import architecture, compiled, multiplies_and_adds
 
 __all__ = ["MOST_VECTORS", "Program", "step_cycles"]
@@ -56,25 +56,26 @@ def step_cycles(
     layout
         Where what stands; every array has its precision.
     coefficients
-        (places,).
+        (systems, places), one row for each of the systems that lanes belong to.
     lanes
         (rows, lanes), 1, 2 or 4 vectors of them, made by `Layout.blank`; overwritten by how
-        they end.
+        they end. Every system has as many vectors, its own side by side.
     waves
-        (steps, 6): cosine and sine of harmonics 1 to 3 over a cycle.
+        (steps, 6): cosine and sine of harmonics 1 to 3 over a cycle, a multiple of
+        `sim.layout.STEPS_SEEN` of them.
 
     Returns
     -------
     ndarray
         (cycles, 7, lanes): the sum, then the products of the output with each
-        column of `waves` summed over each kept cycle.
+        column of `waves`, over those steps of each kept cycle at whose end it is looked at.
     """
     steps, count = len(waves), lanes.shape[1]
     table = layout.blank(steps, _WAVES)
     table[:, : waves.shape[1]] = waves
     sums = layout.blank(kept_cycles, SUMS, count)
     own = np.ascontiguousarray(coefficients, dtype=layout.dtype)
-    _program(layout.structure, count // layout.width)(
+    _program(layout.structure, count // layout.width, len(own))(
         own.ctypes.data, lanes.ctypes.data, table.ctypes.data, steps, settle_cycles, kept_cycles,
         sums.ctypes.data,
     )  # fmt: skip
@@ -82,24 +83,26 @@ def step_cycles(
 
 
 @cache
-def _program(structure: Structure, vectors: int) -> Any:
+def _program(structure: Structure, vectors: int, systems: int) -> Any:
     can = multiplies_and_adds(), architecture()
     return compiled(
-        f"{structure} {vectors} {can}",
+        f"{structure} {vectors} {systems} {can}",
         [
             Path(__file__).with_name(file)
             for file in ("kernel.py", "layout.py", "laws.py", "lanes.py")
         ],
-        lambda: Program(Layout(structure), vectors, *can).text(),
+        lambda: Program(Layout(structure), vectors, systems, *can).text(),
     )
 
 
 class Program:
-    """Writes the program of one structure."""
+    """Writes the program of one structure, for some systems that have as many vectors each."""
 
-    def __init__(self, layout: Layout, vectors: int, fused: bool, architecture: str) -> None:
+    def __init__(
+        self, layout: Layout, vectors: int, systems: int, fused: bool, architecture: str
+    ) -> None:
         self._layout, self._structure = layout, layout.structure
-        self._all = range(vectors)
+        self._all, self._of_each = range(vectors), vectors // systems
         self._module = ir.Module()
         scalar = ir.FloatType() if layout.structure.single else ir.DoubleType()
         pointer = scalar.as_pointer()
@@ -129,18 +132,28 @@ class Program:
         return str(self._module)
 
     def _cycle(self, *, kept: bool) -> None:
-        with self._times(self._steps) as step:
-            following = self._emit.add(step, _INT(1))
-            wraps = self._emit.icmp_signed("<", following, self._steps)
-            at = self._emit.mul(self._emit.select(wraps, following, _INT(0)), _INT(_WAVES))
-            rows = self._layout.m + kept
-            free = self._turn(at, rows)
-            with self._times(self._emit.load(self._sweeps)):
-                self._solve(free)
-            self._emit.store(_INT(1), self._sweeps)
-            seen = self._see(free)
-            if kept:
-                self._accumulate(at, seen[-1])
+        """All steps of a cycle; one in `STEPS_SEEN` is looked at if it is kept."""
+        if not kept:
+            with self._times(self._steps) as step:
+                self._step(step, seen=False)
+            return
+        with self._times(self._emit.sdiv(self._steps, _INT(STEPS_SEEN))) as share:
+            first = self._emit.mul(share, _INT(STEPS_SEEN))
+            with self._times(_INT(STEPS_SEEN - 1)) as step:
+                self._step(self._emit.add(first, step), seen=False)
+            self._step(self._emit.add(first, _INT(STEPS_SEEN - 1)), seen=True)
+
+    def _step(self, step: Any, *, seen: bool) -> None:
+        following = self._emit.add(step, _INT(1))
+        wraps = self._emit.icmp_signed("<", following, self._steps)
+        at = self._emit.mul(self._emit.select(wraps, following, _INT(0)), _INT(_WAVES))
+        free = self._turn(at, self._layout.m + seen)
+        with self._times(self._emit.load(self._sweeps)):
+            self._solve(free)
+        self._emit.store(_INT(1), self._sweeps)
+        there = self._see(free)
+        if seen:
+            self._accumulate(at, there[-1])
 
     def _turn(self, at: Any, rows: int) -> list[Lanes]:
         """Coordinates go one step on; what laws and output would see at its end without any force.
@@ -213,16 +226,16 @@ class Program:
         kind, m = self._structure.kinds[j], self._layout.m
         y0 = self._load("seen", j, self._all)
         a, b, c = (lambda i=i: self._load("parameters", 3 * j + i, self._all) for i in range(3))
-        fixed = [self._all_of("law", 5 * j + i) for i in range(5)]
+        fixed = [self._all_of("law", 7 * j + i) for i in range(7)]
         if kind == Law.PLAY:
-            return [laws.play_force(y0, ahead[0], a(), laws.PlayOverStep(*fixed)).lanes()]
+            return [laws.play_force(y0, ahead[0], a(), b(), laws.PlayOverStep(*fixed))]
         beta, per_beta = fixed[:2]
         if kind == Law.FRICTION:
-            return [laws.friction_force(y0, ahead[0], a(), beta, per_beta)]
+            return [laws.friction_force(y0, ahead[0], a(), b(), per_beta)]
         if kind == STRIBECK:
             w = ((beta * last[j] + ahead[0] + y0) * 0.5).lanes()
             most = laws.peaked_friction(w, a(), b(), c())
-            return [laws.friction_force(y0, ahead[0], most, beta, per_beta)]
+            return [laws.friction_force(y0, ahead[0], most, (beta * most).lanes(), per_beta)]
         if kind == Law.EXCESS:
             centre = b()
             return [laws.excess_force(y0 - centre, ahead[0] - centre, a())]
@@ -317,9 +330,10 @@ class Program:
 
     def _take(self, name: str, i: int, vectors: Sequence[int]) -> Lanes:
         """A coefficient in all lanes of some vectors."""
-        place = _INT(self._layout.coefficients[name][i])
+        first, places = self._layout.coefficients[name][i], self._layout.places
         # Asked for anew by every vector: it costs nothing, where a register to keep it does.
-        loads = [self._emit.load(self._emit.gep(self._coefficients, [place])) for _ in vectors]
+        found = [_INT(v // self._of_each * places + first) for v in vectors]
+        loads = [self._emit.load(self._emit.gep(self._coefficients, [one])) for one in found]
         return Lanes(self._code, [self._code.everywhere(one) for one in loads])
 
     def _all_of(self, name: str, i: int) -> Lanes:

@@ -50,6 +50,8 @@ class Code:
         three, one = [self.vector] * 3, [self.vector]
         self._fma = ir.Function(module, ir.FunctionType(self.vector, three), f"llvm.fma.{kind}")
         self._fabs = ir.Function(module, ir.FunctionType(self.vector, one), f"llvm.fabs.{kind}")
+        kind_of_two = ir.FunctionType(self.vector, [self.vector] * 2)
+        self._copysign = ir.Function(module, kind_of_two, f"llvm.copysign.{kind}")
         self._fused = fused
 
     def multiply_add(self, a: Any, b: Any, c: Any) -> Any:
@@ -61,6 +63,17 @@ class Code:
     def magnitude(self, a: Any) -> Any:
         """One vector |a|."""
         return self.builder.call(self._fabs, [a])
+
+    def signed_as(self, a: Any, b: Any) -> Any:
+        """One vector |a| with the signs of b."""
+        return self.builder.call(self._copysign, [a, b])
+
+    def signed_by(self, a: Any, b: Any) -> Any:
+        """One vector a with its signs turned where b has a minus sign."""
+        emit, bits = self.builder, ir.VectorType(ir.IntType(8 * self.bytes), self.width)
+        minus = ir.Constant(bits, [1 << (8 * self.bytes - 1)] * self.width)
+        sign = emit.and_(emit.bitcast(b, bits), minus)
+        return emit.bitcast(emit.xor(emit.bitcast(a, bits), sign), self.vector)
 
     def everywhere(self, scalar: Any) -> Any:
         """A vector that holds one number throughout."""
@@ -189,6 +202,20 @@ class Lanes:
         """Where it is zero."""
         return self._compare("==", 0.0)
 
+    def equals(self, other: Number) -> Choice:
+        """Where it is another number to the last bit."""
+        return self._compare("==", other)
+
+    def signed_as(self, other: Lanes) -> Lanes:
+        """Its magnitude with the sign of another; a sign is a bit, and zero has one."""
+        pairs = zip(self.vectors, other.vectors, strict=True)
+        return Lanes(self.code, [self.code.signed_as(one, two) for one, two in pairs])
+
+    def signed_by(self, other: Lanes) -> Lanes:
+        """Itself where another has no minus sign, and its negative where that has one."""
+        pairs = zip(self.vectors, other.vectors, strict=True)
+        return Lanes(self.code, [self.code.signed_by(one, two) for one, two in pairs])
+
     def _compare(self, how: str, other: Number) -> Choice:
         emit = self.code.builder.fcmp_ordered
         pairs = zip(self.vectors, self.like(other).vectors, strict=True)
@@ -276,6 +303,6 @@ def greatest(one: Lanes, other: Number) -> Lanes:
     return (one > second).choose(one, second)
 
 
-def within(one: Lanes | Product, limit: Lanes) -> Lanes:
+def between(one: Lanes | Product, low: Lanes, high: Lanes) -> Lanes:
     """The number, or the limit that it is beyond."""
-    return least(greatest(one.lanes(), -limit), limit)
+    return least(greatest(one.lanes(), low), high)

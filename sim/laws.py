@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sim.lanes import Lanes, greatest, least, within
+from sim.lanes import Lanes, between, greatest, least
 
 __all__ = [
     "PlayOverStep",
@@ -31,72 +31,73 @@ _CORRECTIONS = 2
 """How often a play's share of the step is corrected; each leaves about 3 % of the error."""
 
 _TINY = 1e-30
+"""Stands for zero in what is divided by."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlayOverStep:
-    """What a play does over a step of one length: k, c/h, and what follows from its beta.
+    """What a play does over a step of one length h, in its stiffness k, its damping c and its beta.
 
-    `half`, `damp`: k beta / 2 and (c/h) beta; `inverse`: 1 / (1 - half - damp).
+    `half_k`, `per_step`: k/2 and c/h. With half = k beta / 2 and damp = (c/h) beta: `within` is
+    half - damp, `outside` half + damp, `beyond` one less, and `inverse` its inverse with the
+    other sign.
     """
 
-    k: Lanes
-    c: Lanes
+    half_k: Lanes
+    per_step: Lanes
     half: Lanes
-    damp: Lanes
+    within: Lanes
+    outside: Lanes
+    beyond: Lanes
     inverse: Lanes
 
 
-def play_force(y0: Lanes, ahead: Lanes, d: Lanes, play: PlayOverStep) -> Lanes:
+def play_force(y0: Lanes, ahead: Lanes, d: Lanes, low: Lanes, play: PlayOverStep) -> Lanes:
     """Mean of k clip(y, -d, d) over the step, and the damper c taken out while inside the play.
 
     With e = y - clip(y) the mean of clip is (clip0 + clip1)/2 + q (e0 + e1)/2, where q is
-    the share of the step spent inside; q depends on y1, weakly.
+    the share of the step spent inside; q depends on y1, weakly. `low` is -d.
     """
-    half, damp, inverse = play.half, play.damp, play.inverse
-    c0 = within(y0, d)
+    c0 = between(y0, low, d)
     e0 = y0 - c0
-    known = (half - damp) * c0 + ahead
-    guess = e0.is_zero().choose(known * inverse, (half + damp) * c0 + known)
+    known = play.within * c0 + ahead
+    guess = e0.is_zero().choose(known * play.inverse, play.outside * c0 + known)
     moved = guess - y0
-    per_moved = 1.0 / (abs(moved) > _TINY).choose(moved, 1.0)
-    q = ((within(guess, d) - c0) * per_moved).lanes()
+    per_moved = 1.0 / moved.is_zero().choose(1.0, moved)
+    q = ((between(guess, low, d) - c0) * per_moved).lanes()
     c1, e1 = c0, e0
     for _ in range(_CORRECTIONS):
-        share = (half * q).lanes()
+        share = (play.half * q).lanes()
         pulled = share * e0 + known
-        inside = (pulled * inverse).lanes()
-        c1 = within(inside, d)
+        inside = (pulled * play.inverse).lanes()
+        c1 = between(inside, low, d)
         # (1 - share) e1 = pulled + ..., by the series of 1/(1 - share): share is 0.1 at most.
         series = share * (share * (share + 1.0) + 1.0) + 1.0
-        outside = ((half + damp - 1.0) * c1 + pulled) * series
-        e1 = (abs(inside) > d).choose(outside, 0.0)
+        outside = (play.beyond * c1 + pulled) * series
+        e1 = c1.equals(inside).choose(0.0, outside)
         # One Newton step carries the reciprocal over to the corrected motion.
         moved = c1 + e1 - y0
         per_moved = (per_moved * (2.0 - moved * per_moved)).lanes()
         q = least(greatest(((c1 - c0) * per_moved).lanes(), 0.0), 1.0)
-    mean = (q * (e0 + e1) + (c0 + c1)) * 0.5
-    return play.k * mean + play.c * (c1 - c0)
+    spring = play.half_k * (q * (e0 + e1) + (c0 + c1))
+    return play.per_step * (c1 - c0) + spring.lanes()
 
 
-def friction_force(w0: Lanes, ahead: Lanes, most: Lanes, beta: Lanes, per_beta: Lanes) -> Lanes:
+def friction_force(w0: Lanes, ahead: Lanes, most: Lanes, holds: Lanes, per_beta: Lanes) -> Lanes:
     """Force that opposes the motion w with `most`, stops it dead, or turns with it.
 
     Where w passes zero inside the step, either what drives it is below
     break-away and it stops there, or friction turns at the crossing and the
-    force is its mean. `per_beta` is 1/beta.
+    force is its mean. `holds` is beta times `most`, `per_beta` is -1/beta.
     """
     start = w0.is_zero().choose(ahead, w0)
-    sign = (start > 0.0).choose(1.0, -1.0)
-    holds = (beta * most).lanes()
-    slid = sign * ahead - holds
+    sliding = most.signed_as(-start)
+    slid = ahead.signed_by(start) - holds
     before = abs(w0)
     share = before / (before - least(slid, -_TINY))
-    sliding = (most * sign).lanes()
-    turned = sliding * (1.0 - 2.0 * share)
-    stopped = -ahead * per_beta
-    crossing = (abs(ahead - w0) <= holds).choose(stopped, turned)
-    return (slid >= 0.0).choose(-sliding, crossing)
+    turned = sliding * (2.0 * share - 1.0)
+    crossing = (abs(ahead - w0) <= holds).choose(ahead * per_beta, turned)
+    return (slid >= 0.0).choose(sliding, crossing)
 
 
 def peaked_friction(w: Lanes, T: Lanes, T_s: Lanes, w_s: Lanes) -> Lanes:
@@ -112,9 +113,9 @@ def peaked_friction(w: Lanes, T: Lanes, T_s: Lanes, w_s: Lanes) -> Lanes:
 
 def excess_force(y0: Lanes, y1: Lanes, limit: Lanes) -> Lanes:
     """Mean of clip(y, -limit, limit) - y over the step; y itself does not feel it."""
-    c0, c1 = within(y0, limit), within(y1, limit)
+    c0, c1 = between(y0, -limit, limit), between(y1, -limit, limit)
     moved = y1 - y0
-    q = (c1 - c0) / (abs(moved) > _TINY).choose(moved, 1.0)
+    q = (c1 - c0) / moved.is_zero().choose(1.0, moved)
     return ((1.0 - q) * (y0 - c0 + y1 - c1) * -0.5).lanes()
 
 

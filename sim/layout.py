@@ -13,13 +13,16 @@ from numpy.typing import NDArray
 
 from sim.lanes import VECTOR_BYTES
 
-__all__ = ["PAIR", "STRIBECK", "SUMS", "Layout", "Structure"]
+__all__ = ["PAIR", "STEPS_SEEN", "STRIBECK", "SUMS", "Layout", "Structure"]
 
 STRIBECK = 4
 """Kind of a friction that peaks at rest; the other kinds are those of `sim.assembly.Law`."""
 
 PAIR = 5
 """Kind of a hardening spring that is solved together with the law after it, another such spring."""
+
+STEPS_SEEN = 4
+"""The output is looked at after so many steps each time; what passed its filter moves slowly."""
 
 SUMS = 7
 """Sums kept of every cycle; the largest magnitude of the output is kept over all."""
@@ -55,8 +58,8 @@ class Layout:
 
     Of coefficients, which all lanes share: `carry` (p, 2 or p), `push` (p, m), `look`
     (m + 1, p), `gain` (m + 1, m): see `sim.propagator.Propagator`; look and gain are what
-    each law and, last, the output see of the coordinates and of the forces. `law` (m, 5): of a
-    play k, c/h and what `sim.laws.PlayOverStep` holds of beta, of others beta and its inverse.
+    each law and, last, the output see of the coordinates and of the forces. `law` (m, 7): of a
+    play what `sim.laws.PlayOverStep` holds, of others beta and -1/beta.
     """
 
     structure: Structure
@@ -83,7 +86,12 @@ class Layout:
         """Places of what all share."""
         m, p = self.m, self.p
         across = 2 if self.structure.turning else p
-        return _rows(carry=p * across, push=p * m, look=(m + 1) * p, gain=(m + 1) * m, law=5 * m)
+        return _rows(carry=p * across, push=p * m, look=(m + 1) * p, gain=(m + 1) * m, law=7 * m)
+
+    @property
+    def places(self) -> int:
+        """How many numbers all lanes of a system share."""
+        return self.coefficients["law"].stop
 
     @property
     def dtype(self) -> type[np.floating]:

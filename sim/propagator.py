@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm, matrix_balance
 
 from sim.assembly import PiecewiseLinearSystem
+from sim.layout import STEPS_SEEN
 
 __all__ = ["FEWEST_STEPS", "Modes", "Propagator", "build_propagator", "find_modes"]
 
@@ -110,8 +111,9 @@ def _unmoded(balanced: NDArray[np.float64], scale: NDArray[np.float64]) -> Modes
 def build_propagator(
     system: PiecewiseLinearSystem, modes: Modes, frequency_hz: float, longest_step_s: float
 ) -> Propagator:
-    """Propagator with a whole number of steps in each drive cycle."""
-    steps = max(int(np.ceil(1.0 / (frequency_hz * longest_step_s) - 1e-9)), FEWEST_STEPS)
+    """Propagator with a whole number of steps in each drive cycle, a multiple of `STEPS_SEEN`."""
+    fewest = np.ceil(1.0 / (frequency_hz * longest_step_s) - 1e-9)
+    steps = max(STEPS_SEEN * int(np.ceil(fewest / STEPS_SEEN)), FEWEST_STEPS)
     h = 1.0 / (frequency_hz * steps)
     inlets = [law.inlet for law in system.nonlinearities]
     forcings = modes.weights @ np.array([*inlets, system.f, system.b]).T

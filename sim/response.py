@@ -26,6 +26,7 @@ from sim.effects import EffectSetting, drivetrain_with
 from sim.effort import spend
 from sim.engine import HARMONICS, LONGEST_STEP_S, Motion, Stretch, carry
 from sim.reading import PERIODIC_SCATTER, response_of_cycles, scatter_of_cycles
+from sim.stepping import Asking, shared_out, step_together
 from sim.unit import Unit
 
 __all__ = [
@@ -181,20 +182,18 @@ def simulate_cycles(
     groups = list(_groups(servos, levels, 1 if apart else workers))
     shares = _shares(plan, workers) if apart and len(groups) < workers else [slice(None)]
     points = np.asarray(plan.frequencies_hz)
+    steps_s = longest_step_s, *shorter_steps_s
 
-    def sweep(task: tuple[Sequence[int], slice]) -> tuple[NDArray[np.complex128], float]:
+    def swept(task: tuple[Sequence[int], slice]) -> Asking[tuple[NDArray[np.complex128], float]]:
         group, share = [servos[i] for i in task[0]], task[1]
         part = replace(plan, frequencies_hz=tuple(points[share].tolist()))
-        steps = longest_step_s, *shorter_steps_s
-        # What grows at every step may have begun further back than it was gone through again from.
-        for at in range(len(shorter_steps_s)):
-            with suppress(AnalysisError):
-                return _sweep(group, part, steps[at:], single, point_done)
-        return _sweep(group, part, steps[-1:], single, point_done)
+        return _sweep_at_last(group, part, steps_s, single, point_done)
 
     tasks = [(group, share) for group in groups for share in shares]
     with ThreadPoolExecutor(workers) as pool:
-        done = list(pool.map(sweep, tasks))
+        lots = shared_out(tasks, workers, levels * max(map(len, groups)), single)
+        parts = pool.map(lambda lot: step_together([swept(task) for task in lot]), lots)
+        done = [one for part in parts for one in part]
     spend(len(servos) * plan.duration_s, sum(steps for _, steps in done) * longest_step_s)
     shape = (levels, len(points), plan.integrate_cycles, HARMONICS)
     results = [np.empty(shape, dtype=complex) for _ in servos]
@@ -260,9 +259,9 @@ class SteppedServo:
             integrate_cycles,
         )  # fmt: skip
         system = self._servo.system
-        (motion,) = carry(
-            system, _parameters([self._servo], 1), self._state, [stretch], [self._longest_step_s]
-        )
+        parameters = _parameters([self._servo], 1)
+        carried = carry(system, parameters, self._state, [stretch], [self._longest_step_s])
+        ((motion,),) = step_together([carried])
         self._state = motion.state
         return DwellRecord(
             source_cycles=np.full(integrate_cycles, source_vpk, dtype=complex),
@@ -272,13 +271,30 @@ class SteppedServo:
         )
 
 
+def _sweep_at_last(
+    servos: Sequence[Servo],
+    plan: SweepPlan,
+    steps_s: Sequence[float],
+    single: bool,
+    point_done: Callable[[], None],
+) -> Asking[tuple[NDArray[np.complex128], float]]:
+    """The same as `_sweep`, anew at the next of the steps where that fails.
+
+    What grows at every step may have begun further back than it was gone through again from.
+    """
+    for at in range(len(steps_s) - 1):
+        with suppress(AnalysisError):
+            return (yield from _sweep(servos, plan, steps_s[at:], single, point_done))
+    return (yield from _sweep(servos, plan, steps_s[-1:], single, point_done))
+
+
 def _sweep(
     servos: Sequence[Servo],
     plan: SweepPlan,
     steps_s: Sequence[float],
     single: bool,
     point_done: Callable[[], None],
-) -> tuple[NDArray[np.complex128], float]:
+) -> Asking[tuple[NDArray[np.complex128], float]]:
     """(servos, levels, points, cycles, 4) of servos that share their linear part.
 
     And how many steps of a plain unit take as long as theirs.
@@ -297,10 +313,12 @@ def _sweep(
     system = servos[0].system
     parameters, start = _parameters(servos, len(levels)), _start(servos, len(levels))
 
-    def carried(some: Sequence[Stretch]) -> list[Motion]:
+    def carried(some: Sequence[Stretch]) -> Asking[list[Motion]]:
         return carry(system, parameters, start, some, steps_s, single, point_done)
 
-    motions = [carried([s])[0] for s in stretches] if plan.from_rest else carried(stretches)
+    motions: list[Motion] = []
+    for some in [[s] for s in stretches] if plan.from_rest else [stretches]:
+        motions += yield from carried(some)
     steps = sum(s.duration_s / m.step_s for s, m in zip(stretches, motions, strict=True))
     steps *= _worth(system) * len(amplitude)
     kept = np.array([motion.coefficients / amplitude for motion in motions])

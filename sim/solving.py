@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sim.assembly import Law, Nonlinearity
 from sim.layout import PAIR, STRIBECK
 
-__all__ = ["kinds_of", "law_coefficients", "order_of"]
+__all__ = ["kinds_of", "law_coefficients", "law_parameters", "order_of"]
 
 _HARDENING_SWEEPS = 3
 """Passes where a hardening shaft and a play push one tiny inertia; the shaft goes once more."""
@@ -25,7 +25,7 @@ _MOST_PASSES = 8
 _LOOSE = 1e-4
 """Share of its motion that a law may take over from another before that counts."""
 
-_OF_A_LAW = 5
+_OF_A_LAW = 7
 
 
 def kinds_of(laws: Sequence[Nonlinearity]) -> tuple[int, ...]:
@@ -102,13 +102,31 @@ def _hardly_feel(j: int, k: int, kinds: Sequence[int], gain: NDArray[np.float64]
 def law_coefficients(
     kinds: Sequence[int], gain: NDArray[np.float64], fixed: Sequence[tuple[float, float]]
 ) -> NDArray[np.float64]:
-    """(m, 5) what solving each law takes besides its parameters, see `sim.layout.Layout`."""
+    """(m, 7) what solving each law takes besides its parameters, see `sim.layout.Layout`."""
     found = np.zeros((len(kinds), _OF_A_LAW))
     for j, (kind, (k, c)) in enumerate(zip(kinds, fixed, strict=True)):
         beta = gain[j, j]
         if kind == Law.PLAY:
             half, damp = 0.5 * k * beta, c * beta
-            found[j] = k, c, half, damp, 1.0 / (1.0 - half - damp)
+            away = half + damp
+            found[j] = 0.5 * k, c, half, half - damp, away, away - 1.0, 1.0 / (1.0 - away)
         else:
-            found[j, :2] = beta, 1.0 / beta if beta else 0.0
+            found[j, :2] = beta, -1.0 / beta if beta else 0.0
     return found
+
+
+def law_parameters(
+    kinds: Sequence[int], parameters: NDArray[np.float64], gain: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(3 m, lanes) parameters, and in free places what follows from them and does not change.
+
+    `parameters` (m, 3, lanes). Of a play its lower end, of a friction by how much it can slow the
+    motion down within a step.
+    """
+    found = parameters.copy()
+    for j, kind in enumerate(kinds):
+        if kind == Law.PLAY:
+            found[j, 1] = -found[j, 0]
+        elif kind == Law.FRICTION:
+            found[j, 1] = gain[j, j] * found[j, 0]
+    return found.reshape(3 * len(kinds), found.shape[-1])

@@ -31,6 +31,7 @@ from yardsticks.matrices import Matrices, matrices  # noqa: E402
 from yardsticks.page import machine, replace_block  # noqa: E402
 
 from sim.effects import drivetrain_with, parse_effect  # noqa: E402
+from sim.layout import STEPS_SEEN  # noqa: E402
 
 LEVEL = 2.5
 TARGET = 0.02, 0.2
@@ -208,14 +209,14 @@ def print_table(rows: list[tuple[str, Method, int, int]], periodic: list[Case], 
 
 def share() -> str:
     """What part of the arithmetic limit the kernel reaches."""
-    tally = operations.count_step(operations.SERVO)
+    tally = operations.count_steps(operations.SERVO)
     total = sum(tally.values())
     limit = operations.peak_flops()
     one = case(ADSS, 0.25, 0.0, 125.0, 20)
     step_s = 1.0 / (125.0 * np.ceil(1.0 / (125.0 * 5e-6)))
-    each = step_s / speed(engine(64, 5e-6), one, 20, 15)
+    each = STEPS_SEEN * step_s / speed(engine(64, 5e-6), one, 20, 15)
     return (
-        f"One step of one lane: {total} operations ("
+        f"{STEPS_SEEN} steps of one lane: {total} operations ("
         + ", ".join(f"{count} {kind}" for kind, count in tally.most_common())
         + f")\n  {1e9 * each:.1f} ns, {1e-9 * total / each:.0f} billion a second: "
         f"{100 * total / each / limit:.0f} % of the {1e-9 * limit:.0f} billion that multiply-adds "

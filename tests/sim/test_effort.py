@@ -39,15 +39,14 @@ def test_motion_of_a_hardening_shaft_is_worth_more_of_a_plain_units():
 def test_motion_that_needs_shorter_steps_is_worth_more(monkeypatch):
     """At 125 Hz the first step will not do: that and the one before take twice as long."""
     plan = SweepPlan((100.0, 110.0, 125.0), (1.5,), settle_cycles=2, integrate_cycles=3)
-    plain = engine.advance
+    plain = engine._dwell
 
-    def growing(system, parameters, state, stretches, step_s, single):
-        motions = plain(system, parameters, state, stretches, step_s, single)
-        for stretch, motion in zip(stretches, motions, strict=True):
-            grows = stretch.frequency_hz == 125.0 and step_s > 5e-6
-            yield replace(motion, coefficients=motion.coefficients * (np.nan if grows else 1.0))
+    def growing(moving, parameters, state, stretch, step_s):
+        motion = yield from plain(moving, parameters, state, stretch, step_s)
+        grows = stretch.frequency_hz == 125.0 and step_s > 5e-6
+        return replace(motion, coefficients=motion.coefficients * (np.nan if grows else 1.0))
 
-    monkeypatch.setattr(engine, "advance", growing)
+    monkeypatch.setattr(engine, "_dwell", growing)
     servos = [Servo.of(load_unit("adss"), 0.5)] * 2
     with counting() as effort:
         simulate_cycles(servos, plan, longest_step_s=1e-5, shorter_steps_s=(5e-6,))

@@ -10,6 +10,7 @@ from daq.errors import AnalysisError
 from sim import engine
 from sim.effects import drivetrain_with, parse_effect
 from sim.engine import Stretch, advance, carry
+from sim.stepping import step_together
 
 LONG, SHORT, SHORTEST = 1e-5, 5e-6, 2.5e-6
 FREQUENCIES = (70.0, 72.0, 74.0, 76.0, 78.0, 80.0, 82.0, 84.0, 86.0, 88.0, 90.0)
@@ -26,23 +27,26 @@ def machine(hardening):
     return system, law_parameters(system, 2), np.zeros((len(system.states), 2))
 
 
+def carried(*how):
+    (motions,) = step_together([carry(*how)])
+    return motions
+
+
 def taken(monkeypatch, steps, grows):
     """What is stepped how long, and told done, where `grows(frequency, step)` grows."""
-    plain, seen, told = engine.advance, [], []
+    plain, seen, told = engine._dwell, [], []
 
-    def watched(system, parameters, state, some, step, single):
-        for stretch, motion in zip(
-            some, plain(system, parameters, state, some, step, single), strict=True
-        ):
-            seen.append((stretch.frequency_hz, step))
-            if grows(stretch.frequency_hz, step):
-                motion = replace(motion, coefficients=motion.coefficients * np.nan)
-            yield motion
+    def watched(moving, parameters, state, stretch, step):
+        motion = yield from plain(moving, parameters, state, stretch, step)
+        seen.append((stretch.frequency_hz, step))
+        if grows(stretch.frequency_hz, step):
+            motion = replace(motion, coefficients=motion.coefficients * np.nan)
+        return motion
 
-    monkeypatch.setattr(engine, "advance", watched)
+    monkeypatch.setattr(engine, "_dwell", watched)
     system, parameters, state = machine(1e4)
     done = lambda: told.append(len(seen))  # noqa: E731
-    motions = carry(system, parameters, state, stretches(), steps, True, done)
+    motions = carried(system, parameters, state, stretches(), steps, True, done)
     assert len(told) == len(motions) == len(FREQUENCIES)
     return seen, motions
 
@@ -94,6 +98,6 @@ def test_a_shaft_that_hardens_beyond_the_step_is_carried_through(seed):
     start[system.states.index("th_L")] = 1e-5 * np.random.default_rng(seed).standard_normal(2)
     driven = stretches(4.0, (40.0, 60.0, 80.0))
     with pytest.raises(AnalysisError, match="without bound"):
-        carry(system, parameters, start, driven, [LONG], True)
-    motions = carry(system, parameters, start, driven, [LONG, SHORT, SHORTEST / 2], True)
+        carried(system, parameters, start, driven, [LONG], True)
+    motions = carried(system, parameters, start, driven, [LONG, SHORT, SHORTEST / 2], True)
     assert all(np.all(np.isfinite(motion.coefficients)) for motion in motions)

@@ -6,7 +6,7 @@ from permutation import permutation_p
 from side_by_side import ADSS, EDSS, FRICTIONLESS, departure, drive, engine_gain
 
 from daq.plan import SweepPlan
-from sim import engine, propagator
+from sim import propagator, stepping
 from sim.catalogue import CATALOGUE
 from sim.drivetrain import paper_drivetrain
 from sim.effects import EffectSetting, drivetrain_with, parse_effect
@@ -81,13 +81,13 @@ def test_what_dies_away_ends_at_zero_and_not_among_numbers_that_take_long(monkey
     system = drivetrain_with(ADSS, 0.4, [parse_effect("amplifier-lag:tau_a=0.0005")]).system()
     ends = []
 
-    def kept(layout, coefficients, values, *rest):
-        found = step(layout, coefficients, values, *rest)
-        ends.append(values["q"].copy())
+    def kept(layout, coefficients, lanes, *rest):
+        found = step(layout, coefficients, lanes, *rest)
+        ends.append(lanes[layout.lanes["q"]].copy())
         return found
 
-    step = engine._step
-    monkeypatch.setattr(engine, "_step", kept)
+    step = stepping.step_cycles
+    monkeypatch.setattr(stepping, "step_cycles", kept)
     # 0.2 s are 400 times the lag; the smallest number of full digits is left behind after 90.
     drive(system, np.zeros((len(system.states), 16)), 100.0, 20, 2.5, step_s=STEP_S, single=True)
     (q,) = ends

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from llvmlite import ir
 
 from sim import machine_code
-from sim.lanes import VECTOR_BYTES, Code, Lanes, greatest, least, within
+from sim.lanes import VECTOR_BYTES, Code, Lanes, between, greatest, least
 from sim.laws import peaked_friction
 
 ALIVE = []
@@ -94,8 +94,23 @@ def test_choices_and_bounds_are_numpys(single):
     for ours, numpys in ((least, np.minimum), (greatest, np.maximum)):
         found = computed(ours, [A, B], single)
         assert np.array_equal(found, numpys(A, B).astype(found.dtype))
-    found = computed(lambda a, b: within(a, abs(b)), [A, B], single)
+    found = computed(lambda a, b: between(a, -abs(b), abs(b)), [A, B], single)
     assert np.array_equal(found, np.clip(A, -abs(B), abs(B)).astype(found.dtype))
+    found = computed(lambda a, b: a.equals(b).choose(1.0, 2.0), [A, B], single)
+    assert np.array_equal(found, np.where(A == B, 1.0, 2.0))
+
+
+@pytest.mark.parametrize("single", [False, True])
+def test_signs_are_numpys_down_to_those_of_zeros(single):
+    b = np.array([0.5, -4.0, -1.0, -1e-3, 0.0, -0.0, -3.0])
+    for ours, wanted in (
+        (Lanes.signed_as, np.copysign(A, b)),
+        (Lanes.signed_by, A * np.copysign(1.0, b)),
+        (lambda a, b: a.signed_as(-b), np.copysign(A, -b)),
+    ):
+        found = computed(ours, [A, b], single)
+        assert np.array_equal(found, wanted.astype(found.dtype))
+        assert np.array_equal(np.signbit(found), np.signbit(wanted))
 
 
 def test_a_product_and_what_is_added_to_it_are_rounded_once():

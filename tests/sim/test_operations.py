@@ -7,18 +7,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 from side_by_side import ADSS, EDSS, drive
-from yardsticks.operations import SERVO, count_step
+from yardsticks.operations import SERVO, count_steps
 
-from sim import engine
+from sim import stepping
 from sim.drivetrain import paper_drivetrain
+from sim.layout import STEPS_SEEN
 
 PAGE = Path(__file__).parents[2] / "docs" / "performance.md"
 
 
-def test_a_step_takes_as_many_operations_as_the_page_says():
-    tally = count_step(SERVO)
+def test_steps_take_as_many_operations_as_the_page_says():
+    tally = count_steps(SERVO)
     said = re.search(
-        r"(\d+) operations \((\d+) add or multiply, (\d+) compare, (\d+) divide\)",
+        rf"{STEPS_SEEN} steps of one lane: (\d+) operations "
+        r"\((\d+) add or multiply, (\d+) compare, (\d+) divide\)",
         PAGE.read_text(),
     )
     counted = [tally.total(), tally["add or multiply"], tally["compare"], tally["divide"]]
@@ -27,9 +29,9 @@ def test_a_step_takes_as_many_operations_as_the_page_says():
 
 @pytest.mark.parametrize("unit", [ADSS, EDSS], ids=["adss", "edss"])
 def test_what_is_counted_is_what_the_units_of_the_paper_take(unit, monkeypatch):
-    asked, step = [], engine.step_cycles
+    asked, step = [], stepping.step_cycles
     monkeypatch.setattr(
-        engine, "step_cycles", lambda layout, *more: asked.append(layout) or step(layout, *more)
+        stepping, "step_cycles", lambda layout, *more: asked.append(layout) or step(layout, *more)
     )
     system = paper_drivetrain(unit, 0.4).system()
     drive(system, np.zeros((len(system.states), 1)), 120.0, 1, 2.5)
@@ -38,8 +40,8 @@ def test_what_is_counted_is_what_the_units_of_the_paper_take(unit, monkeypatch):
 
 def test_two_more_coordinates_cost_what_a_pair_of_rows_does():
     more = replace(SERVO, turning=(True, *SERVO.turning), heard=(True, True, *SERVO.heard))
-    grown = count_step(more) - count_step(SERVO)
+    grown = count_steps(more) - count_steps(SERVO)
     assert set(grown) == {"add or multiply"}
     # Each row turns (a product, and one that is added), takes four forces, and is looked at by
-    # four laws and the output.
-    assert grown.total() == 2 * (1 + 2 + 4 * 2 + 5 * 2)
+    # four laws in every step, and by the output in one of them.
+    assert grown.total() == 2 * (STEPS_SEEN * (1 + 2 + 4 * 2 + 4 * 2) + 2)

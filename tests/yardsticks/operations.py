@@ -1,7 +1,7 @@
-"""How much arithmetic one step of one lane is, and how much this machine can do.
+"""How much arithmetic the steps of one lane are, and how much this machine can do.
 
 Owns the count of additions, multiplications, divisions and comparisons in the
-kernel's step, made by watching its program being written, and the measured
+kernel's steps, made by watching its program being written, and the measured
 limit of one core: fused multiply-adds on registers.
 """
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
@@ -16,7 +17,7 @@ from llvmlite import ir
 
 from sim.compiling import njit
 from sim.kernel import Program
-from sim.layout import Layout, Structure
+from sim.layout import STEPS_SEEN, Layout, Structure
 
 _KINDS = {"fadd": "add or multiply", "fsub": "add or multiply", "fmul": "add or multiply",
           "fdiv": "divide", "fcmp_ordered": "compare"}  # fmt: skip
@@ -36,8 +37,11 @@ SERVO = Structure(
 that only the output sees."""
 
 
-def count_step(structure: Structure) -> Counter[str]:
-    """Operations of one kept step of one lane, where the laws are solved once."""
+def count_steps(structure: Structure) -> Counter[str]:
+    """Operations of one lane from one look at the output to the next, `STEPS_SEEN` steps.
+
+    In a kept cycle, where the laws are solved once.
+    """
     tally: Counter[str] = Counter()
 
     class Counting(ir.IRBuilder):
@@ -53,18 +57,19 @@ def count_step(structure: Structure) -> Counter[str]:
     counts: list[Counter[str]] = []
 
     class Watched(Program):
-        """Notes what a kept cycle adds to the count."""
+        """Notes what each step adds to the count: of a settle cycle, then two of a kept one."""
 
-        def _cycle(self, *, kept: bool) -> None:
+        def _step(self, step: Any, *, seen: bool) -> None:
             before = tally.copy()
-            super()._cycle(kept=kept)
-            if kept:
-                counts.append(tally - before)
+            super()._step(step, seen=seen)
+            counts.append(tally - before)
 
     with patch.object(ir, "IRBuilder", Counting):
-        Watched(Layout(structure), 1, True, "")
-    (found,) = counts
-    return found
+        Watched(Layout(structure), 1, 1, True, "")
+    _, unseen, seen = counts
+    for _ in range(STEPS_SEEN - 1):
+        seen += unseen
+    return seen
 
 
 def _counted(plain, kind: str, tally: Counter[str]):
