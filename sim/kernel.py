@@ -119,57 +119,51 @@ class Program:
         # Aligns the stack with it: a vector that lies across two lines of the cache costs twice.
         self._sweeps.align = VECTOR_BYTES
         self._emit.store(_INT(_FIRST_SWEEPS), self._sweeps)
-        with self._code.without_denormals(architecture):
-            with self._times(settle):
-                self._cycle(kept=False)
-            with self._times(kept) as cycle:
-                self._cycle(kept=True)
-                self._hand_over(cycle)
+        cycles = self._emit.add(settle, kept)
+        with self._code.without_denormals(architecture), self._times(cycles) as cycle:
+            self._cycle(self._emit.sub(cycle, settle))
         self._emit.ret_void()
 
     def text(self) -> str:
         """The program in the compiler's own language."""
         return str(self._module)
 
-    def _cycle(self, *, kept: bool) -> None:
-        """All steps of a cycle; one in `STEPS_SEEN` is looked at if it is kept."""
-        if not kept:
-            with self._times(self._steps) as step:
-                self._step(step, seen=False)
-            return
+    def _cycle(self, number: Any) -> None:
+        """All steps of a cycle; the output is looked at if it is kept, one of number 0 or more."""
+        kept = self._emit.icmp_signed(">=", number, _INT(0))
         with self._times(self._emit.sdiv(self._steps, _INT(STEPS_SEEN))) as share:
             first = self._emit.mul(share, _INT(STEPS_SEEN))
-            with self._times(_INT(STEPS_SEEN - 1)) as step:
-                self._step(self._emit.add(first, step), seen=False)
-            self._step(self._emit.add(first, _INT(STEPS_SEEN - 1)), seen=True)
+            with self._times(_INT(STEPS_SEEN)) as step:
+                self._step(self._wave_at(self._emit.add(first, step)))
+            with self._emit.if_then(kept):
+                at = self._wave_at(self._emit.add(first, _INT(STEPS_SEEN - 1)))
+                self._accumulate(at, self._output(at))
+        with self._emit.if_then(kept):
+            self._hand_over(number)
 
-    def _step(self, step: Any, *, seen: bool) -> None:
+    def _wave_at(self, step: Any) -> Any:
+        """Where the waves at the end of a step stand."""
         following = self._emit.add(step, _INT(1))
         wraps = self._emit.icmp_signed("<", following, self._steps)
-        at = self._emit.mul(self._emit.select(wraps, following, _INT(0)), _INT(_WAVES))
-        free = self._turn(at, self._layout.m + seen)
+        return self._emit.mul(self._emit.select(wraps, following, _INT(0)), _INT(_WAVES))
+
+    def _step(self, at: Any) -> None:
+        free = self._turn(at)
         with self._times(self._emit.load(self._sweeps)):
             self._solve(free)
         self._emit.store(_INT(1), self._sweeps)
-        there = self._see(free)
-        if seen:
-            self._accumulate(at, there[-1])
+        self._see(free)
 
-    def _turn(self, at: Any, rows: int) -> list[Lanes]:
-        """Coordinates go one step on; what laws and output would see at its end without any force.
+    def _turn(self, at: Any) -> list[Lanes]:
+        """Coordinates go one step on; what laws would see at its end without any force.
 
         Vector by vector, as there is enough to do side by side within each.
         """
-        p, m, heard = self._layout.p, self._layout.m, self._structure.heard
-        cosine, sine = (self._wave(at, k, 1) for k in (0, 1))
-        free: list[list[Any]] = [[] for _ in range(rows)]
+        p, m = self._layout.p, self._layout.m
+        free: list[list[Any]] = [[] for _ in range(m)]
         for v in self._all:
             force = [self._load("force", j, [v]) for j in range(m)]
-            seen: list[Lanes] = []
-            for j in range(rows):
-                turning = self._load("waves", 3 * j, [v]) * sine
-                there = self._load("waves", 3 * j + 1, [v]) * cosine + turning.lanes()
-                seen.append(there + self._load("waves", 3 * j + 2, [v]) if self._steady else there)
+            seen = [self._driven(j, at, [v]) for j in range(m)]
             # Each feels where others were: what is new is written once all of these are read.
             before = {i: self._load("q", i, [v]) for i in range(p)} if self._whole else {}
             for first in range(0, p, 2):
@@ -183,12 +177,19 @@ class Program:
                         now = self._take("push", i * m + j, [v]) * force[j] + now.lanes()
                     new = now.lanes()
                     self._store("q", i, new, [v])
-                    for j in range(rows):
-                        if heard[i] or j == m:
+                    if self._structure.heard[i]:
+                        for j in range(m):
                             seen[j] = self._take("look", j * p + i, [v]) * new + seen[j]
-            for j in range(rows):
+            for j in range(m):
                 free[j] += seen[j].vectors
         return [Lanes(self._code, of) for of in free]
+
+    def _driven(self, j: int, at: Any, vectors: Sequence[int]) -> Lanes:
+        """What the drive alone makes law j, or the output, see."""
+        cosine, sine = (self._wave(at, k, len(vectors)) for k in (0, 1))
+        turning = self._load("waves", 3 * j, vectors) * sine
+        there = self._load("waves", 3 * j + 1, vectors) * cosine + turning.lanes()
+        return there + self._load("waves", 3 * j + 2, vectors) if self._steady else there
 
     def _carried(self, i: int, pair: range, before: dict[int, Lanes], v: int) -> Any:
         """Coordinate i a step later, by those that it feels and no force."""
@@ -250,14 +251,21 @@ class Program:
             laws.Coupling(*pair),
         )
 
-    def _see(self, free: list[Lanes]) -> list[Lanes]:
-        """What laws, and the output if asked for, see at the end of the step."""
+    def _see(self, free: list[Lanes]) -> None:
+        """What laws see at the end of the step."""
         m = self._layout.m
         force = [self._load("force", j, self._all) for j in range(m)]
         seen = [self._felt(j, there, force, range(m)) for j, there in enumerate(free)]
         for j, there in enumerate(seen):
             self._store("seen", j, there, self._all)
-        return seen
+
+    def _output(self, at: Any) -> Lanes:
+        """The output where the last step ended."""
+        p, m = self._layout.p, self._layout.m
+        seen = self._driven(m, at, self._all)
+        for i in range(p):
+            seen = self._all_of("look", m * p + i) * self._load("q", i, self._all) + seen
+        return self._felt(m, seen, [self._load("force", j, self._all) for j in range(m)], range(m))
 
     def _felt(self, j: int, free: Lanes, force: Sequence[Lanes], of: Sequence[int]) -> Lanes:
         """What law j, or the output, sees with some of the forces."""
