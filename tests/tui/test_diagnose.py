@@ -14,6 +14,7 @@ from analysis.swept import check_together
 from daq.configs import config_path
 from daq.errors import InputError, LashbenchError
 from daq.formats import read_response
+from sim.machine_code import code_folder
 from tui.cli import main
 
 PRACTICE = Path(__file__).parents[1] / "data" / "practice"
@@ -153,8 +154,13 @@ def test_a_large_effect_hidden_behind_the_simulated_analyser_is_found(
     tmp_path, monkeypatch, capsys
 ):
     monkeypatch.chdir(tmp_path)
+    compiled = code_folder()
+    compiled.mkdir(parents=True, exist_ok=True)
     for place in ("CACHE", "DATA"):
         monkeypatch.setenv(f"XDG_{place}_HOME", str(tmp_path))
+    # Nothing that was simulated is kept from before; what was compiled may be.
+    code_folder().parent.mkdir()
+    code_folder().symlink_to(compiled, target_is_directory=True)
     # A true cause is refused where a motion happens to be unlike its own runs: in one draw of 25
     # (4.7 standard deviations, four are allowed). Two in a row are one in six hundred.
     if diagnose_a_large_effect(capsys) == "unexplained":
