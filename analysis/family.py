@@ -79,8 +79,13 @@ def read_families(
         return executor.each(read_family, families, progress)
     levels = max(len(plan.levels_vpk) for plan, _ in families[0].plans)
     lanes = levels * max(len(one.machines) for one in families)
-    lots = shared_out(families, executor.cores, lanes)
-    return [one for lot in executor.each(_read_together, lots, progress) for one in lot]
+    kinds = [tuple(effect.id for effect in one.machines[0].effects) for one in families]
+    lots = shared_out(kinds, executor.cores, lanes)
+    tasks = [[families[i] for i in lot] for lot in lots]
+    found: dict[int, Readings] = {}
+    for lot, read in zip(lots, executor.each(_read_together, tasks, progress), strict=True):
+        found |= zip(lot, read, strict=True)
+    return [found[i] for i in range(len(families))]
 
 
 def _read_together(families: Sequence[Family]) -> list[Readings]:

@@ -184,15 +184,16 @@ def simulate_cycles(
     points = np.asarray(plan.frequencies_hz)
     steps_s = longest_step_s, *shorter_steps_s
 
-    def swept(task: tuple[Sequence[int], slice]) -> Asking[tuple[NDArray[np.complex128], float]]:
-        group, share = [servos[i] for i in task[0]], task[1]
+    def swept(number: int) -> Asking[tuple[NDArray[np.complex128], float]]:
+        group, share = tasks[number]
         part = replace(plan, frequencies_hz=tuple(points[share].tolist()))
-        return _sweep_at_last(group, part, steps_s, single, point_done)
+        return _sweep_at_last([servos[i] for i in group], part, steps_s, single, point_done)
 
     tasks = [(group, share) for group in groups for share in shares]
+    lots = shared_out([0] * len(tasks), workers, levels * max(map(len, groups)), single)
     with ThreadPoolExecutor(workers) as pool:
-        lots = shared_out(tasks, workers, levels * max(map(len, groups)), single)
-        parts = pool.map(lambda lot: step_together([swept(task) for task in lot]), lots)
+        parts = pool.map(lambda lot: step_together([swept(number) for number in lot]), lots)
+        # All are of one kind, and stay in order.
         done = [one for part in parts for one in part]
     spend(len(servos) * plan.duration_s, sum(steps for _, steps in done) * longest_step_s)
     shape = (levels, len(points), plan.integrate_cycles, HARMONICS)

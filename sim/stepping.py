@@ -8,7 +8,7 @@ that anybody gets depends on who else asked.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from itertools import pairwise
@@ -24,7 +24,6 @@ from sim.layout import SUMS, Layout
 __all__ = ["Asking", "Stepped", "Steps", "shared_out", "step_together"]
 
 T = TypeVar("T")
-S = TypeVar("S")
 
 _SHARED = (1, 2)
 """Vectors of a system that others may be stepped beside."""
@@ -105,19 +104,33 @@ def step_together(askers: Sequence[Asking[T]]) -> list[T]:
 
 
 def shared_out(
-    systems: Sequence[S], cores: int, lanes: int, single: bool = True
-) -> list[Sequence[S]]:
-    """Lots of systems to step together, of so many `lanes` each, evenly shared out among cores.
+    kinds: Sequence[Hashable], cores: int, lanes: int, single: bool = True
+) -> list[list[int]]:
+    """Lots of systems to step together, by their numbers, of so many `lanes` each.
 
-    Two of them take less than twice as long as one, but longer: where a core would have none they
-    are better apart.
+    Those of one kind are kept together, as one program may step them. Two take less than twice as
+    long as one, but longer: what is left after whole rounds is shared out among all cores.
     """
     vectors = -(-lanes // (VECTOR_BYTES // (4 if single else 8)))
     together = max(MOST_VECTORS // vectors, 1)
-    rounds = -(-len(systems) // (together * cores))
-    count = min(rounds * cores, len(systems))
-    ends = [len(systems) * i // count for i in range(count + 1)] if count else []
-    return [systems[first:last] for first, last in pairwise(ends)]
+    alike: dict[Hashable, list[int]] = {}
+    for i, kind in enumerate(kinds):
+        alike.setdefault(kind, []).append(i)
+    lots, rest = [], []
+    for members in alike.values():
+        whole = len(members) - len(members) % together
+        lots += _cut(members[:whole], whole // together)
+        rest += members[whole:]
+    lots += _cut(rest, -(-len(rest) // together))
+    rounds = len(lots) - len(lots) % cores
+    left = [i for lot in lots[rounds:] for i in lot]
+    return lots[:rounds] + _cut(left, min(cores, len(left)))
+
+
+def _cut(members: list[int], count: int) -> list[list[int]]:
+    """So many lots of about the same size."""
+    ends = [len(members) * i // count for i in range(count + 1)] if count else []
+    return [members[first:last] for first, last in pairwise(ends)]
 
 
 def _lots(asked: Mapping[int, Steps]) -> list[list[int]]:

@@ -55,7 +55,7 @@ def same(some, others):
 # 15, 2 and 40 machines at two levels are two vectors, one, and more than a call takes.
 @pytest.mark.parametrize(
     ("machines", "cores", "lots"),
-    [(15, 1, [1, 2, 2]), (15, 2, [1, 1, 1, 2]), (2, 1, [2, 3]), (2, 4, [1, 1, 1, 2]),
+    [(15, 1, [2, 1, 2]), (15, 2, [2, 1, 1, 1]), (2, 1, [2, 3]), (2, 4, [1, 1, 1, 2]),
      (40, 1, [1] * 5)],
 )  # fmt: skip
 def test_families_are_read_in_lots_as_they_are_one_by_one(machines, cores, lots):

@@ -139,26 +139,40 @@ def test_who_asks_for_nothing_is_done():
 
 
 @given(
-    count=st.integers(0, 60),
+    kinds=st.lists(st.sampled_from("abc"), max_size=40),
     cores=st.integers(1, 9),
     lanes=st.integers(1, 100),
     single=st.booleans(),
 )
-def test_all_are_shared_out_in_order_and_no_core_waits_for_nothing(count, cores, lanes, single):
-    systems = list(range(count))
-    lots = shared_out(systems, cores, lanes, single)
-    assert [one for lot in lots for one in lot] == systems
-    assert len(lots) >= min(cores, count)
-    sizes = {len(lot) for lot in lots}
-    assert not sizes or max(sizes) - min(sizes) <= 1
+def test_all_are_shared_out_and_no_core_is_left_without(kinds, cores, lanes, single):
+    lots = shared_out(kinds, cores, lanes, single)
+    assert sorted(i for lot in lots for i in lot) == list(range(len(kinds)))
+    assert all(lots)
+    assert len(lots) >= min(cores, len(kinds))
     width = 16 if single else 8
     assert all(len(lot) == 1 or len(lot) * -(-lanes // width) <= 4 for lot in lots)
+    # No core has more than a lot more than another.
+    loads = np.zeros(cores)
+    for lot in lots:
+        loads[np.argmin(loads)] += len(lot)
+    assert loads.max() - loads.min() <= max(map(len, lots), default=0)
 
 
 @pytest.mark.parametrize(
-    ("count", "cores", "lanes", "sizes"),
-    [(2, 2, 30, [1, 1]), (3, 2, 30, [1, 2]), (8, 2, 30, [2] * 4), (8, 2, 60, [1] * 8),
-     (8, 2, 10, [4, 4]), (8, 1, 30, [2] * 4), (5, 8, 30, [1] * 5)],
-)  # fmt: skip
-def test_pairs_are_made_where_no_core_would_be_without(count, cores, lanes, sizes):
-    assert [len(lot) for lot in shared_out(range(count), cores, lanes)] == sizes
+    ("kinds", "cores", "lanes", "lots"),
+    [
+        ("aa", 2, 30, [[0], [1]]),
+        ("aaa", 2, 30, [[0, 1], [2]]),
+        ("aaaa", 2, 30, [[0, 1], [2, 3]]),
+        ("aaaaaa", 2, 30, [[0, 1], [2, 3], [4], [5]]),
+        ("aaaa", 2, 60, [[0], [1], [2], [3]]),
+        ("aaaaaaaaaaaa", 2, 10, [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9], [10, 11]]),
+        ("aaaa", 1, 30, [[0, 1], [2, 3]]),
+        ("aaaaa", 8, 30, [[0], [1], [2], [3], [4]]),
+        # What is alike is together, and what each has one too many of.
+        ("abab", 1, 30, [[0, 2], [1, 3]]),
+        ("aaabbbcc", 2, 30, [[0, 1], [3, 4], [6, 7], [2, 5]]),
+    ],
+)
+def test_pairs_are_made_where_no_core_would_be_without(kinds, cores, lanes, lots):
+    assert shared_out(kinds, cores, lanes) == lots
