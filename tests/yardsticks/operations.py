@@ -54,22 +54,27 @@ def count_steps(structure: Structure) -> Counter[str]:
 
     for name, kind in _KINDS.items():
         setattr(Counting, name, _counted(getattr(ir.IRBuilder, name), kind, tally))
-    counts: list[Counter[str]] = []
+    counts: dict[str, Counter[str]] = {}
 
     class Watched(Program):
-        """Notes what each step adds to the count: of a settle cycle, then two of a kept one."""
+        """Notes what a step adds to the count, and a cycle: a step and a look at the output."""
 
-        def _step(self, step: Any, *, seen: bool) -> None:
+        def _step(self, at: Any) -> None:
             before = tally.copy()
-            super()._step(step, seen=seen)
-            counts.append(tally - before)
+            super()._step(at)
+            counts["step"] = tally - before
+
+        def _cycle(self, number: Any) -> None:
+            before = tally.copy()
+            super()._cycle(number)
+            counts["cycle"] = tally - before
 
     with patch.object(ir, "IRBuilder", Counting):
         Watched(Layout(structure), 1, 1, True, "")
-    _, unseen, seen = counts
+    total = counts["cycle"]
     for _ in range(STEPS_SEEN - 1):
-        seen += unseen
-    return seen
+        total += counts["step"]
+    return total
 
 
 def _counted(plain, kind: str, tally: Counter[str]):
