@@ -29,6 +29,7 @@ from analysis.contest import (
     look_at_every_ratio,
     see_it_predict,
     settle_doubt,
+    weigh_baseline,
     weigh_parts,
 )
 from analysis.doubt import (
@@ -169,6 +170,7 @@ def search_causes(
                 lambda: settle_doubt(fine, rng),
                 search_late,
                 hold_rare,
+                lambda: weigh_baseline(fine, rng),
             ):
                 given_up = is_given_up(fine, rng)
                 if given_up:

@@ -23,7 +23,14 @@ from analysis.objection import FEW, OUT_OF_SIGHT, UNLIKE, find_objection
 from analysis.observation import Observation
 from analysis.plausibility import EDGE, may_be_within_tolerance
 
-__all__ = ["LEAST_LEAD", "Judged", "Verdict", "earns_its_name", "judge_candidates"]
+__all__ = [
+    "LEAST_LEAD",
+    "Judged",
+    "Verdict",
+    "earns_its_name",
+    "judge_candidates",
+    "may_be_chance",
+]
 
 Word = Literal["consistent", "explained", "ambiguous", "unexplained"]
 
@@ -224,7 +231,7 @@ def judge_candidates(
     if (
         not best.effects
         or best.score < baseline.score + _FALSE_ALARM
-        or _may_be_chance(baseline, best, rng)
+        or may_be_chance(baseline.candidate, best.candidate, baseline.misfit, rng)
     ):
         if baseline.adequate:
             return Verdict("consistent", baseline, judged, baseline)
@@ -241,6 +248,14 @@ def judge_candidates(
     if verdict.rivals:
         return Verdict("ambiguous", best, judged, baseline)
     return verdict
+
+
+def may_be_chance(
+    simpler: Candidate, best: Candidate, misfit: float, rng: np.random.Generator
+) -> bool:
+    """Whether a set leads a simpler one of some misfit as it does in runs of that one's own."""
+    # Own runs say nothing about an observation that is unlike all of them.
+    return misfit <= UNLIKE and judge_chance(simpler, best, rng) > _BY_CHANCE
 
 
 def earns_its_name(whole: Candidate, part: Candidate, rng: np.random.Generator) -> bool:
@@ -280,13 +295,6 @@ def _ask(judged: Sequence[Judged], rng: np.random.Generator) -> tuple[Judged, ..
             replace(one, misfit=fitted.sigma, structure=fitted.structure, objection=objection)
         )
     return tuple(asked)
-
-
-def _may_be_chance(simpler: Judged, best: Judged, rng: np.random.Generator) -> bool:
-    # Own runs say nothing about an observation that is unlike all of them.
-    if simpler.misfit > UNLIKE:
-        return False
-    return judge_chance(simpler.candidate, best.candidate, rng) > _BY_CHANCE
 
 
 def _leader(judged: Sequence[Judged]) -> Judged:

@@ -265,3 +265,52 @@ def test_whether_pairs_were_searched_is_told(monkeypatch, doubted, spent, hardly
     rough = SimpleNamespace(found={}, leading=lambda *_: [])
     assert search._look_at_all(rough, fine, {}, None, doubted) == (True, doubted)
     assert bool(beside) == (not doubted and not spent and not hardly)
+
+
+@pytest.mark.parametrize(
+    ("lead", "leader_runs", "chance_until", "runs"),
+    [
+        (178.0, 160, 80, 80),
+        (178.0, 160, 400, 160),
+        (178.0, 80, 400, 80),
+        (178.0, 160, 0, 40),
+        (37.0, 160, 400, 40),
+    ],
+)
+def test_the_plain_model_gets_more_runs_where_few_say_that_the_leader_leads_by_chance(
+    monkeypatch, lead, leader_runs, chance_until, runs
+):
+    """As many as the leader at most; and none where nothing would be named."""
+
+    def standing(effects, likelihood, count):
+        best = SimpleNamespace(log_likelihood=likelihood)
+        return SimpleNamespace(
+            hypothesis=Hypothesis(ADSS, effects), best=best, population=range(count)
+        )
+
+    class Fine:
+        found = {
+            (): standing((), 100.0, 40),
+            ("total-backlash",): standing(("total-backlash",), 100.0 + lead, leader_runs),
+        }
+        best = found["total-backlash",]
+        heard = 0
+
+        def settle(self, keys, groups):
+            assert (keys, groups) == ([()], 4)
+            self.found[()].population = range(len(self.found[()].population) + 40)
+
+        def hear(self):
+            self.heard += 1
+
+    def may_be_chance(simpler, best, misfit, rng):
+        assert (simpler.hypothesis.effects, best.hypothesis.effects) == ((), ("total-backlash",))
+        assert misfit == 1.1
+        return len(simpler.population) < chance_until
+
+    monkeypatch.setattr(contest, "judge_adequacy", lambda one, rng: SimpleNamespace(sigma=1.1))
+    monkeypatch.setattr(contest, "may_be_chance", may_be_chance)
+    fine = Fine()
+    contest.weigh_baseline(fine, np.random.default_rng(0))
+    assert len(fine.found[()].population) == runs
+    assert fine.heard == (runs - 40) // 40

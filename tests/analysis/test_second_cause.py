@@ -56,14 +56,16 @@ class Beside:
 
 
 @pytest.mark.parametrize(
-    ("behind", "closer_at", "kept"),
+    ("behind", "gain", "closer_at", "kept"),
     [
-        ((-9.0, 5.0, 19.0, 21.0), 3, 3), ((21.0, 30.0, 19.0, 22.0), 1, 1), ((21.0,), 0, 0),
-        ((9.0, 5.0, 19.0, 8.0, 7.0, 6.0), 5, 4),
+        ((-9.0, 5.0, 19.0, 21.0), 0.0, 4, 3), ((21.0, 44.0, 19.0, 46.0), 0.0, 3, 1),
+        ((9.0, 5.0, 19.0, 8.0, 7.0, 6.0), 0.0, 5, 4), ((46.0,), 55.0, 0, 0),
+        # Few runs had it far behind, and more of them show that it leads.
+        ((31.0,), 55.0, 1, 1), ((31.0,), 10.0, 1, 0),
     ],
 )  # fmt: skip
 def test_those_placed_best_beside_a_leader_are_kept_where_runs_bear_them_out(
-    monkeypatch, behind, closer_at, kept
+    monkeypatch, behind, gain, closer_at, kept
 ):
     """Eight are simulated about their places, and the leader as often about its own.
 
@@ -83,10 +85,6 @@ def test_those_placed_best_beside_a_leader_are_kept_where_runs_bear_them_out(
             return ("few", stride)
 
         def start(self, places, groups, reach=None):
-            if reach is None:
-                closer.update(places)
-                assert groups == 3
-                return
             started.update(places)
             assert (groups, reach) == (2, (0.12, 0.03))
             # Who was placed best is not who does best.
@@ -97,6 +95,12 @@ def test_those_placed_best_beside_a_leader_are_kept_where_runs_bear_them_out(
             for key, one in likelihood.items():
                 best = SimpleNamespace(log_likelihood=one, place=one)
                 self.found[key] = SimpleNamespace(best=best)
+
+        def settle(self, keys, groups):
+            assert groups == 3
+            for key in keys:
+                closer[key] = self.found[key].best
+                closer[key].log_likelihood += gain
 
         def among(self, keys):
             return sorted(keys, key=lambda key: -self.found[key].best.log_likelihood)
