@@ -190,7 +190,8 @@ def simulate_cycles(
         return _sweep_at_last([servos[i] for i in group], part, steps_s, single, point_done)
 
     tasks = [(group, share) for group in groups for share in shares]
-    lots = shared_out([0] * len(tasks), workers, levels * max(map(len, groups)), single)
+    lanes = levels * max(map(len, groups), default=1)
+    lots = shared_out([0] * len(tasks), workers, lanes, single)
     with ThreadPoolExecutor(workers) as pool:
         parts = pool.map(lambda lot: step_together([swept(number) for number in lot]), lots)
         # All are of one kind, and stay in order.

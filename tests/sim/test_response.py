@@ -116,6 +116,11 @@ def test_company_changes_nothing_to_the_last_bit(workers):
         assert np.array_equal(together[i], alone), i
 
 
+@pytest.mark.parametrize("from_rest", [False, True])
+def test_no_servos_give_nothing(from_rest):
+    assert simulate_cycles([], plan_with(from_rest=from_rest)) == []
+
+
 @pytest.mark.parametrize("direction", ["up", "down"])
 def test_points_from_rest_are_the_same_however_many_share_them(direction):
     plan = plan_with(
