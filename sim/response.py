@@ -1,7 +1,7 @@
 """Simulated frequency responses: a servo taken through a sweep plan, as a bench would.
 
 Owns what lies between a drivetrain and a `FrequencyResponse`: levels and
-frequencies in order, the state carried on or put to rest, the start, and the
+frequencies in order, the state carried on or put to rest, and the
 error bar of every point. It judges nothing.
 """
 
@@ -22,10 +22,11 @@ from daq.errors import AnalysisError
 from daq.frf import GAIN_STD_COMPONENTS, FrequencyResponse
 from daq.plan import SweepPlan
 from sim.assembly import Law, PiecewiseLinearSystem
-from sim.effects import EffectSetting, drivetrain_with
+from sim.effects import EffectSetting
 from sim.effort import spend
 from sim.engine import HARMONICS, LONGEST_STEP_S, Motion, Stretch, carry
 from sim.reading import PERIODIC_SCATTER, response_of_cycles, scatter_of_cycles
+from sim.servo import START_SPREAD, Servo, parameters_of, states_at_start
 from sim.stepping import Asking, shared_out, step_together
 from sim.unit import Unit
 
@@ -41,43 +42,9 @@ __all__ = [
     "simulate_cycles",
 ]
 
-START_SPREAD = 0.02
-"""How far from the middle of its play a mesh starts at most, as a share of the half play.
-
-At low drive the motion keeps to the branch that it starts on; one that starts
-near the middle behaves as the paper's simulation from rest does.
-"""
-
 _DEAR = 2.2
 """Steps of a shaft that hardens take so many times as long as others, which are within a third of
 each other (`tests/benchmarks/engine_speed.py --effects`)."""
-
-
-@dataclass(frozen=True, slots=True)
-class Servo:
-    """One machine to simulate: a system and where its motion starts.
-
-    `seed` draws the start: every mesh rests somewhere inside its play, at most
-    `start_spread` of the way from its middle to either end. Servos
-    that share their linear part are stepped side by side, so vary play,
-    friction and seed freely: they cost least.
-    """
-
-    system: PiecewiseLinearSystem
-    seed: int = 0
-    start_spread: float = START_SPREAD
-
-    @classmethod
-    def of(
-        cls,
-        unit: Unit,
-        ratio: float,
-        effects: Sequence[EffectSetting] = (),
-        seed: int = 0,
-        start_spread: float = START_SPREAD,
-    ) -> Servo:
-        """The servo of a unit at one contribution ratio with some effects."""
-        return cls(drivetrain_with(unit, ratio, effects).system(), seed, start_spread)
 
 
 def simulate(
@@ -185,9 +152,13 @@ def simulate_cycles(
     steps_s = longest_step_s, *shorter_steps_s
 
     def swept(number: int) -> Asking[tuple[NDArray[np.complex128], float]]:
-        group, share = tasks[number]
+        group, share = [servos[i] for i in tasks[number][0]], tasks[number][1]
         part = replace(plan, frequencies_hz=tuple(points[share].tolist()))
-        return _sweep_at_last([servos[i] for i in group], part, steps_s, single, point_done)
+        # What grows at every step may have begun further back than it was gone through again from.
+        for at in range(len(shorter_steps_s)):
+            with suppress(AnalysisError):
+                return (yield from _sweep(group, part, steps_s[at:], single, point_done))
+        return (yield from _sweep(group, part, steps_s[-1:], single, point_done))
 
     tasks = [(group, share) for group in groups for share in shares]
     lanes = levels * max(map(len, groups), default=1)
@@ -238,7 +209,7 @@ class SteppedServo:
 
     def rest(self) -> None:
         """Let the motion die and the meshes settle where the seed puts them."""
-        self._state = _start([self._servo], levels=1)
+        self._state = states_at_start([self._servo], levels=1)
 
     def dwell(
         self,
@@ -261,7 +232,7 @@ class SteppedServo:
             integrate_cycles,
         )  # fmt: skip
         system = self._servo.system
-        parameters = _parameters([self._servo], 1)
+        parameters = parameters_of([self._servo], 1)
         carried = carry(system, parameters, self._state, [stretch], [self._longest_step_s])
         ((motion,),) = step_together([carried])
         self._state = motion.state
@@ -271,23 +242,6 @@ class SteppedServo:
             source_peak_v=source_vpk + abs(offset_v),
             output_peak_v=float(motion.peak[0]),
         )
-
-
-def _sweep_at_last(
-    servos: Sequence[Servo],
-    plan: SweepPlan,
-    steps_s: Sequence[float],
-    single: bool,
-    point_done: Callable[[], None],
-) -> Asking[tuple[NDArray[np.complex128], float]]:
-    """The same as `_sweep`, anew at the next of the steps where that fails.
-
-    What grows at every step may have begun further back than it was gone through again from.
-    """
-    for at in range(len(steps_s) - 1):
-        with suppress(AnalysisError):
-            return (yield from _sweep(servos, plan, steps_s[at:], single, point_done))
-    return (yield from _sweep(servos, plan, steps_s[-1:], single, point_done))
 
 
 def _sweep(
@@ -313,7 +267,7 @@ def _sweep(
         for f in visited
     ]  # fmt: skip
     system = servos[0].system
-    parameters, start = _parameters(servos, len(levels)), _start(servos, len(levels))
+    parameters, start = parameters_of(servos, len(levels)), states_at_start(servos, len(levels))
 
     def carried(some: Sequence[Stretch]) -> Asking[list[Motion]]:
         return carry(system, parameters, start, some, steps_s, single, point_done)
@@ -328,47 +282,6 @@ def _sweep(
         kept = kept[::-1]
     lanes = kept.reshape(*kept.shape[:3], len(servos), len(levels))
     return np.ascontiguousarray(lanes.transpose(3, 4, 0, 1, 2)), steps
-
-
-def _start(servos: Sequence[Servo], levels: int) -> NDArray[np.float64]:
-    """States (n, servos x levels) at rest, each mesh somewhere inside its play."""
-    system = servos[0].system
-    meshes = [law for law in system.nonlinearities if law.law is Law.PLAY]
-    columns = []
-    for servo in servos:
-        halves = [law.parameters[0] for law in servo.system.nonlinearities if law.law is Law.PLAY]
-        rng = np.random.default_rng(servo.seed)
-        where = rng.uniform(-1.0, 1.0, size=(levels, len(halves))) * halves * servo.start_spread
-        # The smallest angles that put each mesh there leave every spring but
-        # the meshes unwound only if they are compliant; springs are excluded
-        # by solving for the meshes' deflections and zero elastic energy elsewhere.
-        columns.append(_at_rest(system, meshes, where))
-    return np.concatenate(columns, axis=1)
-
-
-def _at_rest(
-    system: PiecewiseLinearSystem, meshes: Sequence, where: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    n = len(system.b)
-    if not meshes:
-        return np.zeros((n, len(where)))
-    outlets = np.array([mesh.outlet for mesh in meshes])
-    # What stores energy besides the meshes: rows that must stay zero.
-    elastic = system.energy - sum(
-        mesh.stiffness * np.outer(mesh.outlet, mesh.outlet) for mesh in meshes
-    )
-    rows = np.vstack([outlets, elastic / max(np.abs(elastic).max(), 1e-300)])
-    wanted = np.vstack([where.T, np.zeros((n, len(where)))])
-    return np.linalg.lstsq(rows, wanted, rcond=None)[0]
-
-
-def _parameters(servos: Sequence[Servo], levels: int) -> NDArray[np.float64]:
-    """Law parameters (m, 3, servos x levels)."""
-    per_servo = [
-        np.array([law.parameters for law in servo.system.nonlinearities]).reshape(-1, 3)
-        for servo in servos
-    ]
-    return np.repeat(np.stack(per_servo, axis=-1), levels, axis=-1)
 
 
 def _groups(servos: Sequence[Servo], levels: int, workers: int) -> Iterable[list[int]]:

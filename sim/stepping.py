@@ -25,9 +25,6 @@ __all__ = ["Asking", "Stepped", "Steps", "shared_out", "step_together"]
 
 T = TypeVar("T")
 
-_SHARED = (1, 2)
-"""Vectors of a system that others may be stepped beside."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Steps:
@@ -112,7 +109,7 @@ def shared_out(
     long as one, but longer: what is left after whole rounds is shared out among all cores.
     """
     vectors = -(-lanes // (VECTOR_BYTES // (4 if single else 8)))
-    together = max(MOST_VECTORS // vectors, 1)
+    together = _together(vectors)
     alike: dict[Hashable, list[int]] = {}
     for i, kind in enumerate(kinds):
         alike.setdefault(kind, []).append(i)
@@ -125,6 +122,11 @@ def shared_out(
     rounds = len(lots) - len(lots) % cores
     left = [i for lot in lots[rounds:] for i in lot]
     return lots[:rounds] + _cut(left, min(cores, len(left)))
+
+
+def _together(vectors: int) -> int:
+    """Systems of so many vectors that one call steps at most; a large one takes several calls."""
+    return max(MOST_VECTORS // vectors, 1)
 
 
 def _cut(members: list[int], count: int) -> list[list[int]]:
@@ -142,7 +144,7 @@ def _lots(asked: Mapping[int, Steps]) -> list[list[int]]:
     for members in alike.values():
         vectors = asked[members[0]].vectors
         while members:
-            most = min(MOST_VECTORS // vectors, len(members)) if vectors in _SHARED else 1
+            most = min(_together(vectors), len(members))
             taken = 1 << (most.bit_length() - 1)
             lots.append(members[:taken])
             members = members[taken:]

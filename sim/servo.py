@@ -1,0 +1,93 @@
+"""Servos to simulate: a machine's system, its laws' parameters, and where its motion starts.
+
+Owns the start: at rest, each mesh somewhere inside its play. It steps nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.assembly import Law, PiecewiseLinearSystem
+from sim.effects import EffectSetting, drivetrain_with
+from sim.unit import Unit
+
+__all__ = ["START_SPREAD", "Servo", "parameters_of", "states_at_start"]
+
+START_SPREAD = 0.02
+"""How far from the middle of its play a mesh starts at most, as a share of the half play.
+
+At low drive the motion keeps to the branch that it starts on; one that starts
+near the middle behaves as the paper's simulation from rest does.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Servo:
+    """One machine to simulate: a system and where its motion starts.
+
+    `seed` draws the start: every mesh rests somewhere inside its play, at most
+    `start_spread` of the way from its middle to either end. Servos
+    that share their linear part are stepped side by side, so vary play,
+    friction and seed freely: they cost least.
+    """
+
+    system: PiecewiseLinearSystem
+    seed: int = 0
+    start_spread: float = START_SPREAD
+
+    @classmethod
+    def of(
+        cls,
+        unit: Unit,
+        ratio: float,
+        effects: Sequence[EffectSetting] = (),
+        seed: int = 0,
+        start_spread: float = START_SPREAD,
+    ) -> Servo:
+        """The servo of a unit at one contribution ratio with some effects."""
+        return cls(drivetrain_with(unit, ratio, effects).system(), seed, start_spread)
+
+
+def states_at_start(servos: Sequence[Servo], levels: int) -> NDArray[np.float64]:
+    """States (n, servos x levels) at rest, each mesh somewhere inside its play."""
+    system = servos[0].system
+    meshes = [law for law in system.nonlinearities if law.law is Law.PLAY]
+    columns = []
+    for servo in servos:
+        halves = [law.parameters[0] for law in servo.system.nonlinearities if law.law is Law.PLAY]
+        rng = np.random.default_rng(servo.seed)
+        where = rng.uniform(-1.0, 1.0, size=(levels, len(halves))) * halves * servo.start_spread
+        # The smallest angles that put each mesh there leave every spring but
+        # the meshes unwound only if they are compliant; springs are excluded
+        # by solving for the meshes' deflections and zero elastic energy elsewhere.
+        columns.append(_at_rest(system, meshes, where))
+    return np.concatenate(columns, axis=1)
+
+
+def _at_rest(
+    system: PiecewiseLinearSystem, meshes: Sequence, where: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    n = len(system.b)
+    if not meshes:
+        return np.zeros((n, len(where)))
+    outlets = np.array([mesh.outlet for mesh in meshes])
+    # What stores energy besides the meshes: rows that must stay zero.
+    elastic = system.energy - sum(
+        mesh.stiffness * np.outer(mesh.outlet, mesh.outlet) for mesh in meshes
+    )
+    rows = np.vstack([outlets, elastic / max(np.abs(elastic).max(), 1e-300)])
+    wanted = np.vstack([where.T, np.zeros((n, len(where)))])
+    return np.linalg.lstsq(rows, wanted, rcond=None)[0]
+
+
+def parameters_of(servos: Sequence[Servo], levels: int) -> NDArray[np.float64]:
+    """Law parameters (m, 3, servos x levels)."""
+    per_servo = [
+        np.array([law.parameters for law in servo.system.nonlinearities]).reshape(-1, 3)
+        for servo in servos
+    ]
+    return np.repeat(np.stack(per_servo, axis=-1), levels, axis=-1)
