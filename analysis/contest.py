@@ -30,6 +30,7 @@ __all__ = [
     "catch_up",
     "compare",
     "give_chances",
+    "has_fewer",
     "look_at_every_ratio",
     "see_it_predict",
     "settle",
@@ -134,11 +135,16 @@ def catch_up(fine: Hunt, newcomers: Collection[Effects], leader: Effects) -> Non
 
     All others were compared with it before.
     """
-    enough = min(len(fine.found[leader].population), _ENOUGH)
     near = set(newcomers)
     while near := near & set(fine.leading(len(fine.found), CLOSE)):
-        near = {key for key in near if len(fine.found[key].population) < enough}
+        near = {key for key in near if has_fewer(fine, key, leader)}
         settle(fine, sorted(near))
+
+
+def has_fewer(fine: Hunt, key: Effects, other: Effects) -> bool:
+    """Whether a hypothesis has fewer runs than another, and may still get some."""
+    runs, enough = (len(fine.found[one].population) for one in (key, other))
+    return runs < min(enough, _ENOUGH)
 
 
 def settle(fine: Hunt, chosen: Sequence[Effects]) -> None:

@@ -8,7 +8,7 @@ bring is said by `analysis.verdict`.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -17,8 +17,9 @@ from analysis.beside import place_beside
 from analysis.candidate import Candidate, Effects
 from analysis.causes import Hypothesis
 from analysis.chart import Chart
-from analysis.contest import catch_up, settle
+from analysis.contest import catch_up, has_fewer, settle
 from analysis.hunt import Hunt
+from analysis.lending import leads_with_lent
 from analysis.pairs import at_few_frequencies, look_at_felt, look_beside
 from analysis.parts import earns
 from analysis.screening import Additions, add_causes, near, ranked, screen_felt, screen_singles
@@ -26,20 +27,22 @@ from analysis.verdict import earns_its_name
 
 __all__ = ["look_for_second"]
 
-_TRIED, _CLOSER = 8, 5
-"""How many of them are simulated on few rows, and how many of these once more. True ones stood
-fourth at worst by where they were placed, where they were to be seen at all."""
+_TRIED = 16
+"""How many of them are simulated on few rows: by where they were placed true ones stood fourteenth
+at worst, more play beside a light load, where they were to be seen at all."""
 
-_BEHIND, _CLOSER_GROUPS, _BEHIND_STILL = 45.0, 3, 20.0
-"""Log-likelihood on few rows behind the leader from which none is looked at closer; in how many
-groups about what is learned; and from which none of these goes on. Few runs rank by chance, and the
-leader has four times as many: friction at rest of a load, placed first of all, lay 31 behind with
-twenty. Thirty more about its best place left it 24 behind; about what is learned it led by 14."""
+_CLOSER, _CLOSER_GROUPS, _BEHIND = 3, 3, 45.0
+"""How many of these are looked at closer by each measure, with runs of the leader lent to them and
+with their own alone, in how many groups about what is learned of them; and the log-likelihood by
+their own runs behind the leader from which none is: few rank by chance."""
 
-_ON_ALL, _ALL_GROUPS, _NEARLY, _BEHIND_BEST = 4, 4, 15.0, 30.0
-"""How many are simulated on all rows, in how many groups, and the log-likelihoods behind the leader
-and behind the best of them within which they get as many again: true ones led by 7 to 86 with the
-first of these runs, and were 11 behind the best at most."""
+_ON_ALL, _ALL_GROUPS, _LEAD = 4, 4, 1.0
+"""How many are simulated on all rows, in how many groups, and the log-likelihood on few rows by
+which they must lead. True ones led by 8 to 20, and false ones by 2 where nothing hid there."""
+
+_NEARLY, _BEHIND_BEST = 10.0, 30.0
+"""What they must lead by on all rows, and how far behind the best of them they may be, to get as
+many runs again."""
 
 _CALLED_FOR = 15.0
 """By so much must one then lead to be left in the contest: of false ones the best led by 15 to 24
@@ -77,39 +80,61 @@ def look_for_second(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Genera
     if not beside and not others or fine.purse.is_spent:
         return
     fine.take_over([rough.found[key] for key in (*beside, *others)], _ALL_GROUPS)
-    leads = _leads(fine, beside, leader)
-    least = max(-_NEARLY, max(leads.values(), default=0.0) - _BEHIND_BEST)
+    leads = leads_with_lent(fine, additions, leader, beside)
+    least = max(_NEARLY, max(leads.values(), default=0.0) - _BEHIND_BEST)
     settle(fine, [key for key, lead in leads.items() if lead > least])
     catch_up(fine, others, leader)
-    leads = _leads(fine, beside, leader)
+    leads = leads_with_lent(fine, additions, leader, beside)
     # They would only take the place of rivals among those that are judged.
     fine.leave_out([key for key, lead in leads.items() if lead < _CALLED_FOR])
-    _contest(fine, leader, rng)
+    _contest(fine, additions, leader, rng)
 
 
-def _contest(fine: Hunt, leader: Effects, rng: np.random.Generator) -> None:
+def _contest(fine: Hunt, additions: Additions, leader: Effects, rng: np.random.Generator) -> None:
     """Keep sets with a second cause if one brings more than chance does, with as many runs."""
+    further = {key for key in fine.found if set(key) > set(leader)}
     for _ in range(_ROUNDS):
-        best = fine.best.hypothesis.effects
+        best = next(iter(_near(fine, additions, leader, further)), fine.best.hypothesis.effects)
         if best == leader or fine.purse.is_spent:
             break
         settle(fine, [leader, best])
         fine.hear()
-    further = {key for key in fine.found if set(key) > set(leader)}
-    while (best := fine.best.hypothesis.effects) in further:
-        if _leads(fine, [best], leader)[best] < _CALLED_FOR:
-            break
+    while near := _near(fine, additions, leader, further):
+        best = near[0]
         # Few runs fit by chance.
-        catch_up(fine, [best], leader)
-        if fine.best.hypothesis.effects != best:
-            continue
-        if earns_its_name(fine.best, fine.found[leader], rng.spawn(1)[0]):
-            catch_up(fine, further, best)
+        if has_fewer(fine, best, leader):
+            settle(fine, [best])
+        elif earns_its_name(fine.found[best], fine.found[leader], rng.spawn(1)[0]):
+            _level(fine, additions, leader, further, best)
             return
-        further.remove(best)
-        fine.leave_out([best])
-    if best in (leader, *further):
+        else:
+            further.remove(best)
+            fine.leave_out([best])
+    if fine.best.hypothesis.effects in (leader, *further):
         fine.leave_out(further)
+
+
+def _level(
+    fine: Hunt, additions: Additions, leader: Effects, further: Collection[Effects], best: Effects
+) -> None:
+    """Give those that are close to the best as many runs as it has, while they stay close."""
+    few: Collection[Effects] = further
+    while not fine.purse.is_spent:
+        near = _near(fine, additions, leader, few)
+        few = [key for key in near if has_fewer(fine, key, best)]
+        if not few:
+            break
+        settle(fine, few)
+        fine.hear()
+
+
+def _near(
+    fine: Hunt, additions: Additions, leader: Effects, keys: Collection[Effects]
+) -> list[Effects]:
+    """Those that lead by as much as is called for and are close to the best, which comes first."""
+    leads = leads_with_lent(fine, additions, leader, keys)
+    least = max(_CALLED_FOR, max(leads.values(), default=0.0) - _BEHIND_BEST)
+    return [key for key in _best(leads, len(leads)) if leads[key] >= least]
 
 
 def _leads(fine: Hunt, keys: Sequence[Effects], leader: Effects) -> dict[Effects, float]:
@@ -123,15 +148,17 @@ def _worth(rough: Hunt, additions: Additions, leader: Candidate) -> list[Effects
     placed = place_beside(at_few_frequencies(rough), additions, alone, place)
     tried = {key: placed[key].place for key in ranked(placed)[:_TRIED]}
     look_beside(rough, {alone.effects: place, **tried})
-    hopeful = _near(rough, tried, alone.effects, _BEHIND)[:_CLOSER]
+    hopeful = _best(leads_with_lent(rough, additions, alone.effects, tried), _CLOSER)
+    by_own = _leads(rough, rough.among(tried), alone.effects)
+    hopeful += [key for key in _best(by_own, _CLOSER) if by_own[key] > -_BEHIND]
+    hopeful = list(dict.fromkeys(hopeful))
     rough.settle(hopeful, _CLOSER_GROUPS)
-    return _near(rough, hopeful, alone.effects, _BEHIND_STILL)[:_ON_ALL]
+    leads = leads_with_lent(rough, additions, alone.effects, hopeful)
+    return [key for key in _best(leads, _ON_ALL) if leads[key] > _LEAD]
 
 
-def _near(rough: Hunt, keys: Collection[Effects], leader: Effects, behind: float) -> list[Effects]:
-    """Those of some sets that are no farther behind a leader, the best first."""
-    least = rough.found[leader].best.log_likelihood - behind
-    return [key for key in rough.among(keys) if rough.found[key].best.log_likelihood > least]
+def _best(leads: Mapping[Effects, float], most: int) -> list[Effects]:
+    return sorted(leads, key=lambda key: -leads[key])[:most]
 
 
 def _stood_for(rough: Hunt, additions: Additions, atlas: Atlas, leader: Effects) -> list[Effects]:

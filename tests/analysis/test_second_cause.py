@@ -55,27 +55,48 @@ class Beside:
             del self.found[key]
 
 
+@pytest.fixture(autouse=True)
+def lent(monkeypatch):
+    """By how much more sets lead a leader with its runs lent to them than by their own."""
+    more = {}
+
+    def leads(hunt, additions, leader, keys):
+        alone = hunt.found[leader].best.log_likelihood
+        return {k: hunt.found[k].best.log_likelihood - alone + more.get(k, 0.0) for k in keys}
+
+    monkeypatch.setattr(second_cause, "leads_with_lent", leads)
+    return more
+
+
 @pytest.mark.parametrize(
-    ("behind", "gain", "closer_at", "kept"),
+    ("own", "lent", "closer", "gain", "kept"),
     [
-        ((-9.0, 5.0, 19.0, 21.0), 0.0, 4, 3), ((21.0, 44.0, 19.0, 46.0), 0.0, 3, 1),
-        ((9.0, 5.0, 19.0, 8.0, 7.0, 6.0), 0.0, 5, 4), ((46.0,), 55.0, 0, 0),
-        # Few runs had it far behind, and more of them show that it leads.
-        ((31.0,), 55.0, 1, 1), ((31.0,), 10.0, 1, 0),
+        # The best three by each measure are looked at closer, those that then lead go on.
+        ((-9.0, -5.0, -40.0, -46.0), (0.0, 5.0, 2.0, 7.0), [3, 1, 2, 0], 0.0, [3, 1, 2]),
+        # None by its own runs that is far behind, and no more than three by lent ones.
+        ((-50.0,) * 5, (4.0, 3.0, 2.5, 2.0, 1.5), [0, 1, 2], 0.0, [0, 1, 2]),
+        ((-50.0,) * 3, (0.9, 0.5, -3.0), [0, 1, 2], 0.0, []),
+        # Few runs had it behind by either measure, and more of them show that it leads.
+        ((-31.0,), (-17.0,), [0], 20.0, [0]),
+        ((-4.0, -5.0, -6.0, -7.0), (9.0, 8.0, 7.0, 6.0), [0, 1, 2], 0.0, [0, 1, 2]),
+        (
+            (-30.0, -29.0, -28.0, -9.0, -8.0, -7.0), (9.0, 8.0, 7.0, 6.0, 5.0, 4.0),
+            [0, 1, 2, 5, 4, 3], 0.0, [0, 1, 2, 3],
+        ),
     ],
 )  # fmt: skip
 def test_those_placed_best_beside_a_leader_are_kept_where_runs_bear_them_out(
-    monkeypatch, behind, gain, closer_at, kept
+    monkeypatch, own, lent, closer, gain, kept
 ):
-    """Eight are simulated about their places, and the leader as often about its own.
-
-    Five at most are looked at closer, four on all rows.
-    """
-    leader, place, started, closer = ("load-inertia",), np.array([0.3, 0.6]), {}, {}
+    """Sixteen are simulated about their places, and the leader as often about its own."""
+    leader, place, started, settled = ("load-inertia",), np.array([0.3, 0.6]), {}, []
     placed = {
-        (*leader, f"partner-{i}"): Place(np.array([0.3, 0.6, 0.1 * i]), 95.0 - 4.0 * i)
-        for i in range(12)
+        (*leader, f"partner-{i:02}"): Place(np.array([0.3, 0.6, 0.1 * i]), 95.0 - 4.0 * i)
+        for i in range(20)
     }
+    partner = list(placed)
+    # Who was placed best is not who does best: the first of those given was placed last.
+    given = dict(zip(partner[15::-1], zip(own, lent, strict=True), strict=False))
 
     class Rough:
         unit, observation = ADSS, SimpleNamespace(blocks=(slice(0, 21),))
@@ -87,20 +108,14 @@ def test_those_placed_best_beside_a_leader_are_kept_where_runs_bear_them_out(
         def start(self, places, groups, reach=None):
             started.update(places)
             assert (groups, reach) == (2, (0.12, 0.03))
-            # Who was placed best is not who does best.
-            ranked = [-i for i in behind] + [-300.0] * len(placed)
-            order = [key for key in places if key != leader][::-1]
-            likelihood = {leader: 100.0}
-            likelihood |= {k: 100.0 + off for k, off in zip(order, ranked, strict=False)}
-            for key, one in likelihood.items():
-                best = SimpleNamespace(log_likelihood=one, place=one)
+            for key in places:
+                off = 0.0 if key == leader else given.get(key, (-300.0, -300.0))[0]
+                best = SimpleNamespace(log_likelihood=100.0 + off, place=None)
                 self.found[key] = SimpleNamespace(best=best)
 
         def settle(self, keys, groups):
             assert groups == 3
-            for key in keys:
-                closer[key] = self.found[key].best
-                closer[key].log_likelihood += gain
+            settled.extend(keys)
 
         def among(self, keys):
             return sorted(keys, key=lambda key: -self.found[key].best.log_likelihood)
@@ -109,16 +124,19 @@ def test_those_placed_best_beside_a_leader_are_kept_where_runs_bear_them_out(
         assert (few, additions, known.effects, at is place) == (("few", 2), "sums", leader, True)
         return placed
 
+    def leads(hunt, additions, of, keys):
+        assert (additions, of) == ("sums", leader)
+        return {key: given.get(key, (0.0, -300.0))[1] + gain * (key in settled) for key in keys}
+
     monkeypatch.setattr(second_cause, "place_beside", beside)
+    monkeypatch.setattr(second_cause, "leads_with_lent", leads)
     monkeypatch.setattr(pairs, "_is_at_an_end", lambda _: False)
     alone = SimpleNamespace(hypothesis=Hypothesis(ADSS, leader), best=SimpleNamespace(place=place))
     found = second_cause._worth(Rough(), "sums", alone)
-    best_placed = list(placed)[:8]
-    assert set(started) == {leader, *best_placed}
-    assert all(started[key] is placed[key].place for key in best_placed)
-    ranked = [best_placed[::-1][i] for i in np.argsort(behind)]
-    assert list(closer) == ranked[:closer_at]
-    assert found == ranked[:kept]
+    assert set(started) == {leader, *partner[:16]}
+    assert all(started[key] is placed[key].place for key in partner[:16])
+    assert [key for key in settled if key in given] == [list(given)[i] for i in closer]
+    assert found == [list(given)[i] for i in kept]
 
 
 @pytest.mark.parametrize(
@@ -201,7 +219,7 @@ def looked_behind(monkeypatch, ahead, looks=99, *, earning=(PAIR, OTHER), gains=
     [
         (16.0, True, 2, True),
         (14.0, True, 0, False),
-        (-14.0, True, 0, False),
+        (9.0, False, 0, False),
         (-16.0, False, 0, False),
     ],
 )
@@ -234,6 +252,15 @@ def test_a_further_cause_that_leads_by_less_is_not_asked(monkeypatch):
 def test_who_brings_more_is_compared_with_others_that_have_as_many_runs(monkeypatch):
     """Those far behind the best get no more than the first."""
     fine = looked_behind(monkeypatch, {PAIR: 60.0, OTHER: 35.0, ("load-inertia", "x"): 29.0})
+    assert fine.settled == [[PAIR, OTHER], [LEADER, PAIR], [LEADER, PAIR], [OTHER], [OTHER]]
+    assert [len(one.population) for one in fine.found.values()] == [120, 160, 160, 40]
+
+
+def test_who_leads_with_lent_runs_gets_as_many_of_its_own_before_it_is_asked(monkeypatch, lent):
+    """Few runs leave a true pair behind its own part, and beside another true one."""
+    third = ("load-inertia", "x")
+    lent |= {PAIR: 80.0, OTHER: 90.0, third: 90.0}
+    fine = looked_behind(monkeypatch, {PAIR: -20.0, OTHER: -50.0, third: -65.0})
     assert fine.settled == [[PAIR, OTHER], [LEADER, PAIR], [LEADER, PAIR], [OTHER], [OTHER]]
     assert [len(one.population) for one in fine.found.values()] == [120, 160, 160, 40]
 

@@ -1,0 +1,66 @@
+"""Runs of known causes, lent to sets with one cause more as runs of these with none of it.
+
+Owns where a further cause does nothing, and what a set looks like with such runs beside its own.
+Few runs fit badly what lies between them, so that a true pair with twenty lies far behind one of
+its causes alone with eighty. But where the further cause does nothing both are the same servo.
+Lent runs help to decide where to look: they take no part in any judgement.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.candidate import Effects, form_candidates
+from analysis.causes import Hypothesis
+from analysis.hunt import Hunt
+from analysis.population import Population
+from analysis.screening import Additions
+
+__all__ = ["leads_with_lent"]
+
+
+def leads_with_lent(
+    hunt: Hunt, additions: Additions, leader: Effects, keys: Collection[Effects]
+) -> dict[Effects, float]:
+    """By how much sets with one cause more than a leader lead it, in log-likelihood.
+
+    With their own runs, or with those of the leader beside them, whichever tells more.
+    """
+    known, alone = Hypothesis(hunt.unit, leader), hunt.found[leader]
+    own = {key: hunt.found[key] for key in keys}
+    runs, starts, idle = {leader: alone.population}, {leader: alone.best.place}, {}
+    for key, one in own.items():
+        further = Hypothesis(hunt.unit, tuple(e for e in key if e not in leader))
+        nothing = _least_of(further, additions)
+        runs[key] = one.population.joined(_lent(alone.population, known, further, nothing))
+        starts[key] = one.best.place
+        idle[key] = known.joined(alone.best.place, further, nothing)[1]
+    formed = form_candidates(hunt.unit, hunt.observation, runs, starts)
+    leads = {}
+    for key, one in own.items():
+        there = formed[key].surface.climb(idle[key]).log_likelihood
+        lent = max(formed[key].best.log_likelihood, there) - formed[leader].best.log_likelihood
+        leads[key] = max(lent, one.best.log_likelihood - alone.best.log_likelihood)
+    return leads
+
+
+def _lent(
+    runs: Population, known: Hypothesis, further: Hypothesis, nothing: NDArray[np.float64]
+) -> Population:
+    """Runs of known causes as runs of both."""
+    places = [known.joined(place, further, nothing)[1] for place in runs.places]
+    return Population(np.array(places), runs.deviations, runs.mean, runs.variance)
+
+
+def _least_of(further: Hypothesis, additions: Additions) -> NDArray[np.float64]:
+    """The sizes (k,) at which a cause does nothing: the datasheet's, or where it does least."""
+    known = [parameter.nominal(further.unit) for _, parameter in further.parameters]
+    nominal = [value for value in known if value]
+    if len(nominal) == len(known):
+        return (np.log(nominal) - further.logs[:, 0]) / np.ptp(further.logs, axis=1)
+    added = additions.added[further.effects]
+    does = np.abs(added.shift / added.std).mean(axis=(0, 2))
+    return np.asarray(added.sizes[np.argmin(does)])

@@ -1,0 +1,81 @@
+"""Runs of a known cause, lent to pairs with it, in a world whose answers are known."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import synthetic
+import synthetic_search
+
+from analysis import lending
+from analysis.causes import Hypothesis
+from analysis.hunt import Hunt
+from analysis.lending import leads_with_lent
+
+ADSS = synthetic.ADSS
+LEADER, TRUE = ("load-inertia",), ("amplifier-lag", "load-inertia")
+FALSE = [("load-inertia", "mesh1-damping"), ("load-inertia", "shaft-damping")]
+
+
+def doing(shift):
+    """What a cause of one size adds at three sizes of it."""
+    return SimpleNamespace(
+        sizes=np.array([[0.0], [0.5], [1.0]]),
+        shift=np.array(shift)[None, :, None],
+        std=np.ones((1, 3, 1)),
+    )
+
+
+ADDITIONS = SimpleNamespace(
+    added={
+        tuple(e for e in key if e not in LEADER): doing([0.0, 0.5, 1.0]) for key in (TRUE, *FALSE)
+    }
+)
+
+
+def hunted(lag, seed, leaders=8, groups=2):
+    """A hunt with many runs of a load too heavy, and few with a further cause."""
+    rng = np.random.default_rng(seed)
+    looking = Hunt(ADSS, synthetic_search.observed(TRUE, [lag, 0.7], rng), rng, None, None)
+    looking.start({LEADER: np.array([0.4, 0.7])}, leaders)
+    places = {TRUE: [0.4, 0.3, 0.7]} | {key: [0.4, 0.7, 0.3] for key in FALSE}
+    looking.start({key: np.array(at) for key, at in places.items()}, groups)
+    return looking
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_lent_runs_tell_a_true_pair_that_few_of_its_own_leave_behind(runs, seed):
+    looking = hunted(0.1, seed)
+    before = dict(looking.found)
+    leads = leads_with_lent(looking, ADDITIONS, LEADER, [TRUE, *FALSE])
+    alone = looking.found[LEADER].best.log_likelihood
+    own = {key: looking.found[key].best.log_likelihood - alone for key in leads}
+    # Of six draws: -238 to -16 by its own runs, 296 to 346 with lent ones; others at most 35.
+    assert own[TRUE] < 0.0 < 200.0 < leads[TRUE]
+    assert max(leads[key] for key in FALSE) < 70.0
+    assert all(leads[key] >= own[key] for key in leads)
+    assert looking.found == before
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_nobody_leads_by_lent_runs_where_nothing_hides(runs, seed):
+    leads = leads_with_lent(hunted(0.0, seed), ADDITIONS, LEADER, [TRUE, *FALSE])
+    assert max(leads.values()) < 5.0
+
+
+@pytest.mark.parametrize(
+    ("cause", "size"),
+    [("shaft-stiffness", 0.5), ("motor-coulomb-friction", 0.611), ("total-backlash", 0.537)],
+)
+def test_what_the_datasheet_knows_does_nothing_at_its_value(cause, size):
+    """Whatever the atlas, whose sizes are few, has there."""
+    further = Hypothesis(ADSS, (cause,))
+    assert lending._least_of(further, None) == pytest.approx([size], abs=1e-3)
+
+
+@pytest.mark.parametrize(("does", "size"), [([4.0, -2.0, 0.5], 1.0), ([-0.1, 2.0, 0.5], 0.0)])
+def test_what_it_does_not_know_does_nothing_where_it_does_least(does, size):
+    """A clipping amplifier does least where it clips at most; the sign is no matter."""
+    further = Hypothesis(ADSS, ("amplifier-saturation",))
+    added = SimpleNamespace(added={further.effects: doing(does)})
+    assert list(lending._least_of(further, added)) == [size]
