@@ -8,7 +8,7 @@ Lent runs help to decide where to look: they take no part in any judgement.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,10 @@ from analysis.hunt import Hunt
 from analysis.population import Population
 from analysis.screening import Additions
 
-__all__ = ["leads_with_lent"]
+__all__ = ["leads_with_lent", "on_the_other_side"]
+
+_OFF = 0.03
+"""How far a size must be from the datasheet's value to have another side."""
 
 
 def leads_with_lent(
@@ -47,6 +50,27 @@ def leads_with_lent(
     return leads
 
 
+def on_the_other_side(
+    known: Hypothesis, places: Mapping[Effects, NDArray[np.float64]]
+) -> dict[Effects, NDArray[np.float64]]:
+    """The same places (d,), but as far beyond the datasheet's value of the further cause.
+
+    Of those whose datasheet value lies amid its range. What two causes do together may look like
+    adding up on the wrong side of it, and from lent runs, which lie between, the right one is told.
+    """
+    found = {}
+    for key, place in places.items():
+        further = Hypothesis(known.unit, tuple(e for e in key if e not in known.effects))
+        if further.centred:
+            whole = Hypothesis(known.unit, key)
+            size = whole.part(further.effects, place)[1:]
+            nothing = _known_sizes(further)
+            if abs(size - nothing) > _OFF:
+                other = np.clip(2.0 * nothing - size, 0.0, 1.0)
+                found[key] = known.joined(whole.part(known.effects, place), further, other)[1]
+    return found
+
+
 def _lent(
     runs: Population, known: Hypothesis, further: Hypothesis, nothing: NDArray[np.float64]
 ) -> Population:
@@ -57,10 +81,14 @@ def _lent(
 
 def _least_of(further: Hypothesis, additions: Additions) -> NDArray[np.float64]:
     """The sizes (k,) at which a cause does nothing: the datasheet's, or where it does least."""
-    known = [parameter.nominal(further.unit) for _, parameter in further.parameters]
-    nominal = [value for value in known if value]
-    if len(nominal) == len(known):
-        return (np.log(nominal) - further.logs[:, 0]) / np.ptp(further.logs, axis=1)
+    if all(parameter.nominal(further.unit) for _, parameter in further.parameters):
+        return _known_sizes(further)
     added = additions.added[further.effects]
     does = np.abs(added.shift / added.std).mean(axis=(0, 2))
     return np.asarray(added.sizes[np.argmin(does)])
+
+
+def _known_sizes(further: Hypothesis) -> NDArray[np.float64]:
+    """Sizes (k,) of a cause as the datasheet has them."""
+    values = [float(parameter.nominal(further.unit) or 0.0) for _, parameter in further.parameters]
+    return (np.log(values) - further.logs[:, 0]) / np.ptp(further.logs, axis=1)

@@ -24,6 +24,7 @@ from analysis.screening import (
 )
 
 __all__ = [
+    "BESIDE_REACH",
     "at_few_frequencies",
     "look_at_felt",
     "look_beside",
@@ -41,7 +42,7 @@ _FELT_GROUPS = (2, 2, 2)
 """Groups of each look at a pair that is placed by what the load is felt as: ever closer ones told a
 true one from a cable alone, as many runs about the first place did not."""
 
-_HOPELESS, _BESIDE_GROUPS, _BESIDE_REACH = 100.0, 2, (0.12, 0.03)
+_HOPELESS, _BESIDE_GROUPS, BESIDE_REACH = 100.0, 2, (0.12, 0.03)
 """Log-likelihood at few frequencies behind the likeliest, from which on nobody looks at another
 beside a cause of the leading pair; true ones lay up to 75 behind. In how many groups the rest are
 looked at, and how far about their places, which are known well: what sizes further off do would
@@ -114,12 +115,12 @@ def look_beside(rough: Hunt, places: Starts) -> None:
     But for the ratio, which a further cause may move: who agrees best at the end of those looked at
     is followed.
     """
-    rough.start(places, _BESIDE_GROUPS, reach=_BESIDE_REACH)
+    rough.start(places, _BESIDE_GROUPS, reach=BESIDE_REACH)
     for _ in range(_FOLLOWED):
         places = {k: rough.found[k].best.place for k in places if _is_at_an_end(rough.found[k])}
         if not places:
             break
-        rough.start(places, _BESIDE_GROUPS, reach=_BESIDE_REACH)
+        rough.start(places, _BESIDE_GROUPS, reach=BESIDE_REACH)
 
 
 def look_closer_beside(rough: Hunt, keys: Collection[Effects]) -> None:

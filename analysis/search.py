@@ -73,6 +73,10 @@ _ONE_SIZE, _BEHIND, _BEHIND_GROUPS = 2, 60.0, 2
 rows is looked at in fewer groups in the third round: it is there to be held against, and three
 times the rows put it three times as far behind."""
 
+_ON_SECOND = 0.75
+"""Share of what may be simulated from which on nobody looks behind a single cause that explains, if
+pairs were searched before."""
+
 _TRIPLES, _TRIPLES_CLOSER, _TRIPLE_GROUPS, _TRIPLES_AFTER = 8, 4, (2, 4), 2
 """How many sets with a third cause beside a leading pair that is doubted are tried, and looked at
 closer, in how many groups each time; and how many of them on all rows."""
@@ -158,7 +162,9 @@ def search_causes(
                 _hold_rare(rough, fine, _without(without, rare), rng)
 
             def search_late() -> None:
-                if not pairs_searched:
+                if pairs_searched:
+                    _look_behind_single(rough, fine, atlas, rng)
+                else:
                     _search_late(rough, fine, atlas, rng)
 
             for step in (
@@ -219,8 +225,10 @@ def _look_at_all(
         missing = compare(fine, rng)
         if doubted or not is_doubtful(fine.best, rng):
             break
-    if missing and not (doubted or fine.purse.is_spent or is_hardly_missing(fine, rng)):
-        look_for_second(rough, fine, atlas, rng)
+    leader = fine.best.hypothesis.effects
+    alone = missing and len(leader) == 1 and not (doubted or fine.purse.is_spent)
+    if alone and not is_hardly_missing(fine, rng):
+        look_for_second(rough, fine, atlas, leader, rng)
     return missing, doubted
 
 
@@ -232,6 +240,25 @@ def _search_late(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator
     if is_refused_now(fine, rng):
         _bring_pairs(rough, fine, atlas)
         give_chances(fine)
+        compare(fine, rng)
+        see_it_predict(fine)
+
+
+def _look_behind_single(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator) -> None:
+    """Look for a second cause behind the best single one after pairs were searched.
+
+    Where whoever leads would be refused, or that one leads: pairs were searched beside what led on
+    few rows, and with few runs of each by themselves.
+    """
+    close = [k for k in fine.leading(len(fine.found), CLOSE) if len(k) == 1 and k in rough.found]
+    leader = fine.best.hypothesis.effects
+    if not close or not (
+        is_refused_now(fine, rng.spawn(1)[0])
+        or (leader == close[0] and not fine.purse.has_spent(_ON_SECOND))
+    ):
+        return
+    look_for_second(rough, fine, atlas, close[0], rng)
+    if fine.best.hypothesis.effects != leader:
         compare(fine, rng)
         see_it_predict(fine)
 

@@ -19,17 +19,18 @@ from analysis.causes import Hypothesis
 from analysis.chart import Chart
 from analysis.contest import catch_up, has_fewer, settle
 from analysis.hunt import Hunt
-from analysis.lending import leads_with_lent
-from analysis.pairs import at_few_frequencies, look_at_felt, look_beside
+from analysis.lending import leads_with_lent, on_the_other_side
+from analysis.pairs import BESIDE_REACH, at_few_frequencies, look_at_felt, look_beside
 from analysis.parts import earns
 from analysis.screening import Additions, add_causes, near, ranked, screen_felt, screen_singles
 from analysis.verdict import earns_its_name
 
 __all__ = ["look_for_second"]
 
-_TRIED = 16
-"""How many of them are simulated on few rows: by where they were placed true ones stood fourteenth
-at worst, more play beside a light load, where they were to be seen at all."""
+_TRIED, _OTHER_GROUPS = 16, 1
+"""How many of them are simulated on few rows, and in how many groups on the other side of the
+datasheet's value: by where they were placed true ones stood fourteenth at worst, more play beside a
+light load, where they were to be seen at all."""
 
 _CLOSER, _CLOSER_GROUPS, _BEHIND = 3, 3, 45.0
 """How many of these are looked at closer by each measure, with runs of the leader lent to them and
@@ -54,15 +55,19 @@ more than chance does. True ones were among the best two by then, and the others
 only where one does: behind a cause that is alone all do about as well, and none does."""
 
 
-def look_for_second(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator) -> None:
-    """See whether a second cause hides behind a single one that is not doubted.
+def look_for_second(
+    rough: Hunt, fine: Hunt, atlas: Atlas, leader: Effects, rng: np.random.Generator
+) -> None:
+    """See whether a second cause hides behind a single one.
 
     Parameters
     ----------
     rough, fine
-        Hunts on few and on all rows; the second one's leader is what others are tried beside.
+        Hunts on few and on all rows.
     atlas
         On the rows of `rough`.
+    leader
+        The single cause that others are tried beside.
     rng
         For the reading's noise in runs that are taken as observed.
 
@@ -71,9 +76,6 @@ def look_for_second(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Genera
     AnalysisError
         If a motion grew without bound.
     """
-    leader = fine.best.hypothesis.effects
-    if len(leader) != 1:
-        return
     additions = add_causes(rough.unit, rough.observation, atlas)
     beside = _worth(rough, additions, fine.found[leader])
     others = _stood_for(rough, additions, atlas, leader)
@@ -148,6 +150,7 @@ def _worth(rough: Hunt, additions: Additions, leader: Candidate) -> list[Effects
     placed = place_beside(at_few_frequencies(rough), additions, alone, place)
     tried = {key: placed[key].place for key in ranked(placed)[:_TRIED]}
     look_beside(rough, {alone.effects: place, **tried})
+    rough.start(on_the_other_side(alone, tried), _OTHER_GROUPS, reach=BESIDE_REACH)
     hopeful = _best(leads_with_lent(rough, additions, alone.effects, tried), _CLOSER)
     by_own = _leads(rough, rough.among(tried), alone.effects)
     hopeful += [key for key in _best(by_own, _CLOSER) if by_own[key] > -_BEHIND]

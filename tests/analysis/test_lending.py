@@ -79,3 +79,23 @@ def test_what_it_does_not_know_does_nothing_where_it_does_least(does, size):
     further = Hypothesis(ADSS, ("amplifier-saturation",))
     added = SimpleNamespace(added={further.effects: doing(does)})
     assert list(lending._least_of(further, added)) == [size]
+
+
+def test_the_other_side_of_a_datasheet_value_is_as_far_from_it():
+    known = Hypothesis(ADSS, LEADER)
+    pair = {e: tuple(sorted((*LEADER, e))) for e in ("shaft-stiffness", "motor-resistance")}
+    damped, backlash = ("load-inertia", "mesh1-damping"), ("load-inertia", "total-backlash")
+    found = lending.on_the_other_side(
+        known,
+        {
+            pair["shaft-stiffness"]: np.array([0.4, 0.7, 0.35]),
+            # A datasheet value itself has no other side, nor has what is not on it.
+            pair["motor-resistance"]: np.array([0.4, 0.7, 0.52]),
+            damped: np.array([0.4, 0.7, 0.3]),
+            # Nor does anything lie beyond the ends of a range.
+            backlash: np.array([0.4, 0.7, 0.02]),
+        },
+    )
+    assert set(found) == {pair["shaft-stiffness"], backlash}
+    assert found[pair["shaft-stiffness"]] == pytest.approx([0.4, 0.7, 0.65])
+    assert found[backlash] == pytest.approx([0.4, 0.7, 1.0])

@@ -8,7 +8,9 @@ import synthetic
 
 from analysis import contest, search
 from analysis.causes import Hypothesis
+from analysis.purse import Purse
 from analysis.screening import Place
+from sim.effort import Effort
 
 ADSS = synthetic.ADSS
 
@@ -242,17 +244,30 @@ def test_a_cause_of_one_size_that_few_rows_leave_far_behind_gets_fewer_runs():
     assert heard == [len(behind)]
 
 
+PAIR, SINGLE = ("load-inertia", "shaft-damping"), ("load-inertia",)
+
+
 @pytest.mark.parametrize(
-    ("doubted", "spent", "hardly"),
-    [(False, False, False), (True, False, False), (False, True, False), (False, False, True)],
+    ("doubted", "spent", "hardly", "leader", "looked_behind"),
+    [
+        (False, False, False, SINGLE, True),
+        (True, False, False, SINGLE, False),
+        (False, True, False, SINGLE, False),
+        (False, False, True, SINGLE, False),
+        (False, False, False, PAIR, False),
+        (False, False, False, (), False),
+    ],
 )
-def test_whether_pairs_were_searched_is_told(monkeypatch, doubted, spent, hardly):
+def test_whether_pairs_were_searched_is_told(
+    monkeypatch, doubted, spent, hardly, leader, looked_behind
+):
     """A second cause is looked for behind one that nobody doubts, where it may be paid for.
 
     But for one that leads a plain model that will do by too little to be named.
     """
+    best = SimpleNamespace(hypothesis=Hypothesis(ADSS, leader))
     fine = SimpleNamespace(
-        found={}, best=None, take_over=lambda *_: None, hear=lambda: None,
+        found={}, best=best, take_over=lambda *_: None, hear=lambda: None,
         purse=SimpleNamespace(is_spent=spent),
     )  # fmt: skip
     beside = []
@@ -261,10 +276,56 @@ def test_whether_pairs_were_searched_is_told(monkeypatch, doubted, spent, hardly
     monkeypatch.setattr(search, "is_doubtful", lambda *_: False)
     monkeypatch.setattr(search, "compare", lambda *_: True)
     monkeypatch.setattr(search, "is_hardly_missing", lambda *_: hardly)
-    monkeypatch.setattr(search, "look_for_second", lambda *_: beside.append(True))
+    monkeypatch.setattr(search, "look_for_second", lambda *given: beside.append(given[3]))
     rough = SimpleNamespace(found={}, leading=lambda *_: [])
     assert search._look_at_all(rough, fine, {}, None, doubted) == (True, doubted)
-    assert bool(beside) == (not doubted and not spent and not hardly)
+    assert beside == [leader] * looked_behind
+
+
+@pytest.mark.parametrize(
+    ("close", "refused", "spent", "behind", "found", "steps"),
+    [
+        ([PAIR, SINGLE, ("total-backlash",)], True, 0.9, SINGLE, True, ["compare", "predict"]),
+        ([SINGLE, PAIR], True, 0.9, SINGLE, False, []),
+        ([SINGLE, PAIR], False, 0.7, SINGLE, True, ["compare", "predict"]),
+        ([SINGLE, PAIR], False, 0.8, None, True, []),
+        ([PAIR, SINGLE], False, 0.0, None, True, []),
+        ([PAIR, ()], True, 0.0, None, True, []),
+        # Who was not simulated on few rows has nothing there that could be lent.
+        ([PAIR, ("shaft-damping",)], True, 0.0, None, True, []),
+    ],
+)
+def test_behind_the_best_single_cause_is_looked_once_more_after_pairs_were_searched(
+    monkeypatch, close, refused, spent, behind, found, steps
+):
+    """Where whoever leads would be refused, or it leads and enough is left.
+
+    A stiff shaft with damped teeth had been looked at as a soft one, with few runs.
+    """
+    effort = Effort()
+    effort.add(spent * 1e6)
+    done, looked = [], []
+
+    def standing(effects):
+        return SimpleNamespace(hypothesis=Hypothesis(ADSS, effects))
+
+    fine = SimpleNamespace(
+        found=dict.fromkeys(close), best=standing(close[0]), leading=lambda most, far: close,
+        purse=Purse(effort, granted_s=1e6),
+    )  # fmt: skip
+    rough = SimpleNamespace(found=[SINGLE, ("total-backlash",), PAIR])
+
+    def look(rough, fine, atlas, leader, rng):
+        looked.append(leader)
+        if found:
+            fine.best = standing(("load-inertia", "shaft-stiffness"))
+
+    monkeypatch.setattr(search, "look_for_second", look)
+    monkeypatch.setattr(search, "is_refused_now", lambda *_: refused)
+    monkeypatch.setattr(search, "compare", lambda *_: done.append("compare"))
+    monkeypatch.setattr(search, "see_it_predict", lambda *_: done.append("predict"))
+    search._look_behind_single(rough, fine, {}, np.random.default_rng(0))
+    assert (looked, done) == ([behind] if behind else [], steps)
 
 
 @pytest.mark.parametrize(

@@ -89,7 +89,7 @@ def test_those_placed_best_beside_a_leader_are_kept_where_runs_bear_them_out(
     monkeypatch, own, lent, closer, gain, kept
 ):
     """Sixteen are simulated about their places, and the leader as often about its own."""
-    leader, place, started, settled = ("load-inertia",), np.array([0.3, 0.6]), {}, []
+    leader, place, started, settled, mirrored = ("load-inertia",), np.array([0.3, 0.6]), {}, [], []
     placed = {
         (*leader, f"partner-{i:02}"): Place(np.array([0.3, 0.6, 0.1 * i]), 95.0 - 4.0 * i)
         for i in range(20)
@@ -106,8 +106,12 @@ def test_those_placed_best_beside_a_leader_are_kept_where_runs_bear_them_out(
             return ("few", stride)
 
         def start(self, places, groups, reach=None):
+            assert reach == (0.12, 0.03)
+            if groups == 1:
+                mirrored.extend(places)
+                return
             started.update(places)
-            assert (groups, reach) == (2, (0.12, 0.03))
+            assert groups == 2
             for key in places:
                 off = 0.0 if key == leader else given.get(key, (-300.0, -300.0))[0]
                 best = SimpleNamespace(log_likelihood=100.0 + off, place=None)
@@ -129,12 +133,14 @@ def test_those_placed_best_beside_a_leader_are_kept_where_runs_bear_them_out(
         return {key: given.get(key, (0.0, -300.0))[1] + gain * (key in settled) for key in keys}
 
     monkeypatch.setattr(second_cause, "place_beside", beside)
+    monkeypatch.setattr(second_cause, "on_the_other_side", lambda known, places: list(places)[1:3])
     monkeypatch.setattr(second_cause, "leads_with_lent", leads)
     monkeypatch.setattr(pairs, "_is_at_an_end", lambda _: False)
     alone = SimpleNamespace(hypothesis=Hypothesis(ADSS, leader), best=SimpleNamespace(place=place))
     found = second_cause._worth(Rough(), "sums", alone)
     assert set(started) == {leader, *partner[:16]}
     assert all(started[key] is placed[key].place for key in partner[:16])
+    assert mirrored == partner[1:3]
     assert [key for key in settled if key in given] == [list(given)[i] for i in closer]
     assert found == [list(given)[i] for i in kept]
 
@@ -178,7 +184,7 @@ def test_a_payload_is_held_against_two_causes_at_the_load_that_it_may_stand_for(
     monkeypatch.setattr(second_cause, "_worth", lambda *_: [])
     monkeypatch.setattr(second_cause, "screen_felt", lambda additions: additions.felt)
     monkeypatch.setattr(second_cause, "look_at_felt", look)
-    second_cause.look_for_second(rough, fine, {key: None}, RNG)
+    second_cause.look_for_second(rough, fine, {key: None}, key, RNG)
     assert looked == ([pair] if looked_at else [])
     assert list(fine.found) == ([key, pair] if taken_over else [key])
     assert fine.settled == ([[key, pair]] * 2 if taken_over else [])
@@ -210,7 +216,7 @@ def looked_behind(monkeypatch, ahead, looks=99, *, earning=(PAIR, OTHER), gains=
         return whole.hypothesis.effects in earning
 
     monkeypatch.setattr(second_cause, "earns_its_name", asked)
-    second_cause.look_for_second(rough, fine, {LEADER: None}, RNG)
+    second_cause.look_for_second(rough, fine, {LEADER: None}, LEADER, RNG)
     return fine
 
 
@@ -273,10 +279,3 @@ def test_what_may_be_simulated_ends_where_it_is_spent(monkeypatch, looks, taken_
     fine = looked_behind(monkeypatch, {PAIR: 16.0}, looks)
     assert (PAIR in fine.found) == taken_over
     assert len(fine.settled) == settled
-
-
-def test_nothing_is_looked_for_behind_a_pair_or_behind_nothing():
-    for effects in ((), ("amplifier-lag", "load-inertia")):
-        leader = SimpleNamespace(hypothesis=Hypothesis(ADSS, effects), best=None)
-        # Neither hunt would bear being asked for anything else.
-        second_cause.look_for_second(None, SimpleNamespace(best=leader), {}, RNG)
