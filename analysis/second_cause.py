@@ -9,6 +9,7 @@ bring is said by `analysis.verdict`.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -41,9 +42,10 @@ _ON_ALL, _ALL_GROUPS, _LEAD = 4, 4, 1.0
 """How many are simulated on all rows, in how many groups, and the log-likelihood on few rows by
 which they must lead. True ones led by 8 to 20, and false ones by 2 where nothing hid there."""
 
-_NEARLY, _BEHIND_BEST = 10.0, 30.0
+_NEARLY, _BEHIND_BEST, _SURE = 10.0, 30.0, 20.0
 """What they must lead by on all rows, and how far behind the best of them they may be, to get as
-many runs again."""
+many runs again; or what they led by on few. Where forty runs lie is chance, too: of a shaft that
+hardens beside an amplifier that clips they lay 76 behind."""
 
 _CALLED_FOR = 15.0
 """By so much must one then lead to be left in the contest: of false ones the best led by 15 to 24
@@ -82,61 +84,81 @@ def look_for_second(
     if not beside and not others or fine.purse.is_spent:
         return
     fine.take_over([rough.found[key] for key in (*beside, *others)], _ALL_GROUPS)
-    leads = leads_with_lent(fine, additions, leader, beside)
-    least = max(_NEARLY, max(leads.values(), default=0.0) - _BEHIND_BEST)
-    settle(fine, [key for key, lead in leads.items() if lead > least])
+    standing = _Standing(fine, additions, leader)
+    standing.ask(beside)
+    least = max(_NEARLY, max(standing.leads.values(), default=0.0) - _BEHIND_BEST)
+    settle(fine, [key for key in beside if standing.leads[key] > least or beside[key] > _SURE])
     catch_up(fine, others, leader)
-    leads = leads_with_lent(fine, additions, leader, beside)
+    standing.ask([key for key in fine.found if set(key) > set(leader)])
     # They would only take the place of rivals among those that are judged.
-    fine.leave_out([key for key, lead in leads.items() if lead < _CALLED_FOR])
-    _contest(fine, additions, leader, rng)
+    standing.leave_out([key for key in beside if standing.leads[key] < _CALLED_FOR])
+    _contest(standing, rng)
 
 
-def _contest(fine: Hunt, additions: Additions, leader: Effects, rng: np.random.Generator) -> None:
+@dataclass(frozen=True, slots=True)
+class _Standing:
+    """How sets with a second cause stand against the first on all rows, its runs lent to them.
+
+    `leads`: by what log-likelihood they lead, as it was asked last.
+    """
+
+    fine: Hunt
+    additions: Additions
+    leader: Effects
+    leads: dict[Effects, float] = field(default_factory=dict)
+
+    def ask(self, keys: Collection[Effects]) -> None:
+        """See how some stand now."""
+        self.leads.update(leads_with_lent(self.fine, self.additions, self.leader, keys))
+
+    @property
+    def near(self) -> list[Effects]:
+        """Those that lead by as much as is called for and are close to the best, first of all."""
+        least = max(_CALLED_FOR, max(self.leads.values(), default=0.0) - _BEHIND_BEST)
+        return [key for key in _best(self.leads, len(self.leads)) if self.leads[key] >= least]
+
+    def leave_out(self, keys: Collection[Effects]) -> None:
+        """Look at some no more."""
+        self.fine.leave_out(keys)
+        for key in keys:
+            del self.leads[key]
+
+
+def _contest(standing: _Standing, rng: np.random.Generator) -> None:
     """Keep sets with a second cause if one brings more than chance does, with as many runs."""
-    further = {key for key in fine.found if set(key) > set(leader)}
+    fine, leader = standing.fine, standing.leader
     for _ in range(_ROUNDS):
-        best = next(iter(_near(fine, additions, leader, further)), fine.best.hypothesis.effects)
+        best = next(iter(standing.near), fine.best.hypothesis.effects)
         if best == leader or fine.purse.is_spent:
             break
         settle(fine, [leader, best])
         fine.hear()
-    while near := _near(fine, additions, leader, further):
+        standing.ask(list(standing.leads))
+    while near := standing.near:
         best = near[0]
         # Few runs fit by chance.
         if has_fewer(fine, best, leader):
             settle(fine, [best])
+            standing.ask([best])
         elif earns_its_name(fine.found[best], fine.found[leader], rng.spawn(1)[0]):
-            _level(fine, additions, leader, further, best)
+            _level(standing, best)
             return
         else:
-            further.remove(best)
-            fine.leave_out([best])
-    if fine.best.hypothesis.effects in (leader, *further):
-        fine.leave_out(further)
+            standing.leave_out([best])
+    if fine.best.hypothesis.effects in (leader, *standing.leads):
+        standing.leave_out(list(standing.leads))
 
 
-def _level(
-    fine: Hunt, additions: Additions, leader: Effects, further: Collection[Effects], best: Effects
-) -> None:
+def _level(standing: _Standing, best: Effects) -> None:
     """Give those that are close to the best as many runs as it has, while they stay close."""
-    few: Collection[Effects] = further
+    fine = standing.fine
     while not fine.purse.is_spent:
-        near = _near(fine, additions, leader, few)
-        few = [key for key in near if has_fewer(fine, key, best)]
+        few = [key for key in standing.near if has_fewer(fine, key, best)]
         if not few:
             break
         settle(fine, few)
         fine.hear()
-
-
-def _near(
-    fine: Hunt, additions: Additions, leader: Effects, keys: Collection[Effects]
-) -> list[Effects]:
-    """Those that lead by as much as is called for and are close to the best, which comes first."""
-    leads = leads_with_lent(fine, additions, leader, keys)
-    least = max(_CALLED_FOR, max(leads.values(), default=0.0) - _BEHIND_BEST)
-    return [key for key in _best(leads, len(leads)) if leads[key] >= least]
+        standing.ask(few)
 
 
 def _leads(fine: Hunt, keys: Sequence[Effects], leader: Effects) -> dict[Effects, float]:
@@ -144,8 +166,8 @@ def _leads(fine: Hunt, keys: Sequence[Effects], leader: Effects) -> dict[Effects
     return {key: fine.found[key].best.log_likelihood - alone for key in keys}
 
 
-def _worth(rough: Hunt, additions: Additions, leader: Candidate) -> list[Effects]:
-    """Pairs with the leader that are worth simulating on all rows."""
+def _worth(rough: Hunt, additions: Additions, leader: Candidate) -> dict[Effects, float]:
+    """Pairs with the leader that are worth simulating on all rows, and how far they lead."""
     alone, place = leader.hypothesis, leader.best.place
     placed = place_beside(at_few_frequencies(rough), additions, alone, place)
     tried = {key: placed[key].place for key in ranked(placed)[:_TRIED]}
@@ -157,7 +179,7 @@ def _worth(rough: Hunt, additions: Additions, leader: Candidate) -> list[Effects
     hopeful = list(dict.fromkeys(hopeful))
     rough.settle(hopeful, _CLOSER_GROUPS)
     leads = leads_with_lent(rough, additions, alone.effects, hopeful)
-    return [key for key in _best(leads, _ON_ALL) if leads[key] > _LEAD]
+    return {key: leads[key] for key in _best(leads, _ON_ALL) if leads[key] > _LEAD}
 
 
 def _best(leads: Mapping[Effects, float], most: int) -> list[Effects]:

@@ -142,7 +142,7 @@ def test_those_placed_best_beside_a_leader_are_kept_where_runs_bear_them_out(
     assert all(started[key] is placed[key].place for key in partner[:16])
     assert mirrored == partner[1:3]
     assert [key for key in settled if key in given] == [list(given)[i] for i in closer]
-    assert found == [list(given)[i] for i in kept]
+    assert found == {list(given)[i]: lent[i] + gain for i in kept}
 
 
 @pytest.mark.parametrize(
@@ -181,7 +181,7 @@ def test_a_payload_is_held_against_two_causes_at_the_load_that_it_may_stand_for(
     felt = {pair: Place(None, 100.0 - behind)}
     monkeypatch.setattr(second_cause, "screen_singles", lambda *_: {key: Place(None, 100.0)})
     monkeypatch.setattr(second_cause, "add_causes", lambda *_: SimpleNamespace(felt=felt))
-    monkeypatch.setattr(second_cause, "_worth", lambda *_: [])
+    monkeypatch.setattr(second_cause, "_worth", lambda *_: {})
     monkeypatch.setattr(second_cause, "screen_felt", lambda additions: additions.felt)
     monkeypatch.setattr(second_cause, "look_at_felt", look)
     second_cause.look_for_second(rough, fine, {key: None}, key, RNG)
@@ -194,7 +194,7 @@ LEADER, PAIR = ("load-inertia",), ("amplifier-lag", "load-inertia")
 OTHER = ("load-inertia", "shaft-damping")
 
 
-def looked_behind(monkeypatch, ahead, looks=99, *, earning=(PAIR, OTHER), gains=None):
+def looked_behind(monkeypatch, ahead, looks=99, *, earning=(PAIR, OTHER), gains=None, few=5.0):
     """The hunt on all rows after pairs were worth it, so far ahead of their leader."""
     found = {
         key: SimpleNamespace(
@@ -207,7 +207,7 @@ def looked_behind(monkeypatch, ahead, looks=99, *, earning=(PAIR, OTHER), gains=
     fine = Beside(found[LEADER], looks, gains or {})
     rough = SimpleNamespace(unit=ADSS, observation=SimpleNamespace(frequency_hz=None), found=found)
     monkeypatch.setattr(second_cause, "add_causes", lambda *_: None)
-    monkeypatch.setattr(second_cause, "_worth", lambda *_: list(ahead))
+    monkeypatch.setattr(second_cause, "_worth", lambda *_: dict.fromkeys(ahead, few))
     monkeypatch.setattr(second_cause, "_stood_for", lambda *_: [])
 
     def asked(whole, part, _):
@@ -269,6 +269,14 @@ def test_who_leads_with_lent_runs_gets_as_many_of_its_own_before_it_is_asked(mon
     fine = looked_behind(monkeypatch, {PAIR: -20.0, OTHER: -50.0, third: -65.0})
     assert fine.settled == [[PAIR, OTHER], [LEADER, PAIR], [LEADER, PAIR], [OTHER], [OTHER]]
     assert [len(one.population) for one in fine.found.values()] == [120, 160, 160, 40]
+
+
+@pytest.mark.parametrize(("few", "once_more"), [(19.0, False), (21.0, True)])
+def test_who_led_by_much_on_few_rows_gets_a_second_chance_on_all(monkeypatch, few, once_more):
+    """The first runs there lie where they lie by chance."""
+    fine = looked_behind(monkeypatch, {PAIR: -76.0}, few=few, gains={PAIR: 110.0})
+    assert bool(fine.settled) == once_more
+    assert (PAIR in fine.found) == once_more
 
 
 @pytest.mark.parametrize(
