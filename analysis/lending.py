@@ -61,10 +61,10 @@ def on_the_other_side(
     found = {}
     for key, place in places.items():
         further = Hypothesis(known.unit, tuple(e for e in key if e not in known.effects))
-        if further.centred:
+        nothing = _known_sizes(further)
+        if further.centred and nothing is not None:
             whole = Hypothesis(known.unit, key)
             size = whole.part(further.effects, place)[1:]
-            nothing = _known_sizes(further)
             if abs(size - nothing) > _OFF:
                 other = np.clip(2.0 * nothing - size, 0.0, 1.0)
                 found[key] = known.joined(whole.part(known.effects, place), further, other)[1]
@@ -81,14 +81,16 @@ def _lent(
 
 def _least_of(further: Hypothesis, additions: Additions) -> NDArray[np.float64]:
     """The sizes (k,) at which a cause does nothing: the datasheet's, or where it does least."""
-    if all(parameter.nominal(further.unit) for _, parameter in further.parameters):
-        return _known_sizes(further)
+    known = _known_sizes(further)
+    if known is not None:
+        return known
     added = additions.added[further.effects]
     does = np.abs(added.shift / added.std).mean(axis=(0, 2))
     return np.asarray(added.sizes[np.argmin(does)])
 
 
-def _known_sizes(further: Hypothesis) -> NDArray[np.float64]:
-    """Sizes (k,) of a cause as the datasheet has them."""
-    values = [float(parameter.nominal(further.unit) or 0.0) for _, parameter in further.parameters]
-    return (np.log(values) - further.logs[:, 0]) / np.ptp(further.logs, axis=1)
+def _known_sizes(further: Hypothesis) -> NDArray[np.float64] | None:
+    """Sizes (k,) of a cause as the datasheet has them, if it does."""
+    known = [parameter.nominal(further.unit) for _, parameter in further.parameters]
+    values = [value for value in known if value]
+    return further.place(0.0, values)[1:] if len(values) == len(known) else None

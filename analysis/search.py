@@ -251,16 +251,16 @@ def _look_behind_single(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Ge
     few rows, and with few runs of each by themselves.
     """
     close = [k for k in fine.leading(len(fine.found), CLOSE) if len(k) == 1 and k in rough.found]
-    leader = fine.best.hypothesis.effects
-    if not close or not (
-        is_refused_now(fine, rng.spawn(1)[0])
-        or (leader == close[0] and not fine.purse.has_spent(_ON_SECOND))
-    ):
+    if not close:
         return
-    look_for_second(rough, fine, atlas, close[0], rng)
-    if fine.best.hypothesis.effects != leader:
-        compare(fine, rng)
-        see_it_predict(fine)
+    leader = fine.best.hypothesis.effects
+    refused = is_refused_now(fine, rng.spawn(1)[0])
+    alone = leader == close[0] and not fine.purse.has_spent(_ON_SECOND)
+    if refused or (alone and not is_hardly_missing(fine, rng)):
+        look_for_second(rough, fine, atlas, close[0], rng)
+        if fine.best.hypothesis.effects != leader:
+            compare(fine, rng)
+            see_it_predict(fine)
 
 
 def _bring_pairs(rough: Hunt, fine: Hunt, atlas: Atlas) -> None:

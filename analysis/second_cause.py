@@ -88,9 +88,11 @@ def look_for_second(
     standing = _Standing(fine, additions, leader)
     standing.ask(beside)
     least = max(_NEARLY, max(standing.leads.values(), default=0.0) - _BEHIND_BEST)
-    settle(fine, [key for key in beside if standing.leads[key] > least or beside[key] > _SURE])
+    again = [key for key in beside if standing.leads[key] > least or beside[key] > _SURE]
+    settle(fine, again)
     catch_up(fine, others, leader)
-    standing.ask([key for key in fine.found if set(key) > set(leader)])
+    before = [key for key in fine.found if set(key) > set(leader) and key not in beside]
+    standing.ask([*again, *before])
     # They would only take the place of rivals among those that are judged.
     standing.leave_out([key for key in beside if standing.leads[key] < _CALLED_FOR])
     _contest(standing, rng)
@@ -110,7 +112,8 @@ class _Standing:
 
     def ask(self, keys: Collection[Effects]) -> None:
         """See how some stand now."""
-        self.leads.update(leads_with_lent(self.fine, self.additions, self.leader, keys))
+        if keys:
+            self.leads.update(leads_with_lent(self.fine, self.additions, self.leader, keys))
 
     @property
     def near(self) -> list[Effects]:

@@ -283,20 +283,21 @@ def test_whether_pairs_were_searched_is_told(
 
 
 @pytest.mark.parametrize(
-    ("close", "refused", "spent", "behind", "found", "steps"),
+    ("close", "refused", "spent", "hardly", "behind", "found", "steps"),
     [
-        ([PAIR, SINGLE, ("total-backlash",)], True, 0.9, SINGLE, True, ["compare", "predict"]),
-        ([SINGLE, PAIR], True, 0.9, SINGLE, False, []),
-        ([SINGLE, PAIR], False, 0.7, SINGLE, True, ["compare", "predict"]),
-        ([SINGLE, PAIR], False, 0.8, None, True, []),
-        ([PAIR, SINGLE], False, 0.0, None, True, []),
-        ([PAIR, ()], True, 0.0, None, True, []),
+        ([PAIR, SINGLE, ("x",)], True, 0.9, False, SINGLE, True, ["compare", "predict"]),
+        ([SINGLE, PAIR], True, 0.9, False, SINGLE, False, []),
+        ([SINGLE, PAIR], False, 0.7, False, SINGLE, True, ["compare", "predict"]),
+        ([SINGLE, PAIR], False, 0.7, True, None, True, []),
+        ([SINGLE, PAIR], False, 0.8, False, None, True, []),
+        ([PAIR, SINGLE], False, 0.0, False, None, True, []),
+        ([PAIR, ()], True, 0.0, False, None, True, []),
         # Who was not simulated on few rows has nothing there that could be lent.
-        ([PAIR, ("shaft-damping",)], True, 0.0, None, True, []),
+        ([PAIR, ("shaft-damping",)], True, 0.0, False, None, True, []),
     ],
 )
 def test_behind_the_best_single_cause_is_looked_once_more_after_pairs_were_searched(
-    monkeypatch, close, refused, spent, behind, found, steps
+    monkeypatch, close, refused, spent, hardly, behind, found, steps
 ):
     """Where whoever leads would be refused, or it leads and enough is left.
 
@@ -313,7 +314,7 @@ def test_behind_the_best_single_cause_is_looked_once_more_after_pairs_were_searc
         found=dict.fromkeys(close), best=standing(close[0]), leading=lambda most, far: close,
         purse=Purse(effort, granted_s=1e6),
     )  # fmt: skip
-    rough = SimpleNamespace(found=[SINGLE, ("total-backlash",), PAIR])
+    rough = SimpleNamespace(found=[SINGLE, ("x",), PAIR])
 
     def look(rough, fine, atlas, leader, rng):
         looked.append(leader)
@@ -322,6 +323,7 @@ def test_behind_the_best_single_cause_is_looked_once_more_after_pairs_were_searc
 
     monkeypatch.setattr(search, "look_for_second", look)
     monkeypatch.setattr(search, "is_refused_now", lambda *_: refused)
+    monkeypatch.setattr(search, "is_hardly_missing", lambda *_: hardly)
     monkeypatch.setattr(search, "compare", lambda *_: done.append("compare"))
     monkeypatch.setattr(search, "see_it_predict", lambda *_: done.append("predict"))
     search._look_behind_single(rough, fine, {}, np.random.default_rng(0))

@@ -61,6 +61,8 @@ def lent(monkeypatch):
     more = {}
 
     def leads(hunt, additions, leader, keys):
+        # Nobody is asked about where there is nothing to ask.
+        assert keys
         alone = hunt.found[leader].best.log_likelihood
         return {k: hunt.found[k].best.log_likelihood - alone + more.get(k, 0.0) for k in keys}
 
