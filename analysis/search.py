@@ -201,7 +201,7 @@ def _look_at_few(rough: Hunt, atlas: Atlas, rng: np.random.Generator) -> bool:
     rough.hear()
     doubted = is_doubtful_at_once(rough, rng)
     if doubted:
-        search_pairs(rough, atlas)
+        search_pairs(rough, atlas, rng)
     return doubted
 
 
@@ -219,7 +219,7 @@ def _look_at_all(
         if not doubted and is_doubtful_still(fine, rng):
             # More rows, or more runs, show that a single cause will not do after all.
             doubted = True
-            _bring_pairs(rough, fine, atlas)
+            _bring_pairs(rough, fine, atlas, rng)
         if doubted and is_doubtful(fine.best, rng):
             give_chances(fine)
         missing = compare(fine, rng)
@@ -238,7 +238,7 @@ def _search_late(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator
     It shows what is missing only with the runs that it gets as others are held against it.
     """
     if is_refused_now(fine, rng):
-        _bring_pairs(rough, fine, atlas)
+        _bring_pairs(rough, fine, atlas, rng)
         give_chances(fine)
         compare(fine, rng)
         see_it_predict(fine)
@@ -263,9 +263,9 @@ def _look_behind_single(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Ge
             see_it_predict(fine)
 
 
-def _bring_pairs(rough: Hunt, fine: Hunt, atlas: Atlas) -> None:
+def _bring_pairs(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator) -> None:
     """Search pairs on few rows, and look at those that lead there on all."""
-    search_pairs(rough, atlas)
+    search_pairs(rough, atlas, rng)
     _look_on_all(rough, fine, [key for key in _third(rough) if key not in fine.found])
 
 

@@ -12,6 +12,8 @@ from analysis.screening import Place
 from sim.catalogue import CATALOGUE
 from sim.effort import Effort
 
+RNG = np.random.default_rng(1)
+
 
 @pytest.mark.parametrize("seed", synthetic_search.MORE_SEEDS)
 def test_two_causes_are_found_together(runs, seed):
@@ -89,13 +91,17 @@ def test_others_are_tried_beside_the_causes_of_a_leading_pair(
     monkeypatch.setattr(pairs, "places_of_parts", lambda leader: {(e,): None for e in leader.of})
     monkeypatch.setattr(pairs, "_look_at_parts", lambda rough, leader: alone.append(leader))
     additions = SimpleNamespace(coarse=Standings.observation)
-    pairs._hold_against_neighbours(Standings(likelihood), {}, additions, {("a", "b"), ("a", "c")})
+    looked_at = {("a", "b"), ("a", "c")}
+    pairs._hold_against_neighbours(Standings(likelihood), {}, additions, looked_at, RNG)
     assert (beside, alone) == (swapped, weighed)
 
 
-@pytest.mark.parametrize(("behind", "held"), [(59.0, True), (61.0, False)])
-def test_others_are_tried_beside_a_close_pair_that_shares_no_cause_with_the_leader(
-    monkeypatch, behind, held
+@pytest.mark.parametrize(
+    ("behind", "doubted", "held"),
+    [(59.0, True, True), (61.0, True, False), (59.0, False, False)],
+)
+def test_others_are_tried_beside_a_close_pair_that_shares_no_cause_with_a_leader_in_doubt(
+    monkeypatch, behind, doubted, held
 ):
     leader, stranger, far = ("a", "b"), ("c", "d"), ("e", "f")
     likelihood = {leader: 100.0, ("a", "c"): 99.0, stranger: 100.0 - behind, far: 100.0 - behind}
@@ -107,9 +113,26 @@ def test_others_are_tried_beside_a_close_pair_that_shares_no_cause_with_the_lead
     monkeypatch.setattr(pairs, "places_of_parts", lambda leader: {(e,): None for e in leader.of})
     monkeypatch.setattr(pairs, "_look_at_parts", lambda rough, leader: alone.append(leader))
     additions = SimpleNamespace(coarse=Standings.observation)
-    pairs._hold_against_neighbours(rough, {}, additions, {leader, ("a", "c"), stranger, far})
+    monkeypatch.setattr(pairs, "is_doubtful", lambda one, rng, missed: doubted and missed == 1.3)
+    looked_at = {leader, ("a", "c"), stranger, far}
+    pairs._hold_against_neighbours(rough, {}, additions, looked_at, RNG)
     assert beside == [("a",), ("b",), *([("c",), ("d",)] if held else [])]
     assert alone == [leader, *([stranger] if held else [])]
+
+
+@pytest.mark.parametrize(
+    ("ahead", "pair", "kept"),
+    [
+        (199.0, ("a", "b"), [("a",), ("b",)]),
+        (201.0, ("a", "b"), [("a",)]),
+        # The leading pair has nothing to do with it.
+        (201.0, ("b", "c"), [("b",), ("c",)]),
+    ],
+)
+def test_nothing_is_tried_beside_what_a_single_cause_leads_by_far(monkeypatch, ahead, pair, kept):
+    singles = {("a",): 500.0, ("b",): 100.0, ("c",): 500.0 - ahead}
+    monkeypatch.setattr(pairs, "places_of_parts", lambda leader: {(e,): None for e in leader.of})
+    assert list(pairs._kept(Standings({pair: 900.0} | singles), pair)) == kept
 
 
 @pytest.mark.parametrize(("heard_anew", "added_up"), [([False, False], 0), ([True, False], 1)])
@@ -135,7 +158,7 @@ def test_what_causes_add_is_looked_at_again_where_another_noise_was_heard(
     monkeypatch.setattr(pairs, "add_causes", add)
     monkeypatch.setattr(pairs, "_look_beside_all", beside)
     monkeypatch.setattr(pairs, "places_of_parts", lambda leader: {(e,): None for e in leader.of})
-    pairs._hold_against_neighbours(rough, {}, first, {("a", "b")})
+    pairs._hold_against_neighbours(rough, {}, first, {("a", "b")}, RNG)
     assert len(anew) == added_up
     assert used == [anew[0] if added_up else first]
 
@@ -322,9 +345,9 @@ def test_pairs_that_add_up_exactly_are_looked_at_whatever_is_favoured(monkeypatc
     monkeypatch.setattr(pairs, "screen_pairs", lambda *_: places)
     monkeypatch.setattr(pairs, "_glance", lambda _, places, most: glanced.extend(places))
     monkeypatch.setattr(pairs, "_hold_against_neighbours", lambda *_: None)
-    pairs.search_pairs(rough, {})
+    pairs.search_pairs(rough, {}, RNG)
     assert not {felt, unlike} & set(glanced)
-    assert set(others[:20]) <= set(glanced)
+    assert set(others[:10]) <= set(glanced)
     assert started == [{felt: "where it is felt alike"}]
     assert closer[:2] == [[felt], [felt]]
     assert felt in closer[2]

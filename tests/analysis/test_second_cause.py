@@ -22,11 +22,11 @@ class Beside:
 
     def __init__(self, leader, looks=99, gains=None):
         self.found, self.settled = {leader.hypothesis.effects: leader}, []
-        self.looks, self.gains = looks, gains or {}
+        self.looks, self.gains, self.taken = looks, gains or {}, 0
 
     @property
     def purse(self):
-        return SimpleNamespace(is_spent=len(self.settled) + len(self.found) - 1 >= self.looks)
+        return SimpleNamespace(is_spent=len(self.settled) + self.taken >= self.looks)
 
     @property
     def best(self):
@@ -49,6 +49,7 @@ class Beside:
 
     def take_over(self, candidates, groups):
         self.found |= {c.hypothesis.effects: c for c in candidates}
+        self.taken += len(candidates)
 
     def leave_out(self, keys):
         for key in keys:
@@ -74,12 +75,12 @@ def lent(monkeypatch):
     ("own", "lent", "closer", "gain", "kept"),
     [
         # The best three by each measure are looked at closer, those that then lead go on.
-        ((-9.0, -5.0, -40.0, -46.0), (0.0, 5.0, 2.0, 7.0), [3, 1, 2, 0], 0.0, [3, 1, 2]),
+        ((-9.0, -5.0, -40.0, -46.0), (0.0, 5.0, 4.0, 7.0), [3, 1, 2, 0], 0.0, [3, 1, 2]),
         # None by its own runs that is far behind, and no more than three by lent ones.
-        ((-50.0,) * 5, (4.0, 3.0, 2.5, 2.0, 1.5), [0, 1, 2], 0.0, [0, 1, 2]),
-        ((-50.0,) * 3, (0.9, 0.5, -3.0), [0, 1, 2], 0.0, []),
+        ((-50.0,) * 5, (6.0, 5.0, 3.5, 3.4, 3.3), [0, 1, 2], 0.0, [0, 1, 2]),
+        ((-50.0,) * 3, (2.9, 0.5, -3.0), [0, 1, 2], 0.0, []),
         # Few runs had it behind by either measure, and more of them show that it leads.
-        ((-31.0,), (-17.0,), [0], 20.0, [0]),
+        ((-31.0,), (-16.0,), [0], 20.0, [0]),
         ((-4.0, -5.0, -6.0, -7.0), (9.0, 8.0, 7.0, 6.0), [0, 1, 2], 0.0, [0, 1, 2]),
         (
             (-30.0, -29.0, -28.0, -9.0, -8.0, -7.0), (9.0, 8.0, 7.0, 6.0, 5.0, 4.0),
@@ -214,7 +215,7 @@ def looked_behind(monkeypatch, ahead, looks=99, *, earning=(PAIR, OTHER), gains=
 
     def asked(whole, part, _):
         assert part.hypothesis.effects == LEADER
-        assert len(whole.population) >= len(part.population)
+        assert fine.purse.is_spent or len(whole.population) >= len(part.population)
         return whole.hypothesis.effects in earning
 
     monkeypatch.setattr(second_cause, "earns_its_name", asked)
@@ -255,6 +256,22 @@ def test_a_further_cause_that_leads_by_less_is_not_asked(monkeypatch):
     fine = looked_behind(monkeypatch, {PAIR: 60.0, OTHER: 55.0}, earning=(), gains={LEADER: 21.0})
     assert fine.settled == [[PAIR, OTHER], [LEADER, PAIR], [LEADER, PAIR]]
     assert list(fine.found) == [LEADER]
+
+
+@pytest.mark.parametrize(("lead", "asked"), [(35.0, False), (37.0, True)])
+def test_who_leads_by_far_less_than_what_was_chance_is_not_asked(monkeypatch, lead, asked):
+    fine = looked_behind(monkeypatch, {PAIR: 60.0, OTHER: lead}, earning=(OTHER,))
+    assert list(fine.found) == [LEADER, OTHER][: 1 + asked]
+    assert fine.settled[3:] == [[OTHER]] * asked
+
+
+@pytest.mark.parametrize(("looks", "runs"), [(99, 120), (5, 80)])
+def test_who_is_left_is_asked_with_the_runs_it_has_where_all_is_spent(monkeypatch, looks, runs):
+    """By few runs a cause leads by less: what then brings more than chance does is no chance."""
+    ahead = {PAIR: 60.0, OTHER: 55.0}
+    fine = looked_behind(monkeypatch, ahead, looks, earning=(OTHER,))
+    assert list(fine.found) == [LEADER, OTHER]
+    assert len(fine.found[OTHER].population) == runs
 
 
 def test_who_brings_more_is_compared_with_others_that_have_as_many_runs(monkeypatch):
