@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.adequacy import judge_adequacy
 from analysis.candidate import Candidate, Effects
@@ -247,8 +248,7 @@ def weigh_parts(fine: Hunt) -> None:
     few = {
         part: place
         for part, place in parts.items()
-        if part not in elsewhere
-        and (part not in fine.found or len(fine.found[part].population) <= len(leader.population))
+        if part not in elsewhere and _is_open(fine, part, place, part in hopeful)
     }
     if few or elsewhere:
         fine.start(few, LAST_GROUPS)
@@ -256,6 +256,15 @@ def weigh_parts(fine: Hunt) -> None:
         hopeful = fine.leading(len(fine.found), HOPELESS)
         fine.settle([key for key in hopeful if key in few or key in elsewhere], LAST_GROUPS)
         fine.hear()
+
+
+def _is_open(fine: Hunt, part: Effects, place: NDArray[np.float64], hopeful: bool) -> bool:
+    """Whether what a part does at a place (d,) is not known yet, or not by enough runs."""
+    if part not in fine.found:
+        return True
+    known = fine.found[part]
+    there = bool(np.all(abs(known.best.place - place) <= _MOVED))
+    return len(known.population) <= len(fine.best.population) and (hopeful or not there)
 
 
 def weigh_baseline(fine: Hunt, rng: np.random.Generator) -> None:

@@ -56,7 +56,7 @@ _FOLLOWED, _EDGE = 2, 0.03
 about there, and how near to that end. A weak amplifier alone was best at a ratio of 0.17; with
 damped teeth, placed at 0.3 and hidden at 0.52, it went from 65 to 258 in two steps, and alone."""
 
-_BESIDE, _AT_ONCE = 24, 6
+_BESIDE, _AT_ONCE = 18, 6
 """How many are looked at beside what is known, and how many before the purse is asked again: of 28
 true pairs none was placed farther back than twelfth."""
 

@@ -70,8 +70,8 @@ in more where one has many sizes. So many single causes that are close are alway
 
 _ONE_SIZE, _BEHIND, _BEHIND_GROUPS = 2, 60.0, 2
 """A cause of one size (coordinates, the ratio is the first) that is so far behind the leader on few
-rows is looked at in fewer groups in the third round: it is there to be held against, and three
-times the rows put it three times as far behind."""
+rows is looked at in fewer groups in the third round, and the plain model if it is too far behind:
+they are there to be held against, and three times the rows put them three times as far behind."""
 
 _ON_SECOND = 0.75
 """Share of what may be simulated from which on nobody looks behind a single cause that explains, if
@@ -272,8 +272,9 @@ def _bring_pairs(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator
 def _look_on_all(rough: Hunt, fine: Hunt, keys: Sequence[Effects]) -> None:
     """Look at hypotheses on all rows, where few left them."""
     near = set(rough.leading(len(rough.found), _BEHIND))
-    one_size = [key for key in keys if rough.found[key].hypothesis.d == _ONE_SIZE]
-    behind = [key for key in one_size if key not in near]
+    far = {()} - set(rough.leading(len(rough.found), TOO_FAR))
+    one_size = {key for key in keys if rough.found[key].hypothesis.d == _ONE_SIZE}
+    behind = [key for key in keys if key in far or key in one_size - near]
     fine.take_over([rough.found[key] for key in keys if key not in behind], _THIRD_GROUPS)
     if behind:
         fine.take_over([rough.found[key] for key in behind], _BEHIND_GROUPS)

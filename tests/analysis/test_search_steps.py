@@ -82,6 +82,8 @@ def test_who_says_the_same_as_a_leader_with_fewer_sizes_is_looked_at_with_it(f_p
         # However many it has: friction of a motor had 240 at another ratio.
         (240, 0.21, True, False, True), (40, 0.21, True, False, True),
         (240, 0.21, False, False, False), (40, 0.21, False, True, False),
+        # Who is hopeless where the pair has it is known well enough.
+        (40, 0.19, False, False, False),
     ],
 )  # fmt: skip
 def test_a_part_with_no_more_runs_than_a_pair_or_at_another_ratio_is_weighed_where_the_pair_has_it(
@@ -218,7 +220,8 @@ def test_pairs_are_searched_late_where_a_single_cause_would_be_refused_after_all
     assert given == ([found[pair]] if refused else [])
 
 
-def test_a_cause_of_one_size_that_few_rows_leave_far_behind_gets_fewer_runs():
+@pytest.mark.parametrize(("plain", "fewer"), [(199.0, False), (201.0, True)])
+def test_a_cause_of_one_size_that_few_rows_leave_far_behind_gets_fewer_runs(plain, fewer):
     """The baseline is what all is held against, and who has many sizes needs runs to fit."""
     behind = {
         ("load-coulomb-friction",): 0.0,
@@ -226,7 +229,7 @@ def test_a_cause_of_one_size_that_few_rows_leave_far_behind_gets_fewer_runs():
         ("total-backlash",): 61.0,
         ("payload-flexibility",): 90.0,
         ("cable-stiffness", "load-inertia"): 90.0,
-        (): 150.0,
+        (): plain,
     }
     found = {key: SimpleNamespace(hypothesis=Hypothesis(synthetic.ADSS, key)) for key in behind}
     rough = SimpleNamespace(
@@ -240,7 +243,8 @@ def test_a_cause_of_one_size_that_few_rows_leave_far_behind_gets_fewer_runs():
         hear=lambda: heard.append(len(groups)),
     )
     search._look_on_all(rough, fine, list(behind))
-    assert groups == {key: 2 if key == ("total-backlash",) else 4 for key in behind}
+    few = [("total-backlash",), *([()] if fewer else [])]
+    assert groups == {key: 2 if key in few else 4 for key in behind}
     assert heard == [len(behind)]
 
 
