@@ -250,7 +250,7 @@ def test_a_closer_look_is_about_the_best_place_so_far_and_as_far_as_usual():
     assert looks == [(({("a", "c"): "where ('a', 'c') is"}, 3), {})]
 
 
-@pytest.mark.parametrize(("pairs_placed", "looked_at"), [(24, 24), (25, 24), (40, 24)])
+@pytest.mark.parametrize(("pairs_placed", "looked_at"), [(18, 18), (19, 18), (40, 18)])
 def test_no_more_are_looked_at_than_the_likeliest(monkeypatch, pairs_placed, looked_at):
     placed = {("a", f"x{i}"): Place("", -0.1 * i) for i in range(pairs_placed)}
     rough = Rough(monkeypatch, {("a",): placed})
@@ -264,7 +264,7 @@ def test_no_more_are_looked_at_than_the_likeliest(monkeypatch, pairs_placed, loo
 @pytest.mark.parametrize(("apart", "closer"), [(50.0, 6), (5.1, 8), (4.9, 9), (2.0, 14), (0.0, 14)])
 def test_all_that_do_about_as_well_are_looked_at_closer(monkeypatch, apart, closer):
     """Few runs rank them by chance."""
-    rough = Rough(monkeypatch, {("a",): {("a", f"x{i}"): Place("", 0.0) for i in range(24)}})
+    rough = Rough(monkeypatch, {("a",): {("a", f"x{i}"): Place("", 0.0) for i in range(18)}})
     monkeypatch.setattr(Rough, "apart", apart)
     assert rough.look_beside_all() == set(sorted(rough.found, reverse=True)[:closer])
 
