@@ -36,9 +36,7 @@ _DOUBT_OF_FEW = 3.5
 a true cause about once in ten times, and the question is asked again on all rows."""
 
 _CLOSER_LOOKS = 2
-"""How often for each of its sizes a doubtful leader that is far ahead gets more runs before pairs
-are looked at. A payload, which has three, left 3.0 of structure with 80 runs, 2.4 with 160 and 1.4
-with 320; pairs cost as much as 700 runs."""
+"""How often a doubtful leader that is far ahead gets more runs before pairs are looked at."""
 
 _TOO_FAR, _GROUPS = 200.0, 4
 """Log-likelihood by which it is far ahead, and in how many groups of runs each of these is."""
@@ -88,15 +86,14 @@ def is_doubtful_still(fine: Hunt, rng: np.random.Generator) -> bool:
 
     Few runs leave a shape of their own beside a sharp resonance, and pairs cost far more.
     """
-    looks = 0
-    while is_doubtful(fine.best, rng):
-        leader = fine.best.hypothesis
-        far_ahead = leader.effects and len(fine.leading(2, _TOO_FAR)) == 1
-        if not far_ahead or looks >= _CLOSER_LOOKS * (leader.d - 1):
+    for _ in range(_CLOSER_LOOKS):
+        if not is_doubtful(fine.best, rng):
+            return False
+        leader = fine.best.hypothesis.effects
+        if not leader or len(fine.leading(2, _TOO_FAR)) > 1:
             return True
-        fine.settle([leader.effects], _GROUPS)
-        looks += 1
-    return False
+        fine.settle([leader], _GROUPS)
+    return is_doubtful(fine.best, rng)
 
 
 def is_nothing_missing(fine: Hunt, rng: np.random.Generator) -> bool:

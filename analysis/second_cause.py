@@ -143,22 +143,23 @@ def _contest(standing: _Standing, rng: np.random.Generator) -> None:
         settle(fine, [leader, best])
         fine.hear()
         standing.ask(list(standing.leads))
-    refused = 0.0
+    refused: list[float] = []
     while near := standing.near:
         best = near[0]
-        if standing.leads[best] < _AS_MUCH * refused:
+        if standing.leads[best] < _AS_MUCH * max(refused, default=0.0):
             break
+        whole, part = fine.found[best], fine.found[leader]
         # Few runs fit by chance, but may be all that there will be.
         if has_fewer(fine, best, leader) and not fine.purse.is_spent:
             settle(fine, [best])
             if has_fewer(fine, best, leader):
                 settle(fine, [best])
             standing.ask([best])
-        elif earns_its_name(fine.found[best], fine.found[leader], rng.spawn(1)[0]):
+        elif earns_its_name(whole, part, rng.spawn(1)[0], len(refused)):
             _level(standing, best)
             return
         else:
-            refused = max(refused, standing.leads[best])
+            refused.append(standing.leads[best])
             standing.leave_out([best])
     if fine.best.hypothesis.effects in (leader, *standing.leads):
         standing.leave_out(list(standing.leads))

@@ -213,8 +213,12 @@ def looked_behind(monkeypatch, ahead, looks=99, *, earning=(PAIR, OTHER), gains=
     monkeypatch.setattr(second_cause, "_worth", lambda *_: dict.fromkeys(ahead, few))
     monkeypatch.setattr(second_cause, "_stood_for", lambda *_: [])
 
-    def asked(whole, part, _):
+    before = []
+
+    def asked(whole, part, _, refused):
         assert part.hypothesis.effects == LEADER
+        assert refused == len(before)
+        before.append(whole)
         assert fine.purse.is_spent or len(whole.population) >= len(part.population)
         return whole.hypothesis.effects in earning
 

@@ -274,3 +274,17 @@ def test_parts_of_those_that_are_judged_are_judged_however_many_stand_before_the
 
 def test_the_world_of_these_tests_is_not_flat():
     assert np.ptp(BASE[0]) > 0.5
+
+
+@pytest.mark.parametrize(
+    ("share", "beyond", "refused", "earned"),
+    [
+        (0.0, 2.0, 0, True), (0.0, 1.9, 0, False), (0.05, 9.0, 0, False),
+        (0.0, 2.4, 1, False), (0.0, 2.5, 1, True), (0.0, 2.5, 2, False), (0.0, 3.0, 2, True),
+    ],
+)  # fmt: skip
+def test_who_is_asked_after_others_were_refused_must_bring_more(
+    monkeypatch, share, beyond, refused, earned
+):
+    monkeypatch.setattr(rules, "judge_gain", lambda part, whole, rng: (share, beyond))
+    assert rules.earns_its_name(None, None, None, refused) == earned
