@@ -24,7 +24,7 @@ from analysis.lending import leads_with_lent, on_the_other_side
 from analysis.pairs import BESIDE_REACH, at_few_frequencies, look_at_felt, look_beside
 from analysis.parts import earns
 from analysis.screening import Additions, add_causes, near, ranked, screen_felt, screen_singles
-from analysis.verdict import earns_its_name
+from analysis.verdict import LEAST_GAIN, earns_its_name
 
 __all__ = ["look_for_second"]
 
@@ -155,7 +155,9 @@ def _contest(standing: _Standing, rng: np.random.Generator) -> None:
             if has_fewer(fine, best, leader):
                 settle(fine, [best])
             standing.ask([best])
-        elif earns_its_name(whole, part, rng.spawn(1)[0], len(refused)):
+        elif standing.leads[best] >= LEAST_GAIN and earns_its_name(
+            whole, part, rng.spawn(1)[0], len(refused)
+        ):
             _level(standing, best)
             return
         else:

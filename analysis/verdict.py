@@ -24,6 +24,7 @@ from analysis.observation import Observation
 from analysis.plausibility import EDGE, may_be_within_tolerance
 
 __all__ = [
+    "LEAST_GAIN",
     "LEAST_LEAD",
     "Judged",
     "Verdict",
@@ -64,6 +65,9 @@ _FURTHER = 5.0
 """By so much must a further cause beat a part that has it not, beyond its costs: what it brings in
 the part's own runs asks for the rest. Friction behind a filter's corner was 3.5 standard deviations
 beyond chance, and led by 34 where some 38 were asked with 10."""
+
+LEAST_GAIN = _PER_CAUSE + _PER_PARAMETER + _FURTHER
+"""So much must a further cause of one size lead a part by, in all, to be named beside it."""
 
 _SURE = 3.0 * HEAT
 """While it leads by less than this, that nothing is hidden has a twentieth of its probability or
