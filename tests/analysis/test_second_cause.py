@@ -310,6 +310,6 @@ def test_who_led_by_much_on_few_rows_gets_a_second_chance_on_all(monkeypatch, fe
 )
 def test_what_may_be_simulated_ends_where_it_is_spent(monkeypatch, looks, taken_over, settled):
     """Before anything comes to all rows, or after that with those runs alone."""
-    fine = looked_behind(monkeypatch, {PAIR: 16.0}, looks)
+    fine = looked_behind(monkeypatch, {PAIR: 24.0}, looks)
     assert (PAIR in fine.found) == taken_over
     assert len(fine.settled) == settled
