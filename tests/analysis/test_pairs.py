@@ -59,6 +59,10 @@ class Standings:
             for key, value in likelihood.items()
         }
 
+    @property
+    def best_single(self):
+        return self.among([key for key in self.found if len(key) == 1])[0]
+
     def among(self, keys):
         ranked = sorted(self.found, key=lambda key: -self.found[key].best.log_likelihood)
         return [key for key in ranked if key in keys]
