@@ -20,7 +20,7 @@ from analysis.ensemble import TOLERANCES
 from analysis.executor import side_by_side
 from analysis.observation import Observation
 from analysis.population import DEVIATING, Population
-from analysis.surface import Fit, Surface, differences
+from analysis.surface import TRIES, Fit, Surface, differences
 from analysis.widths import learn_width
 from sim.unit import Unit
 
@@ -47,8 +47,12 @@ def form_candidates(
     observation: Observation,
     fine: Mapping[Effects, Population],
     starts: Mapping[Effects, NDArray[np.float64]],
+    tries: int = TRIES,
 ) -> dict[Effects, Candidate]:
-    """Candidates from the runs of several hypotheses, each climbing from its start."""
+    """Candidates from the runs of several hypotheses, each climbing from its start.
+
+    In so many steps (`Surface.climb`).
+    """
     raw = {
         key: _surface(observation, population, Hypothesis(unit, key))
         for key, population in fine.items()
@@ -60,7 +64,8 @@ def form_candidates(
         charts = surface.on_chart(surface.places), surface.on_chart(starts[key][None])
         width = learn_width(charts[0], surface.difference, surface.width, charts[1])
         surface = replace(surface, width=width)
-        return Candidate(Hypothesis(unit, key), fine[key], surface, surface.climb(starts[key]))
+        best = surface.climb(starts[key], tries)
+        return Candidate(Hypothesis(unit, key), fine[key], surface, best)
 
     return dict(zip(fine, side_by_side(formed, fine), strict=True))
 

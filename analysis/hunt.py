@@ -40,6 +40,9 @@ _MANY = 4
 """Coordinates from which on a first look takes more groups, as two are a line in a room, and half
 of further runs of several causes lie along the places that agree."""
 
+_TRIES = 3
+"""Steps of a climb with another noise, where it begins at the best place with the last one."""
+
 
 class Hunt:
     """Candidates on the rows of one observation, and the runs made for them so far.
@@ -154,7 +157,8 @@ class Hunt:
 
         def likelihood(seen: Observation) -> float:
             starts, runs = {key: best.best.place}, {key: self._runs[key]}
-            return form_candidates(self.unit, seen, runs, starts)[key].best.log_likelihood
+            formed = form_candidates(self.unit, seen, runs, starts, _TRIES)
+            return formed[key].best.log_likelihood
 
         heard = likeliest_noise(self._noises, likelihood)
         if heard.noise_v != self.observation.noise_v:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from analysis.candidate import Effects, form_candidates
 from analysis.causes import Hypothesis
+from analysis.executor import side_by_side
 from analysis.hunt import Hunt
 from analysis.population import Population
 from analysis.screening import Additions
@@ -42,12 +43,13 @@ def leads_with_lent(
         starts[key] = one.best.place
         idle[key] = known.joined(alone.best.place, further, nothing)[1]
     formed = form_candidates(hunt.unit, hunt.observation, runs, starts)
-    leads = {}
-    for key, one in own.items():
+
+    def lead(key: Effects) -> float:
         there = formed[key].surface.climb(idle[key]).log_likelihood
         lent = max(formed[key].best.log_likelihood, there) - formed[leader].best.log_likelihood
-        leads[key] = max(lent, one.best.log_likelihood - alone.best.log_likelihood)
-    return leads
+        return max(lent, own[key].best.log_likelihood - alone.best.log_likelihood)
+
+    return dict(zip(own, side_by_side(lead, own), strict=True))
 
 
 def on_the_other_side(

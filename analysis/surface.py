@@ -27,13 +27,16 @@ from analysis.likelihood import HEAT
 from analysis.observation import Observation
 from analysis.population import Population
 
-__all__ = ["Fit", "Surface", "differences"]
+__all__ = ["TRIES", "Fit", "Surface", "differences"]
 
 _FLOOR = np.array([0.003, 0.003, 0.15])
 """What the regression itself gets wrong, by channel, in log units and rad."""
 
 _STRIDES = (0.5, 0.25, 0.12, 0.06)
 """Reach of the random steps of a climb, as shares of what was simulated."""
+
+TRIES = 12
+"""Random steps of a climb per coordinate and reach, where it is to find the best place."""
 
 _AT_ONCE = 64
 """Places that are looked at on one core before it takes the next ones."""
@@ -141,7 +144,7 @@ class Surface:
         )
         return Fit(place, float(likelihoods[0]), residual, std, density, deviations)
 
-    def climb(self, start: NDArray[np.float64], tries: int = 12) -> Fit:
+    def climb(self, start: NDArray[np.float64], tries: int = TRIES) -> Fit:
         """The best fit, by ever finer random steps inside what was simulated.
 
         `tries` per coordinate and step size.
@@ -149,7 +152,7 @@ class Surface:
         return max(self.walk(start, tries=tries), key=lambda fit: fit.log_likelihood)
 
     def walk(
-        self, start: NDArray[np.float64], rows: NDArray[np.bool_] | None = None, tries: int = 12
+        self, start: NDArray[np.float64], rows: NDArray[np.bool_] | None = None, tries: int = TRIES
     ) -> list[Fit]:
         """Every fit that a climb looks at, the start first."""
         low, high = self.places.min(axis=0), self.places.max(axis=0)

@@ -78,7 +78,10 @@ def lent(monkeypatch):
         ((-9.0, -5.0, -40.0, -46.0), (0.0, 5.0, 4.0, 7.0), [3, 1, 2, 0], 0.0, [3, 1, 2]),
         # None by its own runs that is far behind, and no more than three by lent ones.
         ((-50.0,) * 5, (6.0, 5.0, 3.5, 3.4, 3.3), [0, 1, 2], 0.0, [0, 1, 2]),
-        ((-50.0,) * 3, (2.9, 0.5, -3.0), [0, 1, 2], 0.0, []),
+        # The best two even if they lead by nothing, others only if they lead.
+        ((-50.0,) * 3, (2.9, -2.9, -2.95), [0, 1, 2], 0.0, [0, 1]),
+        ((-50.0,) * 3, (2.9, -3.1, -3.2), [0, 1, 2], 0.0, [0]),
+        ((-50.0,) * 3, (3.1, 3.05, 2.9), [0, 1, 2], 0.0, [0, 1]),
         # Few runs had it behind by either measure, and more of them show that it leads.
         ((-31.0,), (-16.0,), [0], 20.0, [0]),
         ((-4.0, -5.0, -6.0, -7.0), (9.0, 8.0, 7.0, 6.0), [0, 1, 2], 0.0, [0, 1, 2]),
@@ -197,12 +200,19 @@ LEADER, PAIR = ("load-inertia",), ("amplifier-lag", "load-inertia")
 OTHER = ("load-inertia", "shaft-damping")
 
 
-def looked_behind(monkeypatch, ahead, looks=99, *, earning=(PAIR, OTHER), gains=None, few=5.0):
-    """The hunt on all rows after pairs were worth it, so far ahead of their leader."""
+def looked_behind(
+    monkeypatch, ahead, looks=99, *, earning=(PAIR, OTHER), gains=None, few=5.0, runs=None,
+    asked_with=None,
+):  # fmt: skip
+    """The hunt on all rows after pairs were worth it, so far ahead of their leader.
+
+    `runs`: of some of them, where it is not 40; `asked_with`: where runs of who is asked are kept.
+    """
+    runs = runs or {}
     found = {
         key: SimpleNamespace(
             hypothesis=Hypothesis(ADSS, key),
-            population=range(40),
+            population=range(runs.get(key, 40)),
             best=SimpleNamespace(place=None, log_likelihood=likelihood),
         )
         for key, likelihood in ((LEADER, 100.0), *((k, 100.0 + a) for k, a in ahead.items()))
@@ -219,7 +229,10 @@ def looked_behind(monkeypatch, ahead, looks=99, *, earning=(PAIR, OTHER), gains=
         assert part.hypothesis.effects == LEADER
         assert refused == len(before)
         before.append(whole)
-        assert fine.purse.is_spent or len(whole.population) >= len(part.population)
+        enough = min(len(part.population), second_cause._ASKED)
+        assert fine.purse.is_spent or len(whole.population) >= enough
+        if asked_with is not None:
+            asked_with.append(len(whole.population))
         return whole.hypothesis.effects in earning
 
     monkeypatch.setattr(second_cause, "earns_its_name", asked)
@@ -249,13 +262,30 @@ def test_who_takes_the_lead_behind_a_cause_gets_more_runs_and_the_cause_as_many(
 
 def test_who_brings_no_more_than_chance_behind_a_cause_is_left_out(monkeypatch):
     ahead = {PAIR: 60.0, OTHER: 55.0, ("load-inertia", "x"): 52.0, ("load-inertia", "y"): 51.0}
-    fine = looked_behind(monkeypatch, ahead, earning=(("load-inertia", "x"),))
+    fine = looked_behind(monkeypatch, ahead, earning=(OTHER,))
     # The next is asked with as many runs; who is behind one that earns its name may be a rival.
-    both = [[LEADER, PAIR]] * 2
-    assert fine.settled[1:] == [*both, [OTHER], [("load-inertia", "x")], [("load-inertia", "y")]]
-    assert list(fine.found) == [LEADER, ("load-inertia", "x"), ("load-inertia", "y")]
-    fine = looked_behind(monkeypatch, ahead, earning=())
+    both, others = [[LEADER, PAIR]] * 2, [("load-inertia", "x"), ("load-inertia", "y")]
+    assert fine.settled[1:] == [*both, [OTHER], others]
+    assert list(fine.found) == [LEADER, OTHER, *others]
+    # Where two bring no more, no third is asked.
+    fine = looked_behind(monkeypatch, ahead, earning=others)
+    assert fine.settled[1:] == [*both, [OTHER]]
     assert list(fine.found) == [LEADER]
+
+
+@pytest.mark.parametrize("earning", [(), (PAIR,)])
+def test_behind_a_cause_of_many_runs_who_earns_its_name_gets_as_many_afterwards(
+    monkeypatch, earning
+):
+    """More of them hardly change what is chance, and are for a comparison."""
+    with_runs = []
+    fine = looked_behind(
+        monkeypatch, {PAIR: 60.0}, earning=earning, runs={LEADER: 200}, asked_with=with_runs
+    )
+    assert with_runs == [160]
+    assert {key: len(one.population) for key, one in fine.found.items()} == dict.fromkeys(
+        [LEADER, *earning], 280
+    )
 
 
 def test_a_further_cause_that_leads_by_less_is_not_asked(monkeypatch):
