@@ -17,7 +17,7 @@ from analysis.candidate import Candidate, Effects
 from analysis.doubt import is_doubtful, is_given_up, is_nothing_missing
 from analysis.holdout import AT_NOISE, hold_out
 from analysis.hunt import Hunt
-from analysis.likeness import is_felt_alike
+from analysis.likeness import is_felt_alike, plainer_places
 from analysis.parts import parts_of, places_of_parts
 from analysis.plausibility import is_pressed
 from analysis.verdict import LEAST_LEAD, may_be_chance
@@ -38,6 +38,7 @@ __all__ = [
     "settle_doubt",
     "weigh_baseline",
     "weigh_parts",
+    "weigh_plainer",
 ]
 
 _NEAR, CLOSE = 120.0, 30.0
@@ -83,8 +84,13 @@ of four times a motor's friction was found at a ratio of 0.61, and hidden at 0.4
 
 _THERE, _THERE_GROUPS = (0.1, 0.03), 8
 """How far about its place in a leading pair a part is looked at that is better at another ratio
-alone, and in how many groups, unless it is hopeless: there it has more runs. Friction of a motor
-was hidden at 0.45, where pairs with it lay, and led itself by 40 runs there with 240 at 0.77."""
+alone, and in how many groups if it has many sizes, unless it is hopeless: there it has more runs.
+Friction of a motor was hidden at 0.45, where pairs with it lay, and led itself by 40 runs there
+with 240 at 0.77."""
+
+_PLAINER_BEHIND = 60.0
+"""Log-likelihood behind a leader up to which a set that says the same with fewer sizes gets as many
+runs: it was looked at where the leader is, which is not quite where it is best itself."""
 
 _OPEN, _ROUNDS_OPEN = (1.0, 8.0), 4
 """Structure between which a leader gets more runs, and how many times. What the runs of a true
@@ -131,13 +137,15 @@ def _is_left(fine: Hunt, rng: np.random.Generator) -> bool:
     return False
 
 
-def catch_up(fine: Hunt, newcomers: Collection[Effects], leader: Effects) -> None:
+def catch_up(
+    fine: Hunt, newcomers: Collection[Effects], leader: Effects, behind: float = CLOSE
+) -> None:
     """Give those that come close to a leader as many runs as it has, while they stay close.
 
     All others were compared with it before.
     """
     near = set(newcomers)
-    while near := near & set(fine.leading(len(fine.found), CLOSE)):
+    while near := near & set(fine.leading(len(fine.found), behind)):
         near = {key for key in near if has_fewer(fine, key, leader)}
         settle(fine, sorted(near))
 
@@ -252,10 +260,28 @@ def weigh_parts(fine: Hunt) -> None:
     }
     if few or elsewhere:
         fine.start(few, LAST_GROUPS)
-        fine.start(elsewhere, _THERE_GROUPS, reach=_THERE)
-        hopeful = fine.leading(len(fine.found), HOPELESS)
+        fine.start(elsewhere, LAST_GROUPS, _THERE_GROUPS, reach=_THERE)
+        hopeful = fine.leading(len(fine.found), TOO_FAR)
         fine.settle([key for key in hopeful if key in few or key in elsewhere], LAST_GROUPS)
         fine.hear()
+
+
+def weigh_plainer(fine: Hunt) -> None:
+    """See whether a set of fewer sizes that says the same as the leader does as well, if any does.
+
+    What few rows had left out is looked at, and others get runs, as nobody compared them: a heavier
+    load beside a damped shaft was named as a payload that is stiffer than all that was measured.
+    """
+    leader, places = fine.best.hypothesis.effects, plainer_places(fine.best)
+    elsewhere = {
+        key: place
+        for key, place in places.items()
+        if key not in fine.found or np.any(abs(fine.found[key].best.place - place) > _MOVED)
+    }
+    if elsewhere:
+        fine.start(elsewhere, LAST_GROUPS)
+        fine.hear()
+    catch_up(fine, places, leader, _PLAINER_BEHIND)
 
 
 def _is_open(fine: Hunt, part: Effects, place: NDArray[np.float64], hopeful: bool) -> bool:

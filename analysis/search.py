@@ -31,6 +31,7 @@ from analysis.contest import (
     settle_doubt,
     weigh_baseline,
     weigh_parts,
+    weigh_plainer,
 )
 from analysis.doubt import (
     is_doubtful,
@@ -172,6 +173,7 @@ def search_causes(
                 lambda: look_at_every_ratio(fine),
                 lambda: see_it_predict(fine),
                 lambda: weigh_parts(fine),
+                lambda: weigh_plainer(fine),
                 lambda: _look_for_third(rough, fine, atlas, rng),
                 lambda: settle_doubt(fine, rng),
                 search_late,

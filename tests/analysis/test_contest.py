@@ -258,6 +258,57 @@ def test_a_newcomer_that_is_close_gets_as_many_runs_as_the_leader(of_leader, beh
     assert runs == {leader: of_leader, pair: left, other: 40}
 
 
+@pytest.mark.parametrize(
+    ("known", "behind", "started", "runs"),
+    [
+        # It was not looked at, or elsewhere, and is then compared as long as it is not far behind.
+        (None, 59.0, True, 160), (None, 61.0, True, 40), (0.29, 59.0, True, 160),
+        (0.31, 59.0, False, 160), (0.31, 61.0, False, 40),
+    ],
+)  # fmt: skip
+def test_what_says_the_same_with_fewer_sizes_is_compared_with_a_leader(
+    monkeypatch, known, behind, started, runs
+):
+    leader, plainer = ("payload-flexibility",), ("load-inertia",)
+    there, looked = {plainer: np.array([0.41, 0.5])}, []
+
+    def one(key, count, ratio=0.4):
+        best = SimpleNamespace(place=np.array([ratio, 0.5]))
+        return SimpleNamespace(hypothesis=Hypothesis(ADSS, key), population=range(count), best=best)
+
+    class Fine:
+        def __init__(self):
+            self.found = {leader: one(leader, 160)}
+            if known is not None:
+                self.found[plainer] = one(plainer, 40, known)
+
+        best = property(lambda self: self.found[leader])
+
+        def start(self, places, groups):
+            looked.append(places)
+            self.found |= {key: one(key, 10 * groups) for key in places}
+
+        def leading(self, most, within):
+            return [leader, *([plainer] if behind <= within else [])]
+
+        def settle(self, chosen, groups):
+            for key in chosen:
+                self.found[key] = one(key, len(self.found[key].population) + 10 * groups)
+
+        def hear(self):
+            pass
+
+    monkeypatch.setattr(contest, "plainer_places", lambda _: there)
+    fine = Fine()
+    contest.weigh_plainer(fine)
+    assert looked == [there] * started
+    assert len(fine.found[plainer].population) == runs
+    # Where nothing says the same nothing is done.
+    monkeypatch.setattr(contest, "plainer_places", lambda _: {})
+    contest.weigh_plainer(fine)
+    assert looked == [there] * started
+
+
 def test_who_has_runs_enough_gets_no_more_to_be_compared_by():
     settled, few, enough = [], ("load-inertia",), ("amplifier-lag",)
     found = {

@@ -102,12 +102,14 @@ def test_a_part_with_no_more_runs_than_a_pair_or_at_another_ratio_is_weighed_whe
         population=range(80),
     )
 
-    def start(places, groups, reach=None):
-        started.extend((key, place.tolist(), groups, reach) for key, place in places.items())
+    def start(places, groups, of_many=0, reach=None):
+        more = max(groups, of_many)
+        started.extend((key, place.tolist(), more, reach) for key, place in places.items())
         fine.found |= dict.fromkeys(places, other)
 
     def leading(most, behind):
-        assert behind == contest.HOPELESS
+        # Who lies between gets runs where the pair has it, and no more of them.
+        assert behind == (contest.TOO_FAR if started else contest.HOPELESS)
         return [pair, *([part] if hopeful and part in fine.found else [])]
 
     fine = SimpleNamespace(
