@@ -89,7 +89,7 @@ def _nearest(
     low, high = np.append(np.zeros(other.d), -_TOLERANCE), np.append(np.ones(other.d), _TOLERANCE)
     begin = np.append(np.clip(start, 0.01, 0.99), 0.0)
     nearest = least_squares(left, begin, bounds=(low, high), x_scale=high - low)
-    size = np.linalg.norm(reflected(felt) - reflected(0.0 * felt))
+    size = float(np.linalg.norm(reflected(felt) - reflected(0.0 * felt)))
     at_load = [False, *(is_at_load(effect) for effect, _ in other.parameters)]
     there = np.where(at_load, nearest.x[:-1], start)
     return there, float(np.linalg.norm(nearest.fun) / max(size, _NOTHING))
