@@ -109,18 +109,21 @@ def compare(fine: Hunt, rng: np.random.Generator) -> bool:
         missing = not is_nothing_missing(fine, rng)
         if not missing or _is_left(fine, rng):
             break
-        leader, *near = fine.leading(most, behind)
+        first, *near = fine.leading(most, behind)
         # The parts of a pair count in every round, even where others lie before them: with few runs
         # a true cause of several parameters has been beaten by itself and another.
-        parts = set(parts_of(leader, fine.found))
+        parts = set(parts_of(first, fine.found))
         near += sorted(parts & set(fine.leading(len(fine.found), TOO_FAR)))
-        if done >= _IN_EARNEST:
-            # Who wants a size that no bench has is no explanation, however well it fits.
-            plausible = [key for key in [leader, *near] if not is_pressed(fine.found[key])]
-            leader, *near = plausible or [leader, *near]
+        leader, spent = first, fine.purse.is_spent
+        if done >= _IN_EARNEST or (done and spent):
+            # Who wants a size that no bench has is no explanation, however well it fits, and must
+            # not keep one that is from runs that it lacks.
+            plausible = [key for key in [first, *near] if not is_pressed(fine.found[key])]
+            leader, *near = plausible or [first, *near]
+            spent = fine.purse.is_spent if leader == first else fine.purse.is_overdrawn
             # Nor is it a question who leads of two that say the same.
             near = [key for key in near if not _say_the_same(fine.found[leader], fine.found[key])]
-        if done and (not near or fine.purse.is_spent):
+        if done and (spent or (leader == first and not near)):
             break
         near += [key for key in fine.leading(len(fine.found), behind) if not key]
         settle(fine, list(dict.fromkeys([leader, *near])))

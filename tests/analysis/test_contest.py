@@ -198,6 +198,7 @@ def test_a_search_is_not_left_with_a_leader_of_few_runs(
     )
     monkeypatch.setattr(contest, "is_nothing_missing", lambda *_: False)
     monkeypatch.setattr(contest, "is_given_up", lambda *_: len(made) < explains_at)
+    monkeypatch.setattr(contest, "is_pressed", lambda _: False)
     monkeypatch.setattr(contest, "settle", lambda _, who: made.extend([None] * 40))
     assert contest.compare(fine, None)
     assert len(made) == runs
@@ -206,23 +207,56 @@ def test_a_search_is_not_left_with_a_leader_of_few_runs(
 @pytest.mark.parametrize(
     ("pressed", "alike", "rounds"),
     [
-        ("", "", 4), ("near", "", 2), ("leader", "", 2), ("leader near", "", 4),
-        ("", "leader", 2), ("", "near", 2),
+        ("", "", [2, 2]), ("near", "", []), ("leader", "", [1, 1]), ("leader near", "", [2, 2]),
+        ("", "leader", []), ("", "near", []),
     ],
 )  # fmt: skip
 def test_who_is_no_rival_is_left_aside_after_two_rounds(monkeypatch, pressed, alike, rounds):
-    """Who wants a size that no bench has, unless all do, or says the same as the leader."""
+    """Who wants a size that no bench has, unless all do, or says the same as the leader.
+
+    Who stands behind one of the first gets runs all the same: it may be the explanation.
+    """
     leader, near, settled = ("load-inertia",), ("payload-flexibility",), []
-    found = {leader: "leader", near: "near"}
+    found = {leader: SimpleNamespace(name="leader"), near: SimpleNamespace(name="near")}
     fine = SimpleNamespace(
         found=found, leading=lambda *_: list(found), hear=lambda: None, purse=Purse()
     )
     monkeypatch.setattr(contest, "is_nothing_missing", lambda *_: False)
-    monkeypatch.setattr(contest, "is_pressed", lambda candidate: candidate in pressed)
-    monkeypatch.setattr(contest, "is_felt_alike", lambda one, simpler: simpler == alike)
+    monkeypatch.setattr(contest, "is_pressed", lambda candidate: candidate.name in pressed)
+    monkeypatch.setattr(contest, "is_felt_alike", lambda one, simpler: simpler.name == alike)
     monkeypatch.setattr(contest, "settle", lambda _, chosen: settled.append(chosen))
     assert contest.compare(fine, None)
-    assert settled == [[leader, near]] * rounds
+    assert settled[:2] == [[leader, near]] * 2
+    assert settled[2:] == [[leader, near][-count:] for count in rounds]
+
+
+@pytest.mark.parametrize(
+    ("pressed", "spent", "overdrawn", "rounds"),
+    [
+        # What is spent ends a comparison, but not for whom an implausible leader keeps behind it.
+        ((), True, False, 0), (("leader",), True, False, 3), (("leader",), True, True, 0),
+        (("leader", "near"), True, False, 0), (("near",), True, False, 0), ((), False, False, 3),
+    ],
+)  # fmt: skip
+def test_a_leader_that_no_bench_has_does_not_end_a_comparison(
+    monkeypatch, pressed, spent, overdrawn, rounds
+):
+    """A shaft too stiff to be one led the shaft that hardens, which was the truth, by chance."""
+    leader, near, settled = ("shaft-stiffness",), ("shaft-hardening",), []
+    found = {leader: SimpleNamespace(name="leader"), near: SimpleNamespace(name="near")}
+    fine = SimpleNamespace(
+        found=found,
+        leading=lambda *_: list(found),
+        hear=lambda: None,
+        purse=SimpleNamespace(is_spent=spent, is_overdrawn=overdrawn),
+    )
+    monkeypatch.setattr(contest, "is_nothing_missing", lambda *_: False)
+    monkeypatch.setattr(contest, "is_given_up", lambda *_: False)
+    monkeypatch.setattr(contest, "is_pressed", lambda candidate: candidate.name in pressed)
+    monkeypatch.setattr(contest, "is_felt_alike", lambda *_: False)
+    monkeypatch.setattr(contest, "settle", lambda _, chosen: settled.append(chosen))
+    contest.compare(fine, None)
+    assert settled == [[leader, near], *[[near] if pressed else [leader, near]] * rounds]
 
 
 @pytest.mark.parametrize(
