@@ -149,9 +149,10 @@ def _contest(standing: _Standing, rng: np.random.Generator) -> None:
     fine, leader = standing.fine, standing.leader
     for _ in range(_ROUNDS):
         best = next(iter(standing.near), fine.best.hypothesis.effects)
-        if best == leader or fine.purse.is_spent:
+        few = [key for key in (leader, best) if len(fine.found[key].population) < _ASKED]
+        if best == leader or fine.purse.is_spent or not few:
             break
-        settle(fine, [leader, best])
+        settle(fine, few)
         fine.hear()
         standing.ask(list(standing.leads))
     refused: list[float] = []

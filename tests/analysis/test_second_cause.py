@@ -284,7 +284,7 @@ def test_behind_a_cause_of_many_runs_who_earns_its_name_gets_as_many_afterwards(
     )
     assert with_runs == [160]
     assert {key: len(one.population) for key, one in fine.found.items()} == dict.fromkeys(
-        [LEADER, *earning], 280
+        [LEADER, *earning], 200
     )
 
 
