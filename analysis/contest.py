@@ -2,7 +2,8 @@
 
 Owns when a comparison is fair and when a leader has runs enough to be judged:
 few runs rank by chance, predict badly and leave a shape of their own.
-It tries no hypothesis that the search did not bring, and passes no verdict.
+It tries no hypothesis that the search did not bring, but parts of a leader and what says the same
+with fewer sizes, and passes no verdict.
 """
 
 from __future__ import annotations
@@ -279,7 +280,7 @@ def weigh_plainer(fine: Hunt) -> None:
     elsewhere = {
         key: place
         for key, place in places.items()
-        if key not in fine.found or np.any(abs(fine.found[key].best.place - place) > _MOVED)
+        if key not in fine.found or not _is_at(fine.found[key], place)
     }
     if elsewhere:
         fine.start(elsewhere, LAST_GROUPS)
@@ -292,8 +293,13 @@ def _is_open(fine: Hunt, part: Effects, place: NDArray[np.float64], hopeful: boo
     if part not in fine.found:
         return True
     known = fine.found[part]
-    there = bool(np.all(abs(known.best.place - place) <= _MOVED))
-    return len(known.population) <= len(fine.best.population) and (hopeful or not there)
+    few = len(known.population) <= len(fine.best.population)
+    return few and (hopeful or not _is_at(known, place))
+
+
+def _is_at(one: Candidate, place: NDArray[np.float64]) -> bool:
+    """Whether a candidate is best about a place (d,)."""
+    return bool(np.all(abs(one.best.place - place) <= _MOVED))
 
 
 def weigh_baseline(fine: Hunt, rng: np.random.Generator) -> None:

@@ -145,7 +145,7 @@ class _Standing:
 
 
 def _contest(standing: _Standing, rng: np.random.Generator) -> None:
-    """Keep sets with a second cause if one brings more than chance does, with as many runs."""
+    """Keep sets with a second cause if one brings more than chance does, with runs enough."""
     fine, leader = standing.fine, standing.leader
     for _ in range(_ROUNDS):
         best = next(iter(standing.near), fine.best.hypothesis.effects)
