@@ -32,6 +32,10 @@ __all__ = ["MOST_VECTORS", "Program", "step_cycles"]
 MOST_VECTORS = 4
 """Vectors that one call steps at most: registers suffice for no more."""
 
+_LAWS_BESIDE = 4 if VECTOR_BYTES == 64 else 2
+"""Vectors whose laws are solved side by side: machines with narrower ones have half as many
+registers, and what does not fit goes by way of memory."""
+
 _FIRST_SWEEPS = 8
 """How often laws are gone through in the first step, which knows no last forces to start from."""
 
@@ -103,6 +107,7 @@ class Program:
     ) -> None:
         self._layout, self._structure = layout, layout.structure
         self._all, self._of_each = range(vectors), vectors // systems
+        self._beside = [self._all[v : v + _LAWS_BESIDE] for v in self._all[::_LAWS_BESIDE]]
         self._module = ir.Module()
         scalar = ir.FloatType() if layout.structure.single else ir.DoubleType()
         pointer = scalar.as_pointer()
@@ -206,28 +211,37 @@ class Program:
 
     def _solve(self, free: list[Lanes]) -> None:
         """Forces of all laws, each with the newest ones of the others."""
-        m, kinds = self._layout.m, self._structure.kinds
-        force = [self._load("force", j, self._all) for j in range(m)]
+        m = self._layout.m
+        force = [[self._load("force", j, some) for j in range(m)] for some in self._beside]
         for group in self._structure.order:
-            newest = list(force)
-            for j in group:
-                together = [j, j + 1] if kinds[j] == PAIR else [j]
-                ahead = []
-                for k in together:
-                    others = [i for i in range(m) if i not in together]
-                    ahead.append(self._felt(k, free[k], force, others))
-                for k, solved in zip(together, self._force(j, ahead, force), strict=True):
-                    newest[k] = solved
-            force = newest
-        for j in range(m):
-            self._store("force", j, force[j], self._all)
+            for i, some in enumerate(self._beside):
+                without = [Lanes(self._code, (of.vectors[v] for v in some)) for of in free]
+                force[i] = self._newest(group, without, force[i], some)
+        for some, found in zip(self._beside, force, strict=True):
+            for j, newest in enumerate(found):
+                self._store("force", j, newest, some)
 
-    def _force(self, j: int, ahead: Sequence[Lanes], last: Sequence[Lanes]) -> Sequence[Lanes]:
-        """The force of law j, or of a pair of them."""
+    def _newest(
+        self, group: Sequence[int], free: list[Lanes], force: list[Lanes], some: Sequence[int]
+    ) -> list[Lanes]:
+        """Forces of all laws in some vectors, once those of a group are solved side by side."""
+        m, kinds, newest = self._layout.m, self._structure.kinds, list(force)
+        for j in group:
+            together = [j, j + 1] if kinds[j] == PAIR else [j]
+            others = [i for i in range(m) if i not in together]
+            ahead = [self._felt(k, free[k], force, others, some) for k in together]
+            for k, solved in zip(together, self._force(j, ahead, force, some), strict=True):
+                newest[k] = solved
+        return newest
+
+    def _force(
+        self, j: int, ahead: Sequence[Lanes], last: Sequence[Lanes], some: Sequence[int]
+    ) -> Sequence[Lanes]:
+        """The force of law j, or of a pair of them, in some vectors."""
         kind, m = self._structure.kinds[j], self._layout.m
-        y0 = self._load("seen", j, self._all)
-        a, b, c = (lambda i=i: self._load("parameters", 3 * j + i, self._all) for i in range(3))
-        fixed = [self._all_of("law", 7 * j + i) for i in range(7)]
+        y0 = self._load("seen", j, some)
+        a, b, c = (lambda i=i: self._load("parameters", 3 * j + i, some) for i in range(3))
+        fixed = [self._take("law", 7 * j + i, some) for i in range(7)]
         if kind == Law.PLAY:
             return [laws.play_force(y0, ahead[0], a(), b(), laws.PlayOverStep(*fixed))]
         beta, per_beta = fixed[:2]
@@ -242,12 +256,12 @@ class Program:
             return [laws.excess_force(y0 - centre, ahead[0] - centre, a())]
         if kind == Law.CUBIC:
             return [laws.cubic_force(y0, ahead[0], last[j], a(), beta)]
-        pair = [self._all_of("gain", k * m + i) for k in (j, j + 1) for i in (j, j + 1)]
+        pair = [self._take("gain", k * m + i, some) for k in (j, j + 1) for i in (j, j + 1)]
         return laws.cubic_pair(
-            (y0, self._load("seen", j + 1, self._all)),
+            (y0, self._load("seen", j + 1, some)),
             (ahead[0], ahead[1]),
             (last[j], last[j + 1]),
-            (a(), self._load("parameters", 3 * (j + 1), self._all)),
+            (a(), self._load("parameters", 3 * (j + 1), some)),
             laws.Coupling(*pair),
         )
 
@@ -255,7 +269,7 @@ class Program:
         """What laws see at the end of the step."""
         m = self._layout.m
         force = [self._load("force", j, self._all) for j in range(m)]
-        seen = [self._felt(j, there, force, range(m)) for j, there in enumerate(free)]
+        seen = [self._felt(j, there, force, range(m), self._all) for j, there in enumerate(free)]
         for j, there in enumerate(seen):
             self._store("seen", j, there, self._all)
 
@@ -264,13 +278,17 @@ class Program:
         p, m = self._layout.p, self._layout.m
         seen = self._driven(m, at, self._all)
         for i in range(p):
-            seen = self._all_of("look", m * p + i) * self._load("q", i, self._all) + seen
-        return self._felt(m, seen, [self._load("force", j, self._all) for j in range(m)], range(m))
+            at_i = self._take("look", m * p + i, self._all)
+            seen = at_i * self._load("q", i, self._all) + seen
+        force = [self._load("force", j, self._all) for j in range(m)]
+        return self._felt(m, seen, force, range(m), self._all)
 
-    def _felt(self, j: int, free: Lanes, force: Sequence[Lanes], of: Sequence[int]) -> Lanes:
-        """What law j, or the output, sees with some of the forces."""
+    def _felt(
+        self, j: int, free: Lanes, force: Sequence[Lanes], of: Sequence[int], some: Sequence[int]
+    ) -> Lanes:
+        """What law j, or the output, sees with the forces of some laws, in some vectors."""
         for k in of:
-            free = self._all_of("gain", j * self._layout.m + k) * force[k] + free
+            free = self._take("gain", j * self._layout.m + k, some) * force[k] + free
         return free
 
     def _accumulate(self, at: Any, output: Lanes) -> None:
@@ -343,9 +361,6 @@ class Program:
         found = [_INT(v // self._of_each * places + first) for v in vectors]
         loads = [self._emit.load(self._emit.gep(self._coefficients, [one])) for one in found]
         return Lanes(self._code, [self._code.everywhere(one) for one in loads])
-
-    def _all_of(self, name: str, i: int) -> Lanes:
-        return self._take(name, i, self._all)
 
     def _wave(self, at: Any, k: int, count: int) -> Lanes:
         """One wave of the table, the same in so many vectors."""

@@ -16,13 +16,15 @@ from typing import Any
 
 from llvmlite import ir
 
+from sim.machine_code import has_wide_vectors
+
 __all__ = ["Code", "Lanes", "Number", "Product"]
 
 _TINY_IS_ZERO = {"x86": 0x8040, "arm": 1 << 24}
 """Bits of a processor's control word that take numbers too small for all their digits for zero."""
 
-VECTOR_BYTES = 64
-"""Of the widest vectors there are; machines with narrower ones take several for each."""
+VECTOR_BYTES = 64 if has_wide_vectors() else 32
+"""Of the vectors that programs are written in; those of a machine may be narrower still."""
 
 
 class Code:

@@ -20,7 +20,13 @@ from platformdirs import user_cache_path
 
 from daq.formats.atomic import keeping
 
-__all__ = ["architecture", "code_folder", "compiled", "multiplies_and_adds"]
+__all__ = [
+    "architecture",
+    "code_folder",
+    "compiled",
+    "has_wide_vectors",
+    "multiplies_and_adds",
+]
 
 _INT, _POINTER = ctypes.c_int64, ctypes.c_void_p
 _KIND = ctypes.CFUNCTYPE(None, *[_POINTER] * 3, *[_INT] * 3, _POINTER)
@@ -49,6 +55,11 @@ def architecture() -> str:
 def multiplies_and_adds() -> bool:
     """Whether the machine multiplies and adds in one instruction."""
     return architecture() == "arm" or bool(llvm.get_host_cpu_features().get("fma"))
+
+
+def has_wide_vectors() -> bool:
+    """Whether the machine computes with vectors of 64 bytes, and has 32 registers of them."""
+    return bool(llvm.get_host_cpu_features().get("avx512f"))
 
 
 def compiled(name: str, sources: Sequence[Path], write: Callable[[], str]) -> Any:
@@ -95,9 +106,8 @@ def _target_machine() -> Any:
 
 def _features() -> str:
     """Of this machine; with AVX-512 whole vectors, which the compiler halves if not told."""
-    features = llvm.get_host_cpu_features()
-    wide = ",-prefer-256-bit" if features.get("avx512f") else ""
-    return f"{features.flatten()}{wide}"
+    wide = ",-prefer-256-bit" if has_wide_vectors() else ""
+    return f"{llvm.get_host_cpu_features().flatten()}{wide}"
 
 
 @cache

@@ -10,9 +10,11 @@ from analysis.observation import unread
 from daq.plan import SweepPlan
 from sim.effects import parse_effect
 from sim.effort import counting
+from sim.lanes import VECTOR_BYTES
 from sim.unit import load_unit
 
 PLAN = SweepPlan((120.0, 150.0), (1.5, 2.5), settle_cycles=2, integrate_cycles=3)
+TWO = VECTOR_BYTES // 4 - 1  # machines at two levels in two vectors, the second not full
 PLANS = unread(PLAN, 5e-4).plans
 EFFECTS = ["", "load-inertia:J_L=0.2", "amplifier-lag:tau_a=0.0005", "shaft-damping:c_s1=0.002", ""]
 
@@ -52,10 +54,10 @@ def same(some, others):
     )
 
 
-# 15, 2 and 40 machines at two levels are two vectors, one, and more than a call takes.
+# Machines at two levels that are two vectors, one, and more than a call takes.
 @pytest.mark.parametrize(
     ("machines", "cores", "lots"),
-    [(15, 1, [2, 1, 2]), (15, 2, [2, 1, 1, 1]), (2, 1, [2, 3]), (2, 4, [1, 1, 1, 2]),
+    [(TWO, 1, [2, 1, 2]), (TWO, 2, [2, 1, 1, 1]), (2, 1, [2, 3]), (2, 4, [1, 1, 1, 2]),
      (40, 1, [1] * 5)],
 )  # fmt: skip
 def test_families_are_read_in_lots_as_they_are_one_by_one(machines, cores, lots):

@@ -12,13 +12,16 @@ from daq.errors import AnalysisError
 from sim import engine, stepping
 from sim.effects import drivetrain_with, parse_effect
 from sim.engine import Stretch, carry
+from sim.lanes import VECTOR_BYTES
 from sim.stepping import shared_out, step_together
 
 LONG, SHORT = 1e-5, 5e-6
+VECTOR = VECTOR_BYTES // 4  # lanes in single precision, on this machine
+TWO = 2 * VECTOR - 2  # lanes in two vectors, the second not full
 FREQUENCIES = (90.0, 110.0, 125.0)
 
 
-def asker(unit=EDSS, ratio=0.5, effects=(), lanes=20, steps=(LONG,), single=True, cycles=(2, 3)):
+def asker(unit=EDSS, ratio=0.5, effects=(), lanes=TWO, steps=(LONG,), single=True, cycles=(2, 3)):
     """A system on its way through three stretches, as many lanes of it as asked for."""
     system = drivetrain_with(unit, ratio, [parse_effect(text) for text in effects]).system()
     one = np.ones(lanes)
@@ -62,8 +65,9 @@ DIFFERENT = [
 @pytest.mark.parametrize("single", [True, False])
 @pytest.mark.parametrize(
     ("count", "lanes", "made"),
-    [(2, 20, [(2, 4)]), (3, 20, [(2, 4), (1, 2)]), (4, 9, [(4, 4)]), (3, 9, [(2, 2), (1, 1)]),
-     (2, 40, [(1, 2), (1, 1)] * 2), (2, 64, [(1, 4)] * 2)],
+    [(2, TWO, [(2, 4)]), (3, TWO, [(2, 4), (1, 2)]),
+     (4, VECTOR - 3, [(4, 4)]), (3, VECTOR - 3, [(2, 2), (1, 1)]),
+     (2, 3 * VECTOR - 4, [(1, 2), (1, 1)] * 2), (2, 4 * VECTOR, [(1, 4)] * 2)],
 )  # fmt: skip
 def test_what_one_program_steps_is_stepped_in_one_call(count, lanes, made, single, calls):
     # Vectors hold half as many numbers of twice the size.
@@ -83,13 +87,13 @@ def test_what_one_program_steps_is_stepped_in_one_call(count, lanes, made, singl
         {"effects": ("shaft-hardening:h=10000",)},
         {"effects": ("load-stribeck-friction:T_s_L=0.02,omega_s=0.05",)},
         {"single": False},
-        {"lanes": 30 + 3},
+        {"lanes": TWO + 3},
         {"cycles": (2, 4)},
         {"steps": (SHORT,)},
     ],
 )
 def test_what_is_not_alike_is_stepped_apart(other, calls):
-    plain, different = {"lanes": 30}, {"lanes": 30, **other}
+    plain, different = {"lanes": TWO}, {"lanes": TWO, **other}
     together = step_together([asker(**plain), asker(**different)])
     assert {systems for systems, _ in calls} == {1}
     for how, found in zip((plain, different), together, strict=True):
@@ -111,8 +115,8 @@ def growing(monkeypatch, who, at=110.0):
 
 
 def test_one_that_goes_back_leaves_the_other_as_it_is(monkeypatch, calls):
-    growing(monkeypatch, who=19)
-    ask = [{"lanes": 19, "steps": (LONG, SHORT)}, {"ratio": 0.3, "lanes": 20, "steps": (LONG,)}]
+    growing(monkeypatch, who=TWO - 1)
+    ask = [{"lanes": TWO - 1, "steps": (LONG, SHORT)}, {"ratio": 0.3, "steps": (LONG,)}]
     together = step_together([asker(**how) for how in ask])
     for how, found in zip(ask, together, strict=True):
         (alone,) = step_together([asker(**how)])
@@ -122,9 +126,9 @@ def test_one_that_goes_back_leaves_the_other_as_it_is(monkeypatch, calls):
 
 
 def test_what_one_raises_ends_the_whole(monkeypatch):
-    growing(monkeypatch, who=19)
+    growing(monkeypatch, who=TWO - 1)
     with pytest.raises(AnalysisError, match="at 110 Hz grew without bound"):
-        step_together([asker(lanes=20), asker(lanes=19)])
+        step_together([asker(lanes=TWO), asker(lanes=TWO - 1)])
 
 
 def test_who_asks_for_nothing_is_done():
@@ -149,7 +153,7 @@ def test_all_are_shared_out_and_no_core_is_left_without(kinds, cores, lanes, sin
     assert sorted(i for lot in lots for i in lot) == list(range(len(kinds)))
     assert all(lots)
     assert len(lots) >= min(cores, len(kinds))
-    width = 16 if single else 8
+    width = VECTOR if single else VECTOR // 2
     assert all(len(lot) == 1 or len(lot) * -(-lanes // width) <= 4 for lot in lots)
     # No core has more than a lot more than another.
     loads = np.zeros(cores)
@@ -161,17 +165,17 @@ def test_all_are_shared_out_and_no_core_is_left_without(kinds, cores, lanes, sin
 @pytest.mark.parametrize(
     ("kinds", "cores", "lanes", "lots"),
     [
-        ("aa", 2, 30, [[0], [1]]),
-        ("aaa", 2, 30, [[0, 1], [2]]),
-        ("aaaa", 2, 30, [[0, 1], [2, 3]]),
-        ("aaaaaa", 2, 30, [[0, 1], [2, 3], [4], [5]]),
-        ("aaaa", 2, 60, [[0], [1], [2], [3]]),
-        ("aaaaaaaaaaaa", 2, 10, [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9], [10, 11]]),
-        ("aaaa", 1, 30, [[0, 1], [2, 3]]),
-        ("aaaaa", 8, 30, [[0], [1], [2], [3], [4]]),
+        ("aa", 2, TWO, [[0], [1]]),
+        ("aaa", 2, TWO, [[0, 1], [2]]),
+        ("aaaa", 2, TWO, [[0, 1], [2, 3]]),
+        ("aaaaaa", 2, TWO, [[0, 1], [2, 3], [4], [5]]),
+        ("aaaa", 2, 2 * TWO, [[0], [1], [2], [3]]),
+        ("aaaaaaaaaaaa", 2, VECTOR - 3, [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9], [10, 11]]),
+        ("aaaa", 1, TWO, [[0, 1], [2, 3]]),
+        ("aaaaa", 8, TWO, [[0], [1], [2], [3], [4]]),
         # What is alike is together, and what each has one too many of.
-        ("abab", 1, 30, [[0, 2], [1, 3]]),
-        ("aaabbbcc", 2, 30, [[0, 1], [3, 4], [6, 7], [2, 5]]),
+        ("abab", 1, TWO, [[0, 2], [1, 3]]),
+        ("aaabbbcc", 2, TWO, [[0, 1], [3, 4], [6, 7], [2, 5]]),
     ],
 )
 def test_pairs_are_made_where_no_core_would_be_without(kinds, cores, lanes, lots):
