@@ -163,9 +163,7 @@ def _contest(standing: _Standing, rng: np.random.Generator) -> None:
         whole, part = fine.found[best], fine.found[leader]
         # Few runs fit by chance, but may be all that there will be.
         if _is_short(fine, best, leader) and not fine.purse.is_spent:
-            settle(fine, [best])
-            if _is_short(fine, best, leader):
-                settle(fine, [best])
+            _settle_short(fine, best, leader)
             standing.ask([best])
         elif standing.leads[best] >= LEAST_GAIN and earns_its_name(
             whole, part, rng.spawn(1)[0], len(refused)
@@ -182,6 +180,13 @@ def _contest(standing: _Standing, rng: np.random.Generator) -> None:
 def _is_short(fine: Hunt, key: Effects, leader: Effects) -> bool:
     """Whether a set has too few runs to be asked what it brings beyond a leader."""
     return len(fine.found[key].population) < _ASKED and has_fewer(fine, key, leader)
+
+
+def _settle_short(fine: Hunt, key: Effects, leader: Effects) -> None:
+    """Give a set the runs with which it is asked: what the first of them tell places the rest."""
+    for _ in range(2):
+        if _is_short(fine, key, leader):
+            settle(fine, [key])
 
 
 def _level(standing: _Standing, best: Effects) -> None:
