@@ -7,7 +7,7 @@ JOBS ?= 2
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: help demo test check bench blind faults fuzz soak docs audit lock clean
+.PHONY: help demo test tests check bench blind faults fuzz soak docs audit lock clean
 
 help:
 	@echo "make demo    the whole job without hardware; results in demo/"
@@ -26,7 +26,11 @@ help:
 demo: $(READY)
 	@$(BIN)/lashbench demo
 
-test: check
+# Types take one core for most of a minute, and tests often wait for something.
+test: $(READY)
+	@$(MAKE) --no-print-directory --jobs 2 check tests
+
+tests: $(READY)
 	@$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile --no-loadscope-reorder
 
 check: $(READY)

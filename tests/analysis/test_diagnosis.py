@@ -118,7 +118,9 @@ QUICK = ("09",)
 @pytest.mark.parametrize(
     "number",
     [
-        pytest.param(f"{i:02d}", marks=() if f"{i:02d}" in QUICK else pytest.mark.study)
+        pytest.param(
+            f"{i:02d}", marks=pytest.mark.slow if f"{i:02d}" in QUICK else pytest.mark.study
+        )
         for i in range(1, 13)
     ],
 )

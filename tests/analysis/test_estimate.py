@@ -194,6 +194,7 @@ def test_practice_sets_with_nothing_hidden(name, truth):
     assert not found.warnings
 
 
+@pytest.mark.slow
 def test_the_papers_adss_frequencies_agree_with_the_microscope():
     found = estimate_features(128.0, 137.0, load_unit("adss"))
     low, high = found.contribution_ratio.interval95
@@ -212,6 +213,7 @@ def test_frequencies_in_another_unit_are_refused(arf_hz, rf_hz):
         fit_features(arf_hz, rf_hz, load_unit("adss"))
 
 
+@pytest.mark.slow
 def test_the_papers_edss_frequencies_are_warned_about():
     # No ratio brings the paper's model near 40 and 75 Hz: the least index is about 20 Hz.
     found = fit_features(40.0, 75.0, load_unit("edss"))

@@ -150,6 +150,7 @@ def test_the_papers_row_is_answered_with_json_and_a_picture(capsys, monkeypatch,
     assert (tmp_path / "out").is_dir()
 
 
+@pytest.mark.slow
 def test_a_large_effect_hidden_behind_the_simulated_analyser_is_found(
     tmp_path, monkeypatch, capsys
 ):

@@ -57,6 +57,7 @@ def outcomes():
         )
 
 
+@pytest.mark.slow
 def test_no_promise_is_broken_whatever_goes_wrong(outcomes):
     assert list(chain.from_iterable(outcome.wrongs for outcome in outcomes)) == []
 
