@@ -213,7 +213,7 @@ def test_frequencies_in_another_unit_are_refused(arf_hz, rf_hz):
         fit_features(arf_hz, rf_hz, load_unit("adss"))
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_the_papers_edss_frequencies_are_warned_about():
     # No ratio brings the paper's model near 40 and 75 Hz: the least index is about 20 Hz.
     found = fit_features(40.0, 75.0, load_unit("edss"))

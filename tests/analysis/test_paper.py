@@ -157,7 +157,7 @@ def test_senseless_requests_are_refused(wrong):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [4, pytest.param(None, marks=pytest.mark.study)])
+@pytest.mark.parametrize("count", [2, pytest.param(None, marks=pytest.mark.study)])
 def test_paper_scheme_meets_table_2(count):
     """In rows drawn at random, and in every row in a study."""
     table = load_paper().simulated
