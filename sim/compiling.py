@@ -10,9 +10,10 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-import llvmlite.binding as llvm
 import numba
 from numba import njit
+
+from sim.machine_code import has_wide_vectors, machine_features
 
 __all__ = ["njit", "part"]
 
@@ -26,9 +27,8 @@ def _ask_for_whole_vectors() -> None:
     settings: Any = numba.config
     if settings.CPU_FEATURES or settings.CPU_NAME or not settings.ENABLE_AVX:
         return
-    features = llvm.get_host_cpu_features()
-    if features.get("avx512f"):
-        settings.CPU_FEATURES = f"{features.flatten()},-prefer-256-bit"
+    if has_wide_vectors():
+        settings.CPU_FEATURES = machine_features()
 
 
 _ask_for_whole_vectors()

@@ -25,6 +25,7 @@ __all__ = [
     "code_folder",
     "compiled",
     "has_wide_vectors",
+    "machine_features",
     "multiplies_and_adds",
 ]
 
@@ -60,6 +61,12 @@ def multiplies_and_adds() -> bool:
 def has_wide_vectors() -> bool:
     """Whether the machine computes with vectors of 64 bytes, and has 32 registers of them."""
     return bool(llvm.get_host_cpu_features().get("avx512f"))
+
+
+def machine_features() -> str:
+    """What a compiler is told of this machine; with AVX-512 whole vectors, which it halves else."""
+    wide = ",-prefer-256-bit" if has_wide_vectors() else ""
+    return f"{llvm.get_host_cpu_features().flatten()}{wide}"
 
 
 def compiled(name: str, sources: Sequence[Path], write: Callable[[], str]) -> Any:
@@ -100,19 +107,13 @@ def _target_machine() -> Any:
     llvm.initialize_native_asmprinter()
     target = llvm.Target.from_triple(llvm.get_process_triple())
     return target.create_target_machine(
-        cpu=llvm.get_host_cpu_name(), features=_features(), opt=3, jit=True
+        cpu=llvm.get_host_cpu_name(), features=machine_features(), opt=3, jit=True
     )
-
-
-def _features() -> str:
-    """Of this machine; with AVX-512 whole vectors, which the compiler halves if not told."""
-    wide = ",-prefer-256-bit" if has_wide_vectors() else ""
-    return f"{llvm.get_host_cpu_features().flatten()}{wide}"
 
 
 @cache
 def _target_text() -> str:
-    return f"{llvmlite.__version__} {llvm.get_host_cpu_name()} {_features()}"
+    return f"{llvmlite.__version__} {llvm.get_host_cpu_name()} {machine_features()}"
 
 
 @cache

@@ -77,8 +77,15 @@ def check_estimate(result):
 
 @pytest.mark.slow
 def test_estimate_gives_the_fields_that_scripts_use(capsys):
+    """For the paper's ADSS, it tells what the microscope saw."""
     words = ["estimate", "--unit", "adss", "--arf-hz", "128", "--rf-hz", "137"]
-    check_estimate(document(words, capsys))
+    found = document(words, capsys)
+    check_estimate(found)
+    low, high = found["contribution_ratio"]["interval95"]
+    assert low < 0.23 < high
+    assert high - low < 0.5
+    assert min(found["error_index"]["hz"]) < 10.0
+    assert not found["warnings"]
 
 
 @pytest.fixture
