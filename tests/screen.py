@@ -7,11 +7,15 @@ from contextlib import asynccontextmanager
 
 from rich.console import Console
 
+from daq.store import Store
 from tui.app.analyses import Analyses
 from tui.app.application import BenchApp
 from tui.app.messages import InstrumentsListed
 
 SIZES = [(80, 24), (120, 40), (200, 60)]
+
+LONG = {"points": "8000", "cycles": ("4", "4")}
+"""A sweep that is still under way when keys are pressed."""
 
 ESTIMATE = {
     "unit": "ADSS",
@@ -188,3 +192,24 @@ async def operated(db, size=(80, 24), **options):
 def run(test):
     """Run a coroutine function that takes nothing."""
     asyncio.run(test())
+
+
+def begun(db):
+    with Store(db, read_only=True) as store:
+        return [m for m in store.measurements() if m.points][-1]
+
+
+async def sweeping(op, url, **plan):
+    """Go to a sweep that has a few points."""
+    await op.connects(url)
+    await op.plans(**plan)
+    await op.checks()
+    await op.press("ctrl+n", "s")
+    await some_points(op)
+
+
+async def some_points(op, count=3):
+    end = time.monotonic() + 20
+    while op.app.desk.run.done < count:
+        assert time.monotonic() < end, op.screen
+        await op.pilot.pause(0.01)

@@ -12,14 +12,15 @@ import logging
 import math
 import os
 import sys
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Annotated, Any, TextIO
 
 from cyclopts import Parameter
 
 from daq.errors import LashbenchError
+from tui.narrator import Narrator
 from tui.pace import Pace, duration
 
 __all__ = ["Console", "Injected", "as_json", "hush"]
@@ -33,6 +34,11 @@ class _Live:
 
     lines: int = 0
     pace: Pace = field(default_factory=Pace)
+    narrator: Narrator | None = None
+
+
+_PATIENCE_S = 2.0
+"""How long is waited for a terminal to take what is left, when nothing drives any more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +91,24 @@ class Console:
         self._clear()
         self._narrate(f"error: {' '.join(text.split())}\n")
 
+    @contextmanager
+    def unhurried(self) -> Iterator[None]:
+        """Narrate without ever waiting for whoever reads it; no data, meanwhile.
+
+        Nor afterwards, if it is not read by then.
+        """
+        try:
+            self._live.narrator = narrator = Narrator(sys.stderr)
+        except (AttributeError, OSError, ValueError):
+            # No file is behind it, which could make anybody wait.
+            yield
+            return
+        try:
+            yield
+        finally:
+            if narrator.has_said_all(_PATIENCE_S):
+                self._live.narrator = None
+
     @property
     def watched(self) -> bool:
         """Whether somebody sees what is drawn in place."""
@@ -108,7 +132,7 @@ class Console:
             remaining_s = self._live.pace.remaining_s(fraction)
         left = "" if remaining_s is None else f"{duration(remaining_s)} left  "
         line = f"{100 * fraction:3.0f} %  {left}{text}"
-        self._narrate(f"\r\x1b[K{line[:78]}")
+        self._narrate(f"\r\x1b[K{line[:78]}", fleeting=True)
 
     def picture(self, lines: Sequence[str]) -> None:
         """Draw lines in place of those drawn before; only where they fit on a terminal."""
@@ -138,8 +162,11 @@ class Console:
             self._narrate(self._erasure())
             self._live.lines = 0
 
-    def _narrate(self, text: str) -> None:
+    def _narrate(self, text: str, fleeting: bool = False) -> None:
         """Write to stderr; whoever stopped listening there does not stop the work."""
+        if self._live.narrator is not None:
+            self._live.narrator.say(text, fleeting)
+            return
         try:
             print(text, end="", file=sys.stderr, flush=True)  # noqa: T201
         except OSError:

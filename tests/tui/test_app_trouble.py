@@ -3,12 +3,21 @@
 import asyncio
 import subprocess
 import sys
-import time
 
 import pytest
 from bench_server import gimbal_analyser, served
 from killed import killed_after
-from screen import DIAGNOSIS, Diagnosed, operated, quick_analyses, run
+from screen import (
+    DIAGNOSIS,
+    LONG,
+    Diagnosed,
+    begun,
+    operated,
+    quick_analyses,
+    run,
+    some_points,
+    sweeping,
+)
 
 from analysis.swept import sweep_document
 from daq.analyser import SourceState
@@ -16,30 +25,6 @@ from daq.frf import PointFlag
 from daq.plan import SweepPlan
 from daq.store import Store
 from tui.app.dialogs import ErrorDialog
-
-LONG = {"points": "8000", "cycles": ("4", "4")}
-"""A sweep that is still under way when keys are pressed."""
-
-
-def begun(db):
-    with Store(db, read_only=True) as store:
-        return [m for m in store.measurements() if m.points][-1]
-
-
-async def sweeping(op, url, **plan):
-    """Go to a sweep that has a few points."""
-    await op.connects(url)
-    await op.plans(**plan)
-    await op.checks()
-    await op.press("ctrl+n", "s")
-    await some_points(op)
-
-
-async def some_points(op, count=3):
-    end = time.monotonic() + 20
-    while op.app.desk.run.done < count:
-        assert time.monotonic() < end, op.screen
-        await op.pilot.pause(0.01)
 
 
 @pytest.mark.parametrize("place", ["sweep", "field", "dialog"])

@@ -21,6 +21,7 @@ from textual.app import App, SystemCommand
 from textual.binding import Binding, BindingType
 from textual.screen import ModalScreen, Screen
 
+from daq.analyser import SourceState
 from daq.errors import LashbenchError
 from daq.formats.atomic import write_text
 from daq.session_events import Finished, PointStored, RunIn
@@ -35,6 +36,7 @@ from tui.app.screens.instrument_screen import InstrumentScreen
 from tui.app.session_keeper import SessionKeeper
 from tui.app.step_screen import STEPS, StepScreen
 from tui.app.style import STYLE
+from tui.entry import INTERRUPTED
 
 if TYPE_CHECKING:
     from daq.store_records import Measurement
@@ -89,6 +91,7 @@ class BenchApp(App[int]):
         self._find = find
         self._log_file = log
         self._stale = False
+        self._told_to_end = False
 
     # ------------------------------------------------------------ the way through
 
@@ -97,6 +100,11 @@ class BenchApp(App[int]):
         self.push_screen(STEPS[0])
         self.set_interval(_REDRAW_S, self._redraw)
         self._listen_to_signals()
+
+    def on_unmount(self) -> None:
+        """Whatever took the screen away: nobody could stop a session any more."""
+        if self.desk.run.live:
+            self.keeper.stop_now()
 
     def action_go(self, step: int) -> None:
         """Go to a step by number."""
@@ -178,9 +186,17 @@ class BenchApp(App[int]):
     def _end_and_leave(self) -> None:
         self.keeper.interrupt_then(self._leave)
 
+    def _end_at_once(self) -> None:
+        """A signal: nobody may be there to read a dialog."""
+        self._told_to_end = True
+        self._end_and_leave()
+
     def _leave(self) -> None:
         self.analyses.give_up()
-        self.exit(0)
+        run, code, line = self.desk.run, INTERRUPTED if self._told_to_end else 0, None
+        if run.source not in (None, SourceState.CONFIRMED_OFF):
+            code, line = LashbenchError.exit_code, f"error: {run.source_text}"
+        self.exit(code, code, line)
 
     def get_system_commands(self, screen: Screen) -> Iterable[SystemCommand]:
         """The palette: steps, keys of the step, and what Textual offers."""
@@ -228,9 +244,9 @@ class BenchApp(App[int]):
         if self.is_headless or threading.current_thread() is not threading.main_thread():
             return
         loop = asyncio.get_running_loop()
-        for name in ("SIGTERM", "SIGHUP"):
+        for name in ("SIGINT", "SIGTERM", "SIGHUP"):
             with suppress(AttributeError, NotImplementedError, RuntimeError, ValueError):
-                loop.add_signal_handler(getattr(signal, name), self._end_and_leave)
+                loop.add_signal_handler(getattr(signal, name), self._end_at_once)
         if hasattr(signal, "SIGTSTP"):
             # A halted program would leave the source driving.
             signal.signal(signal.SIGTSTP, signal.SIG_IGN)
@@ -254,7 +270,8 @@ class BenchApp(App[int]):
         run.end(message.error)
         self.redraw_now()
         finished = run.finished
-        if finished is not None and finished.source_state.value != "confirmed-off":
+        proven = finished is None or finished.source_state is SourceState.CONFIRMED_OFF
+        if finished is not None and not proven:
             self.show_error(
                 "SWITCH THE SOURCE OFF BY HAND",
                 f"{run.source_text}. The session ended ({finished.reason}) and the source could "
@@ -264,7 +281,8 @@ class BenchApp(App[int]):
             self._show_fault(message.error)
         elif finished is not None:
             self.notify(f"{finished.state}: {finished.points} points, source confirmed off")
-        self.keeper.released()
+        # Whoever wanted to leave, or to go on, is to read that first.
+        self.keeper.released(follow=proven or self._told_to_end)
 
     def _show_fault(self, error: Exception) -> None:
         finished = self.desk.run.finished
@@ -296,9 +314,10 @@ class BenchApp(App[int]):
     def on_source_stopped(self, message: messages.SourceStopped) -> None:
         """The recipe ran outside of a session."""
         self.desk.run.source, self.desk.run.source_vpk = message.state, None
-        self.keeper.released()
+        proven = message.state is SourceState.CONFIRMED_OFF
+        self.keeper.released(follow=proven or self._told_to_end)
         self.redraw_now()
-        if message.state.value != "confirmed-off":
+        if not proven:
             self.show_error("SWITCH THE SOURCE OFF BY HAND", message.text)
         else:
             self.notify("source confirmed off")

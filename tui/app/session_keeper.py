@@ -139,11 +139,11 @@ class SessionKeeper:
 
     # ------------------------------------------------------------ told by the application
 
-    def released(self) -> None:
-        """The worker is done; what was to follow follows."""
+    def released(self, follow: bool = True) -> None:
+        """The worker is done; what was to follow follows, if it may."""
         self.busy = False
         then, self._then = self._then, None
-        if then is not None:
+        if follow and then is not None:
             then()
 
     def settle(self, finished: Finished) -> None:

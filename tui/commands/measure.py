@@ -19,7 +19,7 @@ from daq.errors import InputError, LashbenchError, MeasurementError
 from tui.entry import INTERRUPTED
 from tui.measure_options import PlanOptions, read_band, session_request
 from tui.options import Json, Real, UnitName, Whole
-from tui.output import Console, Injected
+from tui.output import Console, Injected, hush
 from tui.places import history_path
 
 if TYPE_CHECKING:
@@ -199,13 +199,14 @@ def _run(
         closing(bench_session(instrument, unit, db, request, control, transcript)) as events,
     ):
         try:
-            for event in events:
-                # Whoever listened may have left; the measurement goes on without.
-                with suppress(BrokenPipeError):
-                    _tell(event, console)
-                if isinstance(event, Finished):
-                    finished = event
-        except LashbenchError as error:
+            with console.unhurried():
+                for event in events:
+                    # Whoever listened may have left; the measurement goes on without.
+                    with suppress(BrokenPipeError):
+                        _tell(event, console)
+                    if isinstance(event, Finished):
+                        finished = event
+        except Exception as error:
             if finished is None:
                 raise
             _report(finished, json, console)
@@ -253,6 +254,14 @@ def _decibels(gain: complex) -> str:
 
 
 def _report(finished: Finished, json: bool, console: Console) -> None:
+    """Say how it ended; who reads no more must not keep the error and the exit code back."""
+    try:
+        _say_how_it_ended(finished, json, console)
+    except BrokenPipeError:
+        hush(sys.stdout)
+
+
+def _say_how_it_ended(finished: Finished, json: bool, console: Console) -> None:
     if json:
         console.document(
             {
@@ -281,8 +290,10 @@ def _contract_state(finished: Finished) -> str:
     return "unconfirmed" if state == "on" else state
 
 
-def _complete(error: LashbenchError, finished: Finished) -> LashbenchError:
+def _complete(error: Exception, finished: Finished) -> LashbenchError:
     """The error, with the loud words where the source was not proven off."""
+    if not isinstance(error, LashbenchError):
+        error = MeasurementError(f"internal error: {type(error).__name__}: {error}")
     state = _contract_state(finished)
     kept = f"{finished.points} point{'' if finished.points == 1 else 's'} kept"
     if state == "confirmed-off":

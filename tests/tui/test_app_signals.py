@@ -1,0 +1,138 @@
+"""The bench screen on a real terminal, told to end by a signal, and left with a source not off."""
+
+import asyncio
+import os
+import pty
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import suppress
+
+import pytest
+from screen import LONG, begun, operated, run, sweeping
+
+from daq.analyser import SourceState
+from daq.errors import LashbenchError
+from daq.store import Store
+
+PROGRAM = """
+import sys
+from pathlib import Path
+import daq.hp35670a
+import daq.hp35670a_safe
+from daq.hp35670a_setup import Timing
+from tui.app.application import BenchApp
+from tui.measure_options import PlanOptions
+
+# Whoever is silent is waited for less long than at a bench.
+daq.hp35670a.Timing = lambda: Timing(reply_s=0.5, block_s=1.0, overhead_s=3.0)
+daq.hp35670a_safe._BUDGET_S = 2.0
+
+class Driven(BenchApp):
+    def on_mount(self):
+        super().on_mount()
+        self.desk.choose_unit("adss")
+        self.desk.url = sys.argv[2]
+        self.desk.options = PlanOptions((2.0,), 120.0, 160.0, 8000, None, None, 4, 4)
+        assert self.keeper.start(hold=False)
+        if len(sys.argv) > 3:
+            self.set_interval(0.05, lambda: self.desk.run.done < int(sys.argv[3]) or self.exit(0))
+
+app = Driven(Path(sys.argv[1]), find=lambda post: None)
+code = app.run()
+sys.exit(code if code is not None else app.return_code or 0)
+"""
+
+
+class OnTerminal:
+    """The program on a terminal of its own, whose screen somebody reads."""
+
+    def __init__(self, *words):
+        ours, theirs = pty.openpty()
+        self.program = subprocess.Popen(
+            [sys.executable, "-c", PROGRAM, *words], stdin=theirs, stdout=theirs, stderr=theirs
+        )
+        os.close(theirs)
+        self.seen = b""
+        self._reader = threading.Thread(target=self._read, args=(ours,), daemon=True)
+        self._reader.start()
+
+    def _read(self, terminal):
+        while True:
+            try:
+                some = os.read(terminal, 65536)
+            except OSError:
+                return
+            if not some:
+                return
+            self.seen += some
+
+    def ended(self, within_s=30.0):
+        code = self.program.wait(within_s)
+        self._reader.join(5.0)
+        return code
+
+
+def driving(db, within_s=40.0):
+    """Wait until a session in a history has points."""
+    end = time.monotonic() + within_s
+    while True:
+        # Until the session has made it there is no history to read.
+        with suppress(LashbenchError), Store(db, read_only=True) as store:
+            if any(m.points > 2 for m in store.measurements()):
+                return
+        assert time.monotonic() < end, "no session began"
+        time.sleep(0.05)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
+def test_a_signal_ends_session_and_screen_with_the_source_off(tmp_path, number):
+    db = tmp_path / "bench.db"
+    terminal = OnTerminal(str(db), "sim:?ratio=0.3&seed=1")
+    driving(db)
+    terminal.program.send_signal(number)
+    assert terminal.ended() == 130
+    assert begun(db).state == "interrupted"
+    assert begun(db).source_state is SourceState.CONFIRMED_OFF
+
+
+def test_a_source_that_a_signal_could_not_switch_off_is_told_after_the_screen(tmp_path):
+    db = tmp_path / "bench.db"
+    terminal = OnTerminal(str(db), "sim:?fault=silence:point=5")
+    driving(db)
+    terminal.program.send_signal(signal.SIGTERM)
+    assert terminal.ended(60.0) == 1
+    assert begun(db).source_state is SourceState.UNKNOWN
+    assert b"error: SOURCE UNKNOWN: switch it off by hand" in terminal.seen.splitlines()[-1]
+
+
+def test_who_quits_reads_first_that_the_source_could_not_be_switched_off(tmp_path, monkeypatch):
+    monkeypatch.setattr("daq.hp35670a_safe._BUDGET_S", 2.0)
+    db = tmp_path / "bench.db"
+
+    async def way():
+        async with operated(db) as op:
+            await sweeping(op, "sim:?fault=silence:point=5", **LONG)
+            await op.press("ctrl+q")
+            await op.sees("Quit?")
+            await op.press("y")
+            await op.sees("SWITCH THE SOURCE OFF BY HAND", within_s=60.0)
+            assert op.app.is_running
+            await op.press("escape", "ctrl+q")
+            while op.app.is_running:
+                await asyncio.sleep(0.02)
+            assert op.app.return_code == 1
+
+    run(way)
+    assert begun(db).source_state is SourceState.UNKNOWN
+
+
+def test_a_screen_that_is_taken_away_ends_the_session(tmp_path):
+    db = tmp_path / "bench.db"
+    terminal = OnTerminal(str(db), "sim:?ratio=0.3&seed=1", "3")
+    assert terminal.ended() == 0, terminal.seen[-2000:]
+    assert begun(db).state == "interrupted"
+    assert begun(db).source_state is SourceState.CONFIRMED_OFF
+    assert begun(db).points < 8000
