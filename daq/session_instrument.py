@@ -12,7 +12,6 @@ from contextlib import suppress
 
 from daq.analyser import Analyser, SourceState
 from daq.control import SessionControl
-from daq.errors import LashbenchError
 
 __all__ = ["HeldInstrument"]
 
@@ -88,10 +87,12 @@ class HeldInstrument:
 
     def _connect(self, reopen: Callable[[], Analyser]) -> bool:
         try:
-            self.analyser.close()
+            # Whatever a dead connection has to say at its end is no reason not to try another.
+            with suppress(Exception):
+                self.analyser.close()
             time.sleep(_RECONNECT_S)
             self.analyser = reopen()
-        except LashbenchError:
+        except Exception:
             return False
         except KeyboardInterrupt:
             self._control.interrupt("interrupted from the keyboard")

@@ -1,9 +1,10 @@
-"""A child process that makes the source safe when its session is killed outright.
+"""A child process that makes the source safe when its session could not.
 
 Owns that child: it waits for the session's last word on a pipe, and where the
-pipe breaks without one it opens the instrument anew, runs the safe-off recipe
-and writes into the history what it could prove. It helps only where the
-transport can be opened again; the next session checks the source in any case.
+pipe breaks without one, as where the session was killed outright or could not
+prove the source off, it opens the instrument anew, runs the safe-off recipe and
+writes into the history what it could prove. It helps only where the transport
+can be opened again; the next session checks the source in any case.
 While the session lives it touches nothing.
 """
 
@@ -14,6 +15,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -22,9 +24,10 @@ from daq.errors import InputError, LashbenchError
 __all__ = ["Watchdog", "main"]
 
 _DONE = b"done\n"
-_OPENINGS = 5
+_TRIES = 5
 _BETWEEN_S = 1.0
 _DISMISSAL_S = 5.0
+_NO_WORD = "the session ended without proving the source off"
 
 
 class Watchdog:
@@ -55,6 +58,13 @@ class Watchdog:
             )
         except OSError as error:
             raise InputError(f"the watchdog cannot be started ({error.strerror})") from error
+
+    def leave(self) -> None:
+        """Let it see to the source, which could not be proven off; nobody waits for it."""
+        child, self._child = self._child, None
+        if child is not None and child.stdin is not None:
+            child.stdin.close()
+            threading.Thread(target=child.wait, daemon=True).start()
 
     def dismiss(self) -> None:
         """Tell it that the source is off; may be called twice."""
@@ -98,18 +108,20 @@ def _make_safe(url: str) -> tuple[str, str]:
     from daq.hp35670a import HP35670A
     from daq.transports.open import open_transport
 
-    failure = ""
-    for _ in range(_OPENINGS):
+    state, found = SourceState.UNKNOWN, ""
+    for _ in range(_TRIES):
         try:
             analyser = HP35670A(open_transport(url))
         except LashbenchError as error:
-            failure = str(error)
-            time.sleep(_BETWEEN_S)
-            continue
-        state = analyser.make_safe()
-        analyser.close()
-        return f"the session was killed; source {state.value}", state.value
-    return f"the session was killed, and {failure}", SourceState.UNKNOWN.value
+            found = f", and {error}"
+        else:
+            state = analyser.make_safe()
+            analyser.close()
+            found = f"; source {state.value}"
+        if state is SourceState.CONFIRMED_OFF:
+            break
+        time.sleep(_BETWEEN_S)
+    return f"{_NO_WORD}{found}", state.value
 
 
 def _write_down(history: Path, measurement: int, text: str, state: str) -> None:
@@ -118,7 +130,7 @@ def _write_down(history: Path, measurement: int, text: str, state: str) -> None:
 
     with Store(history) as store:
         # The session may have ended well and died before its last word here.
-        if store.measurement(measurement).source_state is SourceState.ON:
+        if store.measurement(measurement).source_state is not SourceState.CONFIRMED_OFF:
             store.set_source_state(measurement, SourceState(state))
         store.note(measurement, "watchdog", text)
 

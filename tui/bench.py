@@ -7,9 +7,11 @@ taken apart again. It prints nothing and decides nothing about a measurement.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from daq.errors import LashbenchError
 
 if TYPE_CHECKING:
     from daq.control import SessionControl
@@ -17,6 +19,8 @@ if TYPE_CHECKING:
     from daq.limits import Limits
     from daq.session_events import SessionEvent
     from daq.session_request import SessionRequest
+    from daq.store import Store
+    from daq.watchdog import Watchdog
     from sim.unit import Unit
 
 __all__ = ["bench_session", "connect", "drives_hardware", "unit_limits"]
@@ -49,13 +53,20 @@ def unit_limits(unit: Unit) -> Limits:
     )
 
 
-def connect(url: str, unit: Unit, transcript: Path | None = None) -> HP35670A:
+def connect(
+    url: str,
+    unit: Unit,
+    transcript: Path | None = None,
+    fault: Callable[[str], None] | None = None,
+) -> HP35670A:
     """Open the instrument at an address; ``sim:`` is a simulated one with the unit behind it.
 
     Parameters
     ----------
     transcript
         New file that records the dialogue.
+    fault
+        Told if that file takes no more.
 
     Raises
     ------
@@ -70,7 +81,7 @@ def connect(url: str, unit: Unit, transcript: Path | None = None) -> HP35670A:
         from sim.loopback import open_loopback
 
         factories["sim"] = open_loopback(unit)
-    return HP35670A(open_transport(url, factories, record=transcript))
+    return HP35670A(open_transport(url, factories, record=transcript, fault=fault))
 
 
 def bench_session(
@@ -84,7 +95,7 @@ def bench_session(
     """Run a session and yield what it tells; close the iterator to end it early.
 
     On hardware a watchdog stands by from before the first volt until the
-    source is proven off.
+    source is proven off; where it never is, the watchdog goes on trying when this ends.
 
     Raises
     ------
@@ -94,21 +105,39 @@ def bench_session(
     """
     from daq.bench_lock import BenchLock
     from daq.session import Session
-    from daq.session_events import Opened
+    from daq.session_events import Opened, Warned
     from daq.store import Store
     from daq.watchdog import Watchdog
 
     is_real = drives_hardware(url)
     reopen: Callable[[], HP35670A] | None = (lambda: connect(url, unit)) if is_real else None
+    faults: list[str] = []
     with ExitStack() as stack:
         store = stack.enter_context(Store(history, create=request.resume is None))
         lock = stack.enter_context(BenchLock(history))
-        analyser = connect(url, unit, transcript)
+        analyser = connect(url, unit, transcript, faults.append)
+        # The watchdog opens the instrument anew, which must be free by then.
+        watch = stack.enter_context(ExitStack())
         stack.callback(analyser.close)
         session = Session(analyser, store, request, control, reopen)
         with closing(session.run()) as events:
             for event in events:
                 if isinstance(event, Opened) and is_real:
                     watchdog = Watchdog(url, history, event.measurement, lock.descriptor)
-                    stack.callback(watchdog.dismiss)
+                    watch.callback(_stand_down, watchdog, store, event.measurement)
+                while faults:
+                    yield Warned(faults.pop(0))
                 yield event
+
+
+def _stand_down(watchdog: Watchdog, store: Store, measurement: int) -> None:
+    """Dismiss it where the source is proven off, as the history says; else leave it to its work."""
+    from daq.analyser import SourceState
+
+    state = None
+    with suppress(LashbenchError):
+        state = store.measurement(measurement).source_state
+    if state is SourceState.CONFIRMED_OFF:
+        watchdog.dismiss()
+    else:
+        watchdog.leave()

@@ -63,6 +63,8 @@ class Console:
 
     def data(self, text: str) -> None:
         """Print a line or block of the result to stdout."""
+        if sys.stdout is None:
+            raise LashbenchError("there is no stdout to write the result to; leave it open")
         self._clear()
         try:
             print(text, flush=True)  # noqa: T201

@@ -34,6 +34,7 @@ def open_transport(
     factories: Mapping[str, TransportFactory] | None = None,
     *,
     record: Path | None = None,
+    fault: Callable[[str], None] | None = None,
     opening_s: float = _OPENING_S,
 ) -> Transport:
     """Open the transport that a URL names; docs/instrument.md explains the forms.
@@ -46,6 +47,8 @@ def open_transport(
         Transports provided by the caller, by scheme (``"sim"``).
     record
         File to record the dialogue to; must not exist yet.
+    fault
+        Told if that file takes no more; see `daq.transports.transcript.Recorder`.
     opening_s
         Bound of opening, s.
 
@@ -89,7 +92,7 @@ def open_transport(
     from daq.transports.transcript import Recorder
 
     try:
-        return Recorder(transport, record)
+        return Recorder(transport, record, fault)
     except LashbenchError:
         transport.close()
         raise

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import base64
 import json
+import logging
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -21,6 +23,8 @@ from daq.errors import FileFormatError, InputError, LashbenchError, ProtocolErro
 from daq.transports.base import Deadline, Transport
 
 __all__ = ["Recorder", "Replay"]
+
+_LOG = logging.getLogger("lashbench.transcript")
 
 _VERSION = 1
 _LIMIT_BYTES = 256 << 20
@@ -38,14 +42,21 @@ class Recorder:
     path
         New file; an existing one is refused, since a transcript is evidence.
 
+    fault
+        Where to say that the file takes no more: the dialogue goes on without it, as a source that
+        drives must be made safe over it.
+
     Raises
     ------
     InputError
         If the file exists or cannot be written.
     """
 
-    def __init__(self, transport: Transport, path: Path) -> None:
+    def __init__(
+        self, transport: Transport, path: Path, fault: Callable[[str], None] | None = None
+    ) -> None:
         self._transport = transport
+        self._path, self._tell = path, fault or _LOG.warning
         self.address = transport.address
         self._started_s = time.monotonic()
         try:
@@ -54,6 +65,7 @@ class Recorder:
             raise InputError(
                 f"{path}: the transcript cannot be written ({error.strerror}); give a new file"
             ) from error
+        self._acts = -1
         self._note({"transcript": _VERSION, "address": self.address, "started": _now()})
 
     def write(self, line: str, deadline: Deadline) -> None:
@@ -83,7 +95,7 @@ class Recorder:
     def close(self) -> None:
         """Close the wire and the file."""
         self._transport.close()
-        self._file.close()
+        self._close_file()
 
     def _record(self, act: str, call: Callable[[], _Result], **asked: str) -> _Result:
         entry: dict[str, Any] = {"act": act, **asked}
@@ -104,8 +116,22 @@ class Recorder:
         if self._file.closed:  # closed while a last attempt to go safe is still under way
             return
         stamp = {"t_s": round(time.monotonic() - self._started_s, 6)}
-        self._file.write(json.dumps(entry | stamp) + "\n")
-        self._file.flush()
+        try:
+            self._file.write(json.dumps(entry | stamp) + "\n")
+            self._file.flush()
+        except OSError as error:
+            self._close_file()
+            self._tell(
+                f"{self._path}: the transcript ends after {self._acts} acts ({error.strerror}); "
+                "the measurement goes on without"
+            )
+        else:
+            self._acts += 1
+
+    def _close_file(self) -> None:
+        # What is left in the buffer cannot be written either.
+        with suppress(OSError):
+            self._file.close()
 
 
 class Replay:

@@ -40,6 +40,24 @@ def test_a_connection_that_stays_lost_leaves_the_source_unknown(store):
     assert store.measurement(1).source_state is UNKNOWN
 
 
+def test_a_connection_that_cannot_even_be_closed_is_opened_again(store):
+    """Nor does it matter what opening it raises: going safe raises nothing."""
+    faults = {("point", 6): LinkError("cable pulled")}
+    dead, fresh = FakeAnalyser(faults, safe=(OFF, UNKNOWN)), FakeAnalyser()
+
+    def broken():
+        raise OSError("no space left on device")
+
+    dead.close = broken
+    with pytest.raises(LinkError, match="cable pulled"):
+        list(Session(dead, store, request(), reopen=lambda: fresh).run())
+    assert store.measurement(1).source_state is OFF
+    dead = FakeAnalyser(faults, safe=(OFF, UNKNOWN))
+    with pytest.raises(LinkError, match="cable pulled"):
+        list(Session(dead, store, request(), reopen=broken).run())
+    assert store.measurement(2).source_state is UNKNOWN
+
+
 def test_an_answer_without_proof_is_no_reason_to_connect_again(store):
     def never():
         raise AssertionError("opened again")

@@ -1,5 +1,6 @@
 """Transcripts: what was recorded comes back, and any departure from it is named by line."""
 
+import errno
 import json
 
 import pytest
@@ -74,6 +75,34 @@ def test_errors_are_recorded_and_come_back_as_errors(tmp_path):
         with pytest.raises(BenchTimeout, match="'Q\\?' got no answer"):
             ask(transport, "Q?", SOON)
         assert transport.device_clear(SOON)
+
+
+def test_a_disk_that_is_full_ends_the_transcript_and_not_the_dialogue(tmp_path):
+    told, script = [], Script(DIALOGUE)
+    recorder = Recorder(script, tmp_path / "run.jsonl", told.append)
+    full = OSError(errno.ENOSPC, "No space left on device")
+
+    class Full:
+        closed = False
+
+        def write(self, text):
+            raise full
+
+        def close(self):
+            self.closed = True
+            raise full
+
+    recorder.write("A 1", SOON)
+    recorder._file.close()
+    recorder._file = Full()
+    assert ask(recorder, "B?", SOON) == "+5"
+    (line,) = told
+    assert "run.jsonl: the transcript ends after 1 acts (No space left on device)" in line
+    assert ask_block(recorder, "C?", SOON)
+    recorder.close()
+    assert script.closed
+    assert len(told) == 1
+    assert Replay(tmp_path / "run.jsonl").unused == 1
 
 
 def test_a_departure_is_named_by_line_and_by_both_sides(recorded):

@@ -31,3 +31,18 @@ sys.exit(main())
 def test_it_hands_on_to_the_command_line(monkeypatch):
     monkeypatch.setattr(cli, "main", lambda: 7)
     assert entry.main() == 7
+
+
+@pytest.mark.parametrize(
+    ("closed", "code", "said"),
+    [("2>&-", 0, ""), ("<&-", 0, ""), (">&-", 1, "error: there is no stdout to write")],
+)
+def test_streams_that_the_caller_closed(closed, code, said):
+    words = "dry --unit adss --instrument sim: --level 2 --start 100 --stop 110 --points 3"
+    program = "from tui.entry import main; raise SystemExit(main())"
+    line = f'"{sys.executable}" -c "{program}" {words.replace("dry", "measure --dry-run --json")}'
+    run = subprocess.run(
+        ["/bin/sh", "-c", f"{line} {closed}"], capture_output=True, text=True, check=False
+    )
+    assert (run.returncode, run.stderr[: len(said)]) == (code, said)
+    assert bool(run.stdout) == (code == 0)

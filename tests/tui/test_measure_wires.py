@@ -13,6 +13,7 @@ from daq.analyser import SourceState
 from daq.bench_lock import BenchLock
 from daq.errors import MeasurementError
 from daq.frf import PointFlag
+from daq.hp35670a_setup import Timing
 from daq.store import Store
 from tui import cli
 
@@ -93,6 +94,25 @@ def test_after_a_kill_the_watchdog_switches_the_source_off(tmp_path):
             found = store.measurement(1)
         assert found.source_state is SourceState.CONFIRMED_OFF
         assert (found.state, found.ended) == ("interrupted", None)
+
+
+def test_a_watchdog_goes_on_where_the_source_could_not_be_proven_off(tmp_path, monkeypatch, capsys):
+    """The instrument is silent for longer than the session waits, and answers then."""
+    monkeypatch.setattr("daq.hp35670a.Timing", lambda: Timing(reply_s=0.5, block_s=1.0))
+    monkeypatch.setattr("daq.hp35670a_safe._BUDGET_S", 0.5)
+    db, silent = tmp_path / "bench.db", "silence:point=3,seconds=8"
+    short = ["--level", "1", "--start", "130", "--stop", "170", "--points", "9", *QUICK]
+    with served(linear_analyser(known_gain, [silent])) as url:
+        words = ["measure", "--unit", "adss", "--instrument", url, "--db", str(db), "--yes"]
+        assert cli.main([*words, *short]) != 0
+        assert "SOURCE OFF UNKNOWN: switch it off by hand" in capsys.readouterr().err
+        with Store(db) as store:
+            assert store.measurement(1).source_state is SourceState.UNKNOWN
+        assert "without proving the source off; source confirmed" in wait_for_watchdog(db, 1, 60.0)
+        with Store(db) as store:
+            assert store.measurement(1).source_state is SourceState.CONFIRMED_OFF
+        with BenchLock(db):
+            assert source_state(url) is SourceState.CONFIRMED_OFF
 
 
 def test_without_a_watchdog_the_next_start_finds_the_source_driving(tmp_path, monkeypatch, capsys):
