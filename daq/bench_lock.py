@@ -26,7 +26,7 @@ class BenchLock:
     Parameters
     ----------
     history
-        File of the bench's history; the lock is a file beside it.
+        File of the bench's history, or a link to it; the lock is a file beside the file itself.
     patience_s
         How long to wait where the session that holds it is gone already and
         only its watchdog is still at work, s.
@@ -40,7 +40,9 @@ class BenchLock:
     """
 
     def __init__(self, history: Path, patience_s: float = 45.0) -> None:
-        self._path = history.with_name(history.name + "-lock")
+        # Beside the file itself: all the links to it lead to one bench.
+        file = Path(os.path.realpath(history))
+        self._path = file.with_name(file.name + "-lock")
         self._file = -1
         deadline_s = time.monotonic() + patience_s
         while not self._taken():

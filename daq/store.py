@@ -23,7 +23,7 @@ from daq import store_schema as table
 from daq.analyser import Identity, SourceState, SweepPoint
 from daq.errors import FileFormatError, InputError
 from daq.frf import FrequencyResponse, PointFlag
-from daq.store_file import WRITES, open_engine, telling_faults
+from daq.store_file import WRITES, log_of, open_engine, telling_faults
 from daq.store_flush import Flusher
 from daq.store_records import (
     Estimate,
@@ -56,7 +56,7 @@ class Store:
         self.path = Path(path)
         self._engine = open_engine(self.path, create=create, read_only=read_only)
         self._writer = self._engine.execution_options(**{WRITES: True})
-        self._flusher = Flusher(self.path.with_name(self.path.name + "-wal"))
+        self._flusher = Flusher(log_of(self.path))
 
     def __enter__(self) -> Self:
         return self
@@ -222,7 +222,7 @@ class Store:
         """All measurements, or those of one unit by name (any case), oldest first."""
         if unit is None:
             return self._measurements(sa.true())
-        return self._measurements(sa.func.lower(table.units.c.name) == unit.lower())
+        return self._measurements(sa.func.casefold(table.units.c.name) == unit.casefold())
 
     def points(self, measurement: int, *, superseded: bool = False) -> list[StoredPoint]:
         """Committed points in the order in which they were taken.

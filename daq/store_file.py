@@ -8,6 +8,7 @@ commit is `daq.store_flush`'s part. It knows no tables.
 
 from __future__ import annotations
 
+import os
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -22,7 +23,7 @@ from daq.bounded_text import parse_json
 from daq.errors import FileFormatError, InputError, LashbenchError, MeasurementError
 from daq.store_schema import SCHEMA_VERSION, migrate, schema_version
 
-__all__ = ["engine_of", "open_engine", "telling_faults"]
+__all__ = ["engine_of", "log_of", "open_engine", "telling_faults"]
 
 _MAGIC = b"SQLite format 3\x00"
 _BUSY_S = 5.0
@@ -52,7 +53,7 @@ def open_engine(path: Path, *, create: bool, read_only: bool) -> sa.Engine:
 
 def engine_of(path: Path, mode: str) -> sa.Engine:
     """An engine on a file in one of SQLite's URI modes; nothing is opened yet."""
-    uri = f"{path.absolute().as_uri()}?{mode}"
+    uri = f"{_behind_links(path).as_uri()}?{mode}"
 
     def connect() -> sqlite3.Connection:
         # The driver's own transaction handling commits before DDL; ours begins by hand.
@@ -68,6 +69,8 @@ def engine_of(path: Path, mode: str) -> sa.Engine:
     def _settle(connection: sqlite3.Connection, _record: object) -> None:
         connection.execute("PRAGMA synchronous = NORMAL")
         connection.execute("PRAGMA foreign_keys = ON")
+        # SQLite's own lower() knows the letters of ASCII only.
+        connection.create_function("casefold", 1, str.casefold, deterministic=True)
 
     @event.listens_for(engine, "begin")
     def _begin(connection: sa.Connection) -> None:
@@ -75,6 +78,12 @@ def engine_of(path: Path, mode: str) -> sa.Engine:
         connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
 
     return engine
+
+
+def log_of(path: Path) -> Path:
+    """The write-ahead log of a history: beside the file itself, wherever a link to it lies."""
+    file = _behind_links(path)
+    return file.with_name(file.name + "-wal")
 
 
 @contextmanager
@@ -97,6 +106,11 @@ def telling_faults(path: Path) -> Iterator[None]:
     except UnicodeDecodeError as error:
         # SQLite quotes damaged text in its complaint, which then cannot be decoded.
         raise FileFormatError(f"{path}: is damaged (text that is not UTF-8)") from error
+
+
+def _behind_links(path: Path) -> Path:
+    # Unlike `Path.resolve`, this leaves links that go in a circle to whoever opens them.
+    return Path(os.path.realpath(path))
 
 
 def _plain(path: Path, error: DBAPIError | sqlite3.Error) -> LashbenchError:
@@ -148,7 +162,7 @@ def _mode(path: Path, exists: bool, read_only: bool) -> str:
     # A log beside the file must be taken into account, which needs the shared
     # memory file; without a log the file alone is the whole truth, and can be
     # read even where nothing may be written.
-    log = path.with_name(path.name + "-wal")
+    log = log_of(path)
     return "mode=ro" if log.exists() and log.stat().st_size > 0 else "mode=ro&immutable=1"
 
 

@@ -15,7 +15,10 @@ repaired or filled in.
 
 `phase_deg` and `gain_std_db` may be empty. Comment keys other than those in
 `_PROCEDURE` are provenance and come back as they were. Readings that a session
-marked as spoilt are not written as rows but listed under `spoilt_points`.
+marked as spoilt are not written as rows but listed under `spoilt_points`. A
+frequency that comes twice in a level is a slip, unless `repeated_points` is
+true: an analyser sets frequencies in steps, and two that were asked for may
+fall on one.
 """
 
 from __future__ import annotations
@@ -36,13 +39,10 @@ from daq.formats.csv_columns import EXTRA_KEYS, extra_columns, extra_comments
 from daq.formats.toml import toml_key, toml_value
 from daq.frf import FrequencyResponse, PointFlag
 
-__all__ = ["COLUMNS", "LEAST_POINTS", "read", "write"]
+__all__ = ["COLUMNS", "read", "write"]
 
 COLUMNS = ("frequency_hz", "source_vpk", "gain_db", "phase_deg", "gain_std_db")
 """The header, in this order."""
-
-LEAST_POINTS = 3
-"""Points below which a source level is no frequency response."""
 
 _LIMIT_BYTES = 64 << 20
 """Size above which a file is not read; a million readings have less."""
@@ -55,8 +55,14 @@ _PROCEDURE = (
     "integrate_cycles",
     "from_rest",
     "point_flags",
+    "repeated_points",
     "spoilt_points",
     *EXTRA_KEYS,
+)
+_OUT_OF_ORDER = ("out of order", 'a level must rise (or fall, with sweep = "down")')
+_REPEATED = (
+    "repeated",
+    "take one out, or write '# repeated_points = true' above the header if both were measured",
 )
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\Z")
 
@@ -93,7 +99,6 @@ def read(path: Path) -> FrequencyResponse:
     procedure = _procedure(table)
     _check_values(table)
     _check_order(table, procedure["direction"])
-    _check_enough(table)
     phase = table["phase_deg"]
     known = np.isfinite(phase)
     with np.errstate(over="ignore", under="ignore"):
@@ -167,6 +172,8 @@ def _comments(kept: FrequencyResponse, spoilt: FrequencyResponse) -> dict[str, A
     }
     if np.any(kept.flags):
         comments["point_flags"] = kept.flags
+    if len(set(zip(kept.source_vpk, kept.frequency_hz, strict=True))) < len(kept):
+        comments["repeated_points"] = True
     comments |= extra_comments(kept)
     comments |= {k: v for k, v in kept.provenance.items() if k not in _PROCEDURE}
     listed = list(kept.provenance.get("spoilt_points", []))
@@ -295,15 +302,15 @@ def _procedure(table: _Table) -> dict[str, Any]:
         raise FileFormatError(f"{path}: unit {unit!r} is not a name in quotes")
     if sweep not in (None, "up", "down"):
         raise FileFormatError(f"{path}: sweep {sweep!r} is not 'up' or 'down'")
-    from_rest = comments.get("from_rest")
-    if not isinstance(from_rest, bool | None):
-        raise FileFormatError(f"{path}: from_rest {from_rest!r} is not true or false")
+    for key in ("from_rest", "repeated_points"):
+        if not isinstance(comments.get(key), bool | None):
+            raise FileFormatError(f"{path}: {key} {comments[key]!r} is not true or false")
     return {
         "unit": unit,
         "direction": sweep,
         "settle_cycles": _count(comments, "settle_cycles", 0, path),
         "integrate_cycles": _count(comments, "integrate_cycles", 1, path),
-        "from_rest": from_rest,
+        "from_rest": comments.get("from_rest"),
         "flags": _flags(table),
     }
 
@@ -345,29 +352,21 @@ def _check_values(table: _Table) -> None:
 
 def _check_order(table: _Table, direction: str | None) -> None:
     """Ascending in each level, or descending where the sweep is said to go down."""
+    may_repeat = bool(table.comments.get("repeated_points"))
     for level, rows in _levels(table):
         frequency = table["frequency_hz"][rows]
         if direction == "down" and frequency[0] > frequency[-1]:
             frequency = -frequency
-        wrong = np.flatnonzero(np.diff(frequency) <= 0.0)
+        step = np.diff(frequency)
+        wrong = np.flatnonzero(step < 0.0 if may_repeat else step <= 0.0)
         if wrong.size:
             row = rows[wrong[0] + 1]
-            again = frequency[wrong[0]] == frequency[wrong[0] + 1]
-            what = "repeated" if again else "out of order"
+            what, remedy = _REPEATED if step[wrong[0]] == 0.0 else _OUT_OF_ORDER
             _refuse(
                 table,
                 row,
                 f"frequency_hz {table['frequency_hz'][row]:g} is {what} at source level "
-                f'{level:g} V; a level must rise (or fall, with sweep = "down")',
-            )
-
-
-def _check_enough(table: _Table) -> None:
-    for level, rows in _levels(table):
-        if rows.size < LEAST_POINTS:
-            raise FileFormatError(
-                f"{table.path}: source level {level:g} V has {rows.size} points; "
-                f"a response needs {LEAST_POINTS} or more"
+                f"{level:g} V; {remedy}",
             )
 
 

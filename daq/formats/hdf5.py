@@ -7,6 +7,7 @@ degrees are written as well, for viewers; they are not read back.
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -63,7 +64,9 @@ def write(response: FrequencyResponse, path: Path) -> None:
 
     arrays, document = taken_apart(response, path)
     shown = {"gain_db": (response.gain_db, "dB"), "phase_deg": (response.phase_deg, "deg")}
-    with replacing(path) as partial, h5py.File(partial, "w") as file:
+    # In memory first: the library does not survive a disk that refuses its data.
+    buffer = BytesIO()
+    with h5py.File(buffer, "w") as file:
         file.attrs.update({"NX_class": "NXroot", "default": "entry"})
         # A data set of its own: attributes are limited to 64 KiB.
         file.create_dataset("document", data=np.frombuffer(document.encode("ascii"), np.uint8))
@@ -74,6 +77,8 @@ def write(response: FrequencyResponse, path: Path) -> None:
             group.create_dataset(name, data=values).attrs["units"] = ARRAYS[name][1]
         for name, (column, unit) in shown.items():
             group.create_dataset(name, data=column).attrs["units"] = unit
+    with replacing(path) as partial:
+        partial.write_bytes(buffer.getvalue())
 
 
 def _document(file: h5py.File, path: Path) -> str:

@@ -152,6 +152,31 @@ def test_measurements_are_listed_by_unit_oldest_first(store):
     assert store.measurements("other") == []
 
 
+@pytest.mark.parametrize("asked", ["GÄR", "gär", "GäR"])
+def test_a_unit_is_found_in_any_case_of_any_alphabet(store, asked):
+    ids = [store.begin(header(unit=unit)) for unit in ("GÄR", "GAR", "gär")]
+    assert [m.id for m in store.measurements(asked)] == [ids[0], ids[2]]
+
+
+def test_a_link_to_a_history_shows_what_its_log_holds(store, tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    link = tmp_path / "elsewhere" / "link.db"
+    link.symlink_to(store.path)
+    measurement = store.begin(header())
+    with Store(link, read_only=True) as reader:
+        assert [m.id for m in reader.measurements()] == [measurement]
+
+
+def test_through_a_link_the_disk_is_asked_for_every_commit(store, tmp_path, monkeypatch):
+    link = tmp_path / "link.db"
+    link.symlink_to(store.path)
+    flushed = []
+    monkeypatch.setattr(os, "fsync", lambda handle: flushed.append(os.fstat(handle).st_ino))
+    with Store(link) as linked:
+        linked.finish(linked.begin(header()), "complete", SourceState.CONFIRMED_OFF)
+    assert os.stat(f"{store.path}-wal").st_ino in flushed
+
+
 def test_journal_keeps_order_and_data(store):
     measurement = store.begin(header())
     first = store.note(measurement, "check", "identity", {"model": "35670A"})
