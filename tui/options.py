@@ -29,6 +29,8 @@ __all__ = [
 ]
 
 _WHOLE = re.compile(r"[+-]?[0-9]+\Z")
+_DIGITS = 15
+"""Of a count: no bench has more of anything, and a history could not look it up."""
 
 
 def _whole(_type: object, tokens: Sequence[Token]) -> int:
@@ -36,6 +38,8 @@ def _whole(_type: object, tokens: Sequence[Token]) -> int:
     text = tokens[0].value
     if not _WHOLE.match(text):
         raise ValueError(f"{text!r} is not a whole number")
+    if len(text) > _DIGITS:
+        raise ValueError(f"{text!r} is too large a number")
     return int(text)
 
 

@@ -25,11 +25,13 @@ def history_path(given: Path | None, *, create: bool = False) -> Path:
     Raises
     ------
     InputError
-        If that folder cannot be made.
+        If that folder cannot be made, or that of the one given is not there.
     """
     from platformdirs import user_data_path
 
     if given is not None:
+        if create and not given.parent.is_dir():
+            raise InputError(f"{given}: there is no directory {given.parent}; make it first")
         return given
     folder = user_data_path("lashbench", appauthor=False)
     if create:

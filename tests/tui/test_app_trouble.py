@@ -260,6 +260,60 @@ def test_a_refused_plan_is_a_dialog_and_the_old_one_stays(tmp_path):
     run(way)
 
 
+def test_a_decimal_comma_is_no_second_level(tmp_path):
+    async def way():
+        async with operated(tmp_path / "bench.db") as op:
+            await op.connects("sim:")
+            await op.goes_to(3)
+            await op.press("p")
+            op.app.screen.query_one("#plan-levels").value = "1,2"
+            await op.press("enter")
+            screen = await op.sees("'1,2' is not a finite number")
+            assert "V peak: 1 2.5" in screen
+            assert "yes or no" in screen
+            op.app.screen.query_one("#plan-levels").value = "1.2  2.5"
+            await op.press("enter")
+            assert op.app.desk.options.levels_vpk == (1.2, 2.5)
+
+    run(way)
+
+
+def test_letters_do_the_same_with_shift(tmp_path):
+    async def way():
+        async with operated(tmp_path / "bench.db") as op:
+            await op.connects("sim:")
+            await op.goes_to(3)
+            await op.press("P")
+            await op.sees("source levels")
+            await op.press("escape")
+            await op.goes_to(1)
+            await op.types("#notes", "")
+            await op.press("A", "b")
+            assert op.app.desk.notes == "Ab"
+
+    run(way)
+
+
+def test_points_stay_on_the_screen_where_going_on_with_them_fails(tmp_path):
+    async def way(url):
+        async with operated(tmp_path / "bench.db") as op:
+            await sweeping(op, url, **LONG)
+            await op.press("1")
+            await op.sees("Session 1 is under way: step 4")
+            await op.press("ctrl+x")
+            await op.sees("SOURCE OFF (confirmed)", "#1 interrupted")
+            done = op.app.desk.run.done
+            op.app.desk.url = "TCPIP::127.0.0.1::1::SOCKET"
+            await op.goes_to(4)
+            await op.press("r")
+            await op.sees("The session did not begin")
+            await op.press("escape")
+            await op.sees(f"{done} of 8000 points stored; interrupted")
+            assert done > 2
+
+    run(lambda: way("sim:"))
+
+
 def test_quitting_ends_a_session_safe(tmp_path):
     db = tmp_path / "bench.db"
 

@@ -246,3 +246,24 @@ def test_a_terminal_without_the_character_shows_another():
         check=True,
     )
     assert run.stdout == b"1 ? 2\n"
+
+
+def test_nothing_that_is_read_somewhere_reaches_a_terminal_as_an_order(capsys):
+    console = output.Console()
+    console.note("unit \x1b[31mred\x00, serial a\tb")
+    console.error("no \x1b]0;title\x07 here")
+    console.data("row 1\nrow \x9b2J")
+    out, err = capsys.readouterr()
+    assert err == "unit \\x1b[31mred\\x00, serial a\tb\nerror: no \\x1b]0;title\\x07 here\n"
+    assert out == "row 1\nrow \\x9b2J\n"
+
+
+@pytest.mark.parametrize("verb", ["export", "replay", "measure --unit adss --resume"])
+def test_an_identifier_that_no_history_can_hold_is_a_usage_error(verb, tmp_path, capsys):
+    db = tmp_path / "m.db"
+    place = "replay {db} --id {id}" if verb == "replay" else f"{verb} {{id}} --db {{db}}"
+    words = place.format(db=db, id="9" * 20).split()
+    words += ["--instrument", "sim:"] if verb.startswith("measure") else []
+    words += ["--out", str(tmp_path / "x.csv")] if verb == "export" else []
+    assert cli.main(words) == 2
+    assert "is too large a number" in capsys.readouterr().err

@@ -2,6 +2,8 @@
 
 import json
 import os
+import re
+import shlex
 import signal
 import threading
 import time
@@ -29,6 +31,16 @@ def test_a_signal_ends_it_safe_and_it_can_be_resumed(run, db, monkeypatch, numbe
     code, out, _ = run(*measuring("--json", "--resume", "1"))
     assert code == 0
     assert json.loads(out)["points"] == 5
+    with Store(db) as store:
+        assert store.measurement(1).state == "complete"
+
+
+def test_what_is_said_to_go_on_with_goes_on(run, db, monkeypatch):
+    with monkeypatch.context() as patch:
+        at_point(patch, 2, lambda: signal.raise_signal(signal.SIGTERM))
+        _, _, err = run(*measuring())
+    (line,) = (line for line in err.splitlines() if line.startswith("go on with: lashbench "))
+    assert run(*shlex.split(line)[4:], history=False)[0] == 0
     with Store(db) as store:
         assert store.measurement(1).state == "complete"
 
@@ -114,6 +126,51 @@ def test_resume_needs_no_plan_and_refuses_another_one(run, monkeypatch):
     assert run(*bare)[0] == 0
 
 
+SAID = ["--serial", "S", "--operator", "anna", "--notes", "one", "--spacing", "log"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--spacing", "lin"], "spacing 'lin' was given and it has 'log'"),
+        (["--operator", "bob"], "operator 'bob' was given and it has 'anna'"),
+        (["--notes", "SECOND"], "notes 'SECOND' was given and it has 'one'"),
+        (["--serial", "T"], "serial 'T' was given and it has 'S'"),
+        (["--recipe", "edss"], "points 46 was given by recipe EDSS and it has 5"),
+        (["--recipe", "adss", "--points", "5"], "start_hz 100.0 was given by recipe ADSS"),
+    ],
+)
+def test_what_contradicts_the_stored_measurement_is_refused(run, db, words, said):
+    assert run(*measuring(*SAID))[0] == 0
+    bare = ["measure", "--unit", "adss", "--instrument", "sim:", "--resume", "1"]
+    code, out, err = run(*bare, *words)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert "leave that out, or start a new measurement" in err
+    assert run(*measuring("--resume", 1, *SAID))[0] == 0
+
+
+def test_a_recipe_may_be_given_again_with_what_it_says(run, tmp_path):
+    words = ["measure", "--unit", "adss", "--instrument", "sim:", "--recipe", "adss"]
+    few = ["--points", "3", "--settle-cycles", "2", "--integrate-cycles", "4"]
+    assert run(*words, *few)[0] == 0
+    # What was overridden need not be said again.
+    assert run(*words, "--resume", "1")[0] == 0
+    text = config_path("recipes", "adss").read_text()
+    for points, code in ((3, 0), (4, 2)):
+        text = re.sub(r"points = \d+", f"points = {points}", text, count=1)
+        other = tmp_path / "other.toml"
+        other.write_text(text)
+        assert run(*words[:-1], other, *few[2:], "--resume", "1")[0] == code
+
+
+def test_two_points_are_spaced_as_either_word_says(run):
+    plan = ["--level", "2.5", "--start", "130", "--stop", "170", "--points", "2"]
+    assert run(*measuring(plan=plan))[0] == 0
+    for spacing in ("lin", "log"):
+        assert run(*measuring("--spacing", spacing, "--resume", "1", plan=plan))[0] == 0
+
+
 def test_resuming_a_complete_measurement_is_no_fault(run):
     assert run(*measuring())[0] == 0
     code, out, _ = run(*measuring("--resume", "1", "--json"))
@@ -158,6 +215,16 @@ def test_a_band_is_measured_again(run, db):
         every = store.points(1, superseded=True)
         assert len(store.points(1)) == 5
     assert [p.requested_hz for p in every if p.superseded_by] == [150.0, 160.0]
+
+
+@pytest.mark.parametrize("band", ["1:2", "141:149", "170.1:200"])
+def test_a_band_without_stored_points_is_refused(run, db, band):
+    run(*measuring())
+    code, out, err = run(*measuring("--resume", "1", "--remeasure", band))
+    low, high = band.split(":")
+    assert (code, out) == (2, "")
+    assert f"measurement 1 has no point from {low} to {high} Hz" in err
+    assert "its 5 points lie from 130 to 170 Hz" in err
 
 
 def test_a_transcript_runs_the_session_again_without_an_instrument(run, db, tmp_path):

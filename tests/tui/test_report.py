@@ -111,6 +111,12 @@ def test_a_report_on_a_stored_measurement(calls, bench, tmp_path):
         assert len(data["response"]["frequency_hz"]) == len(store.response(1))
 
 
+def test_another_unit_than_was_measured_is_told_at_once(calls, bench, tmp_path, capsys):
+    words = ["report", "1", "--db", str(bench), "--unit", "edss", "--no-diagnose"]
+    assert cli.main([*words, "--out", str(tmp_path / "r.html")]) == 0
+    assert "warning: the response is of unit ADSS, not of EDSS" in capsys.readouterr().err
+
+
 def test_the_history_is_the_users_own_if_none_is_named(calls, bench, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     (tmp_path / "lashbench").mkdir()

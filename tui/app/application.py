@@ -278,15 +278,17 @@ class BenchApp(App[int]):
                 "not be proven off.",
             )
         elif message.error is not None:
-            self._show_fault(message.error)
+            self._show_fault(message.error, finished)
         elif finished is not None:
             self.notify(f"{finished.state}: {finished.points} points, source confirmed off")
         # Whoever wanted to leave, or to go on, is to read that first.
         self.keeper.released(follow=proven or self._told_to_end)
 
-    def _show_fault(self, error: Exception) -> None:
-        finished = self.desk.run.finished
+    def _show_fault(self, error: Exception, finished: Finished | None) -> None:
         if finished is None:
+            if self.desk.run.measurement is None:
+                self.keeper.put_back()
+                self.redraw_now()
             self.show_error("The session did not begin", error)
             return
         more = f"{finished.points} points are kept, the source is confirmed off."

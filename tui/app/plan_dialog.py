@@ -19,7 +19,7 @@ from tui.options import real_number
 __all__ = ["PlanDialog"]
 
 _FIELDS = (
-    ("levels", "source levels", "V peak, with spaces between"),
+    ("levels", "source levels", "V peak: 1 2.5"),
     ("start", "start", "Hz"),
     ("stop", "stop", "Hz"),
     ("points", "points a level", ""),
@@ -27,7 +27,7 @@ _FIELDS = (
     ("direction", "direction", "up or down"),
     ("settle", "settle cycles", ""),
     ("integrate", "integrate cycles", ""),
-    ("adaptive", "refine", "yes or no: go on around ARF and RF"),
+    ("adaptive", "refine", "yes or no"),
 )
 
 
@@ -94,7 +94,7 @@ class PlanDialog(ModalScreen[PlanOptions | None]):
         )
 
     def _text(self, name: str) -> str:
-        return self.query_one(f"#plan-{name}", Input).value.replace(",", " ").strip()
+        return self.query_one(f"#plan-{name}", Input).value.strip()
 
     def _count(self, name: str) -> int:
         text = self._text(name)

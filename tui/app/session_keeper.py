@@ -38,6 +38,7 @@ class SessionKeeper:
         self._app = app
         self._control = SessionControl()
         self._then: Callable[[], None] | None = None
+        self._before = RunView()
         self.busy = False
         """Whether the instrument's worker has something to do."""
 
@@ -76,7 +77,7 @@ class SessionKeeper:
         if hold:
             self._control.pause()
         run.begin()
-        desk.run = run
+        self._before, desk.run = desk.run, run
         work = partial(
             bench_owner.run_session,
             self._app.post_message, desk.url, desk.unit, desk.db, request, self._control,
@@ -145,6 +146,10 @@ class SessionKeeper:
         then, self._then = self._then, None
         if follow and then is not None:
             then()
+
+    def put_back(self) -> None:
+        """The session never began: what was there of the one before is still so."""
+        self._app.desk.run = self._before
 
     def settle(self, finished: Finished) -> None:
         """Put what came of a session on the desk."""

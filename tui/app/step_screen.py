@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, ClassVar, cast
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Container
+from textual.events import Key
 from textual.screen import Screen
 from textual.widgets import Footer, Static
 
@@ -79,6 +80,15 @@ class StepScreen(Screen[None]):
         if self.is_mounted and self.query("#banner"):
             self.arrive()
             self.show()
+
+    async def on_key(self, event: Key) -> None:
+        """A letter is the same key with Shift: the hints print capitals."""
+        if not (len(event.key) == 1 and event.key.isupper()):
+            return
+        found = self.active_bindings.get(event.key.lower())
+        if found is not None and found.enabled:
+            event.stop()
+            await self.app.run_action(found.binding.action, found.node)
 
     def arrive(self) -> None:
         """Called whenever the step comes on top."""

@@ -7,6 +7,7 @@ exit code. The session itself, and that it ends safe, is the engine's.
 from __future__ import annotations
 
 import math
+import shlex
 import sys
 from contextlib import closing, suppress
 from dataclasses import asdict
@@ -121,7 +122,7 @@ def measure(
         settle_cycles, integrate_cycles, offset, adaptive,
     )  # fmt: skip
     subject = load_unit(unit)
-    db = history_path(db, create=not dry_run)
+    is_given, db = db is not None, history_path(db, create=not dry_run)
     request = session_request(
         options, unit, subject, instrument, db,
         recipe=recipe, bench=bench, resume=resume, remeasure=read_band(remeasure), run_in=run_in,
@@ -131,7 +132,9 @@ def measure(
         _show_plan(request, db, json, console)
         return 0
     _confirm(instrument, request, db, yes)
-    return _run(instrument, subject, db, request, transcript, json, console)
+    again = ["lashbench", "measure", "--unit", unit, "--instrument", instrument]
+    again += ["--db", str(db)] if is_given else []
+    return _run(instrument, subject, db, request, transcript, json, console, shlex.join(again))
 
 
 def _show_plan(request: SessionRequest, db: Path, json: bool, console: Console) -> None:
@@ -187,6 +190,7 @@ def _run(
     transcript: Path | None,
     json: bool,
     console: Console,
+    again: str,
 ) -> int:
     from daq.control import SessionControl
     from daq.session_events import Finished
@@ -209,11 +213,11 @@ def _run(
         except Exception as error:
             if finished is None:
                 raise
-            _report(finished, json, console)
+            _report(finished, json, console, again)
             raise _complete(error, finished) from error
     if finished is None:
         raise MeasurementError("the session ended without a word; this is a fault of lashbench")
-    _report(finished, json, console)
+    _report(finished, json, console, again)
     return _exit_code(finished)
 
 
@@ -253,15 +257,15 @@ def _decibels(gain: complex) -> str:
     return f"{20 * math.log10(abs(gain)):.2f} dB" if abs(gain) > 0 else "no reading"
 
 
-def _report(finished: Finished, json: bool, console: Console) -> None:
+def _report(finished: Finished, json: bool, console: Console, again: str) -> None:
     """Say how it ended; who reads no more must not keep the error and the exit code back."""
     try:
-        _say_how_it_ended(finished, json, console)
+        _say_how_it_ended(finished, json, console, again)
     except BrokenPipeError:
         hush(sys.stdout)
 
 
-def _say_how_it_ended(finished: Finished, json: bool, console: Console) -> None:
+def _say_how_it_ended(finished: Finished, json: bool, console: Console, again: str) -> None:
     if json:
         console.document(
             {
@@ -281,7 +285,7 @@ def _say_how_it_ended(finished: Finished, json: bool, console: Console) -> None:
         f"{finished.elapsed_s:.1f} s"
     )
     if finished.state == "interrupted":
-        console.note(f"go on with: lashbench measure ... --resume {finished.measurement}")
+        console.note(f"go on with: {again} --resume {finished.measurement}")
 
 
 def _contract_state(finished: Finished) -> str:

@@ -55,6 +55,7 @@ def report(
     diagnose
         Diagnose too, which takes a minute or two; --no-diagnose leaves it out.
     """
+    from analysis.swept import unit_doubts
     from daq.formats.atomic import checked_target
     from sim.unit import load_unit
 
@@ -71,6 +72,8 @@ def report(
         origin = file_origin(Path(source))
     else:
         response, origin, estimate = _stored(history_path(db), source, subject)
+    for doubt in unit_doubts([response], subject):
+        console.note(f"warning: {doubt}")
     if estimate is None:
         estimate = _estimate(response, subject, remarks, console)
     diagnosis = _diagnose(response, subject, remarks, console) if diagnose else None

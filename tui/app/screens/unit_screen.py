@@ -87,7 +87,7 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
         if unit is None:
             return
         limits = unit.limits
-        cells = [f"{name:<6}{value:<11.4g}" for name, value in unit.parameters.items()]
+        cells = [f"{name:<5} {value:<11.4g}" for name, value in unit.parameters.items()]
         cells.sort(key=len)  # the one with a long name goes on a line of its own
         half = len(cells) // 2
         pairs = [f"{left} {right}" for left, right in zip(cells[:half], cells[half:], strict=False)]
@@ -214,6 +214,8 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
         words = f"Sessions of this bench ({self.desk.db})"
         if interrupted:
             words = f"{interrupted} interrupted: Enter on RESUME goes on   {words}"
+        elif self.desk.run.live and self.desk.run.measurement is not None:
+            words = f"Session {self.desk.run.measurement} is under way: step 4   {words}"
         elif not self._measurements:
             words = f"No sessions yet in {self.desk.db}"
         self.query_one("#sessions-heading", Static).update(words)
