@@ -1,9 +1,9 @@
 # Everything runs in .venv, which is made on first use and again when the
 # requirements change. `make` alone lists what there is. `make test JOBS=4` tests
-# in as many processes.
+# in as many processes; three keep two cores busy, as tests often wait for something.
 
 PYTHON ?= python3
-JOBS ?= 2
+JOBS ?= 3
 BIN := .venv/bin
 READY := .venv/.ready
 
@@ -26,7 +26,7 @@ help:
 demo: $(READY)
 	@$(BIN)/lashbench demo
 
-# Types take one core for most of a minute, and tests often wait for something.
+# Types take one core for most of a minute.
 test: $(READY)
 	@$(MAKE) --no-print-directory --jobs 2 check tests
 

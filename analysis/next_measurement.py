@@ -9,6 +9,7 @@ does nearly as well is preferred.
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -22,6 +23,7 @@ from analysis.likelihood import HEAT
 from analysis.observation import Observation, channels_of_readings, noise_and_floor, unread
 from analysis.placement import groups_along
 from analysis.population import Group, Population, simulate_groups
+from daq.configs import config_names
 from daq.plan import SweepPlan, spaced_frequencies
 from sim.unit import Unit
 
@@ -41,7 +43,10 @@ _FLOOR = 0.01
 
 @dataclass(frozen=True, slots=True)
 class NextMeasurement:
-    """A sweep, the two sets of causes it parts, and by how many standard deviations."""
+    """A sweep, the two sets of causes it parts, and by how many standard deviations.
+
+    `unit` is the unit's name, or the path of its file.
+    """
 
     unit: str
     plan: SweepPlan
@@ -51,8 +56,10 @@ class NextMeasurement:
     @property
     def command(self) -> str:
         """The options with which ``lashbench measure`` takes this sweep."""
-        f = self.plan.frequencies_hz
-        parts = [f"lashbench measure --unit {self.unit.lower()} --instrument URL"]
+        f, unit = self.plan.frequencies_hz, self.unit
+        if unit.lower() in config_names("units"):
+            unit = unit.lower()
+        parts = [f"lashbench measure --unit {shlex.quote(unit)} --instrument URL"]
         parts += [f"--level {level:g}" for level in self.plan.levels_vpk]
         parts += [f"--start {f[0]:g} --stop {f[-1]:g} --points {len(f)}"]
         if self.plan.direction != "up":

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,11 +16,12 @@ from numpy.typing import NDArray
 
 from daq.analyser import PointSettings
 from daq.dialogue import Dialogue
-from daq.errors import InstrumentError
+from daq.errors import InputError, InstrumentError
 from daq.hp35670a_settings import (
     CALCULATE,
     CONTINUOUS,
     DC_OFFSET,
+    GRID_HZ,
     LEVEL,
     MODE,
     RESOLUTION,
@@ -34,6 +36,7 @@ from daq.hp35670a_settings import (
 )
 from daq.hp35670a_status import Questionable, arm_events, wait_until_done
 from daq.hp35670a_trace import prove_byte_order, read_axis
+from daq.plan import SweepPlan
 from daq.scpi import QueueEntry
 from daq.scpi_settings import Setting
 from daq.transports.base import Deadline
@@ -43,6 +46,7 @@ __all__ = [
     "apply_all",
     "Timing",
     "calibrate",
+    "check_sweep",
     "enter_swept_sine",
     "parks_at_zero",
     "planned_settings",
@@ -114,6 +118,47 @@ def planned_settings(
     for setting, value in table:
         setting.command(value)
     return table
+
+
+def check_sweep(
+    plan: SweepPlan,
+    slew_vpk_per_s: float = 0.0,
+    input_range_vpk: tuple[float | None, float | None] = (None, None),
+    *,
+    may_repeat: bool = False,
+) -> None:
+    """Refuse a sweep that the instrument cannot be set to, before anything is opened for it.
+
+    Parameters
+    ----------
+    may_repeat
+        Let frequencies be that fall on one step, as in a measurement that was begun so.
+
+    Raises
+    ------
+    LimitError
+        If any value is out of range.
+    InputError
+        If two frequencies fall on one of the steps in which they are set.
+    """
+    for source_vpk in plan.levels_vpk:
+        settings = PointSettings(
+            source_vpk=source_vpk,
+            settle_cycles=plan.settle_cycles,
+            integrate_cycles=plan.integrate_cycles,
+            dc_offset_v=plan.dc_offset_v,
+            slew_vpk_per_s=slew_vpk_per_s,
+            input_range_vpk=input_range_vpk,
+        )
+        planned_settings(min(plan.frequencies_hz), max(plan.frequencies_hz), settings)
+    asked = sorted(plan.frequencies_hz)
+    for lower, upper in pairwise(asked):
+        if not may_repeat and round(lower / GRID_HZ) == round(upper / GRID_HZ):
+            raise InputError(
+                f"{lower:.10g} and {upper:.10g} Hz would both be measured at "
+                f"{round(lower / GRID_HZ) * GRID_HZ:g} Hz, as the analyser sets frequencies in "
+                "steps of 1/64 Hz; take fewer points or a wider band"
+            )
 
 
 def enter_swept_sine(dialogue: Dialogue) -> None:

@@ -1,13 +1,20 @@
 """What holds for every test: Ctrl-C interrupts, and linear algebra keeps to one core.
 
-Tests run side by side: threads of a library that wait for each other would keep cores from them.
+Tests run side by side: threads of a library that wait for each other would keep cores from them,
+and how long an example takes says nothing.
 """
 
 import os
 import signal
 
+from hypothesis import settings
+
 # Before anything loads numpy; what a test starts inherits it.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
+settings.register_profile("side by side", deadline=None)
+settings.load_profile("side by side")
 
 
 def pytest_configure():

@@ -174,7 +174,9 @@ def replace_instrument(instrument: Analyser35670A) -> None:
     """Let ``sim:`` mean this one."""
     import tui.bench
 
-    tui.bench.connect = lambda url, unit, transcript=None: HP35670A(Loopback(instrument))
+    tui.bench.connect = lambda url, unit, transcript=None, fault=None: HP35670A(
+        Loopback(instrument)
+    )
 
 
 class Trouble:

@@ -14,7 +14,7 @@ from tui.app.messages import InstrumentsListed
 
 SIZES = [(80, 24), (120, 40), (200, 60)]
 
-LONG = {"points": "8000", "cycles": ("4", "4")}
+LONG = {"points": "2800", "cycles": ("4", "4")}
 """A sweep that is still under way when keys are pressed."""
 
 ESTIMATE = {

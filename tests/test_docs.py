@@ -15,6 +15,7 @@ from links import broken_links
 from printed import Newcomer, mentions, pages, pieces, stocked_history
 
 from analysis.causes import every_single_cause
+from daq.analyser import SourceState
 from daq.formats import read_response
 from daq.plan import SweepPlan
 from daq.store import Store
@@ -245,5 +246,6 @@ def fleet_of_one(example, folder):
     with Store(folder / "lab.db", create=True) as store:
         for value in (0.19, 0.2, 0.21):
             number = store.begin(MeasurementHeader("ADSS", "SN 7", plan, "sim:", "test"))
+            store.finish(number, "complete", SourceState.CONFIRMED_OFF)
             store.add_estimate(number, "test", {"b1_deg": {"value": value, "std": 0.01}})
     return [str(folder / "lab.db")]

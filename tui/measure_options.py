@@ -8,8 +8,10 @@ nothing.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,8 +21,9 @@ from tui.options import real_number
 
 if TYPE_CHECKING:
     from daq.adaptive import Judge, Refinement
+    from daq.configs import Kind
     from daq.limits import Limits
-    from daq.plan import SweepPlan
+    from daq.plan import Spacing, SweepPlan
     from daq.recipe import Recipe
     from daq.session_request import SessionRequest
     from daq.store_records import Measurement
@@ -31,6 +34,8 @@ __all__ = ["PlanOptions", "plan_of", "read_band", "session_request", "swept_plan
 _TARGET_STD_HZ = 0.5
 _BUDGET = 2
 """Points of a refined level in multiples of the plan's, where no recipe says."""
+_SAME = 1e-9
+"""Share by which grids that were computed on two machines may differ."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,41 +98,59 @@ def session_request(
     remeasure: tuple[float, float] | None,
     run_in: int | None,
     remarks: Mapping[str, str],
+    unit_text: str | None = None,
 ) -> SessionRequest:
     """Everything a session needs to know, checked against all limits.
+
+    Parameters
+    ----------
+    unit_name
+        Name or path of the unit's file.
+    unit_text
+        What that file held, where `unit_name` is no name or path of one any more.
 
     Raises
     ------
     InputError
-        If something is missing or contradicts.
+        If something is missing, cannot be, or contradicts the rest or what is stored.
     LimitError
-        If bench, unit or recipe forbids the plan; nothing was sent.
+        If bench, unit, recipe or instrument forbids the plan; nothing was sent.
     """
-    from daq.configs import config_path
+    from daq.hp35670a_setup import check_sweep
     from daq.limits import check_plan, load_bench
     from daq.recipe import load_recipe
     from daq.session_request import SessionRequest
     from daq.store_records import MeasurementHeader
     from tui.bench import unit_limits
 
+    _check_printable(remarks)
     place = load_bench(bench)
     way = None if recipe is None else load_recipe(recipe)
+    way_text = {} if recipe is None else {"recipe": _text("recipes", recipe)}
     limits: tuple[Limits, ...] = (place.bounds(), unit_limits(unit))
     limits += () if way is None else (way.bounds(),)
     header = None
     if resume is not None:
-        before = _resumed(options, unit, db, resume, remarks)
+        before = _resumed(db, resume, remeasure)
         plan, configurations = before.header.plan, before.header.configurations
+        named = {name: text for name, text in remarks.items() if text}
+        _check_same(before, options.given | {"unit": unit.name} | named)
+        # What options overrode of its own recipe is no contradiction.
+        if way is not None and not way_text.items() <= configurations.items():
+            sweep = way.sweep.model_dump()
+            sweep["levels_vpk"] = tuple(sweep["levels_vpk"])
+            _check_same(before, sweep | options.given, f" by recipe {way.name}")
         refinement = _kept_refinement(configurations)
     else:
         if remeasure is not None:
             raise InputError("--remeasure needs --resume ID: which measurement is it about?")
         plan = swept_plan(options, way)
         refinement = _refinement(options, way, plan)
-        texts = {"unit": config_path("units", unit_name), "bench": config_path("benches", bench)}
-        if recipe is not None:
-            texts["recipe"] = config_path("recipes", recipe)
-        configurations = {kind: path.read_text(encoding="utf-8") for kind, path in texts.items()}
+        configurations = {
+            "unit": _text("units", unit_name) if unit_text is None else unit_text,
+            "bench": _text("benches", bench),
+            **way_text,
+        }
         if refinement is not None:
             configurations["refinement"] = _refinement_text(refinement)
         header = MeasurementHeader(
@@ -139,6 +162,8 @@ def session_request(
             **remarks,
         )
     check_plan(plan, limits, _longest_s(plan, refinement))
+    ranges = place.drive.channel1_range_vpk, place.drive.channel2_range_vpk
+    check_sweep(plan, place.drive.slew_vpk_per_s, ranges, may_repeat=resume is not None)
     return SessionRequest(
         header=header,
         limits=limits,
@@ -146,10 +171,23 @@ def session_request(
         remeasure_hz=remeasure,
         run_in_points=run_in,
         slew_vpk_per_s=place.drive.slew_vpk_per_s,
-        input_range_vpk=(place.drive.channel1_range_vpk, place.drive.channel2_range_vpk),
+        input_range_vpk=ranges,
         refinement=refinement,
         judge=_judge() if refinement is not None else None,
     )
+
+
+def _check_printable(remarks: Mapping[str, str]) -> None:
+    """A remark is one line that can be shown and written wherever the measurement goes.
+
+    Raises
+    ------
+    InputError
+        If it holds a line break, another control character or bytes that are no text.
+    """
+    for name, text in remarks.items():
+        if not text.isprintable():
+            raise InputError(f"{name} {text!r} is not one line of text; leave out what is not")
 
 
 def plan_of(request: SessionRequest, db: Path) -> SweepPlan:
@@ -232,26 +270,49 @@ def _longest_s(plan: SweepPlan, refinement: Refinement | None) -> float | None:
     return cost.most_s * len(plan.levels_vpk)
 
 
-def _resumed(
-    options: PlanOptions, unit: Unit, db: Path, resume: int, remarks: Mapping[str, str]
-) -> Measurement:
-    """The measurement to go on with; what the command line says must be what it is.
+def _resumed(db: Path, resume: int, remeasure: tuple[float, float] | None) -> Measurement:
+    """The measurement to go on with.
+
+    Raises
+    ------
+    InputError
+        If it is not there, or has no point in the band that is to be measured again.
+    """
+    from daq.store import Store
+
+    with Store(db, read_only=True) as store:
+        before = store.measurement(resume)
+        points = store.points(resume) if remeasure is not None else []
+    if remeasure is not None:
+        low_hz, high_hz = remeasure
+        asked_hz = [point.requested_hz for point in points]
+        if not any(low_hz <= hz <= high_hz for hz in asked_hz):
+            held = "it has none at all"
+            if asked_hz:
+                lowest_hz, highest_hz = min(asked_hz), max(asked_hz)
+                held = f"its {len(points)} points lie from {lowest_hz:g} to {highest_hz:g} Hz"
+            raise InputError(
+                f"--remeasure {low_hz:g}:{high_hz:g}: measurement {resume} has no point from "
+                f"{low_hz:g} to {high_hz:g} Hz, {held}; give a band with points, or leave it out"
+            )
+    return before
+
+
+def _check_same(before: Measurement, given: Mapping[str, Any], by: str = "") -> None:
+    """What is said of a measurement to go on with must be what it is.
 
     Raises
     ------
     InputError
         Names each value that differs.
     """
-    from daq.store import Store
-
-    with Store(db, read_only=True) as store:
-        before = store.measurement(resume)
     header, plan = before.header, before.header.plan
     stored: dict[str, Any] = {
         "levels_vpk": plan.levels_vpk,
         "start_hz": min(plan.frequencies_hz),
         "stop_hz": max(plan.frequencies_hz),
         "points": len(plan.frequencies_hz),
+        "spacing": _spacing(plan, given["spacing"]) if "spacing" in given else None,
         "direction": plan.direction,
         "settle_cycles": plan.settle_cycles,
         "integrate_cycles": plan.integrate_cycles,
@@ -259,17 +320,36 @@ def _resumed(
         "adaptive": "refinement" in header.configurations,
         "unit": header.unit,
         "serial": header.serial,
+        "operator": header.operator,
+        "notes": header.notes,
     }
-    given = options.given | {"unit": unit.name}
-    given |= {"serial": remarks["serial"]} if remarks["serial"] else {}
     differ = [
-        f"{name} {given[name]!r} was given and it has {value!r}"
-        for name, value in stored.items()
-        if name in given and given[name] != value
+        f"{name} {value!r} was given{by} and it has {stored[name]!r}"
+        for name, value in given.items()
+        if value != stored[name]
     ]
     if differ:
         raise InputError(
-            f"measurement {resume} is another one: {'; '.join(differ)}; leave that out, or start "
-            "a new measurement"
+            f"measurement {before.id} is another one: {'; '.join(differ)}; leave that out, or "
+            "start a new measurement"
         )
-    return before
+
+
+def _spacing(plan: SweepPlan, asked: Spacing) -> str:
+    """How a stored grid is spaced; as asked about, where it may be called both."""
+    from daq.plan import spaced_frequencies
+
+    stored_hz = plan.frequencies_hz
+    spacings: tuple[Spacing, ...] = (asked, "lin", "log")
+    for spacing in spacings:
+        grid_hz = spaced_frequencies(stored_hz[0], stored_hz[-1], len(stored_hz), spacing)
+        if all(map(partial(math.isclose, rel_tol=_SAME), grid_hz, stored_hz)):
+            return spacing
+    return "irregular"
+
+
+def _text(kind: Kind, name_or_path: str) -> str:
+    """What a unit, bench or recipe file holds."""
+    from daq.configs import config_path
+
+    return config_path(kind, name_or_path).read_text(encoding="utf-8")

@@ -17,6 +17,8 @@ with Store(sys.argv[1], read_only=True) as store:
         found = estimates.get(measurement.id)
         if found is None or "b1_deg" not in found.document:
             continue
+        if measurement.ended is None or found.made <= measurement.ended:
+            continue  # points were taken since
         moment_s = datetime.fromisoformat(measurement.started).timestamp()
         b1 = found.document["b1_deg"]
         rows[measurement.header.unit, measurement.header.serial].append(

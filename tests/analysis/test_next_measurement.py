@@ -1,3 +1,4 @@
+import shlex
 from types import SimpleNamespace
 
 import numpy as np
@@ -91,6 +92,17 @@ def test_measure_takes_the_plan_as_it_is_printed(offset):
     assert (given["level"], given["start"], given["stop"], given["points"]) == ([0.75], 80, 200, 31)
     assert given["direction"] == "down"
     assert given.get("offset", 0.0) == offset
+
+
+@pytest.mark.parametrize(
+    ("unit", "given"),
+    [("EDSS", "edss"), ("My Gimbal", "My Gimbal"), ("my units/it's.toml", "my units/it's.toml")],
+)
+def test_the_unit_is_printed_as_a_shell_reads_it(unit, given):
+    plan = SweepPlan(tuple(np.linspace(80.0, 200.0, 31)), (0.75,))
+    words = shlex.split(NextMeasurement(unit, plan, ("a", "b"), 3.0).command)
+    assert words[words.index("--unit") + 1] == given
+    assert words[words.index("--unit") + 2] == "--instrument"
 
 
 def test_two_models_that_differ_are_parted_by_a_real_simulation_and_one_not_from_itself():

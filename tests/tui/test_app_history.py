@@ -58,6 +58,18 @@ def test_trend_overlay_and_opening(db):
         assert set(store.latest_estimates()) == {1, 2}
 
 
+def test_the_trend_leaves_out_an_estimate_of_points_that_were_measured_again(db):
+    words = ["measure", "--unit", "adss", "--db", str(db), "--instrument", "sim:"]
+    assert main([*words, "--resume", "1", "--remeasure", "100:200"]) == 0
+
+    async def way():
+        async with operated(db, (120, 40)) as op:
+            await op.press("7")
+            assert "0.31" not in await op.sees("[7 Report]", "no session is estimated yet")
+
+    run(way)
+
+
 def test_the_report_is_written_where_the_operator_is(db, tmp_path, monkeypatch):
     async def way():
         analyses = Analyses(quick_analyses().estimate, quick_analyses().diagnose)

@@ -35,7 +35,7 @@ class Driven(BenchApp):
         super().on_mount()
         self.desk.choose_unit("adss")
         self.desk.url = sys.argv[2]
-        self.desk.options = PlanOptions((2.0,), 120.0, 160.0, 8000, None, None, 4, 4)
+        self.desk.options = PlanOptions((2.0,), 120.0, 160.0, 2500, None, None, 4, 4)
         assert self.keeper.start(hold=False)
         if len(sys.argv) > 3:
             self.set_interval(0.05, lambda: self.desk.run.done < int(sys.argv[3]) or self.exit(0))
@@ -46,8 +46,23 @@ sys.exit(code if code is not None else app.return_code or 0)
 """
 
 
+@pytest.fixture
+def on_terminal():
+    """Start the program on a terminal of its own, whose screen somebody reads."""
+    started = []
+
+    def start(*words):
+        started.append(OnTerminal(*words))
+        return started[-1]
+
+    yield start
+    for one in started:
+        one.program.kill()
+        one.ended()
+
+
 class OnTerminal:
-    """The program on a terminal of its own, whose screen somebody reads."""
+    """The program, and what it drew."""
 
     def __init__(self, *words):
         ours, theirs = pty.openpty()
@@ -88,9 +103,9 @@ def driving(db, within_s=40.0):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
-def test_a_signal_ends_session_and_screen_with_the_source_off(tmp_path, number):
+def test_a_signal_ends_session_and_screen_with_the_source_off(tmp_path, on_terminal, number):
     db = tmp_path / "bench.db"
-    terminal = OnTerminal(str(db), "sim:?ratio=0.3&seed=1")
+    terminal = on_terminal(str(db), "sim:?ratio=0.3&seed=1")
     driving(db)
     terminal.program.send_signal(number)
     assert terminal.ended() == 130
@@ -98,9 +113,11 @@ def test_a_signal_ends_session_and_screen_with_the_source_off(tmp_path, number):
     assert begun(db).source_state is SourceState.CONFIRMED_OFF
 
 
-def test_a_source_that_a_signal_could_not_switch_off_is_told_after_the_screen(tmp_path):
+def test_a_source_that_a_signal_could_not_switch_off_is_told_after_the_screen(
+    tmp_path, on_terminal
+):
     db = tmp_path / "bench.db"
-    terminal = OnTerminal(str(db), "sim:?fault=silence:point=5")
+    terminal = on_terminal(str(db), "sim:?fault=silence:point=5")
     driving(db)
     terminal.program.send_signal(signal.SIGTERM)
     assert terminal.ended(60.0) == 1
@@ -129,10 +146,10 @@ def test_who_quits_reads_first_that_the_source_could_not_be_switched_off(tmp_pat
     assert begun(db).source_state is SourceState.UNKNOWN
 
 
-def test_a_screen_that_is_taken_away_ends_the_session(tmp_path):
+def test_a_screen_that_is_taken_away_ends_the_session(tmp_path, on_terminal):
     db = tmp_path / "bench.db"
-    terminal = OnTerminal(str(db), "sim:?ratio=0.3&seed=1", "3")
+    terminal = on_terminal(str(db), "sim:?ratio=0.3&seed=1", "3")
     assert terminal.ended() == 0, terminal.seen[-2000:]
     assert begun(db).state == "interrupted"
     assert begun(db).source_state is SourceState.CONFIRMED_OFF
-    assert begun(db).points < 8000
+    assert begun(db).points < 2500

@@ -52,7 +52,7 @@ def test_one_key_stops_the_source_from_every_screen(tmp_path, place):
     run(lambda: way("sim:"))
     measurement = begun(db)
     assert measurement.state == "interrupted"
-    assert 3 <= measurement.points < 8000
+    assert 3 <= measurement.points < 2800
 
 
 def test_pause_goes_off_and_on_and_abort_is_for_good(tmp_path):
@@ -308,7 +308,7 @@ def test_points_stay_on_the_screen_where_going_on_with_them_fails(tmp_path):
             await op.press("r")
             await op.sees("The session did not begin")
             await op.press("escape")
-            await op.sees(f"{done} of 8000 points stored; interrupted")
+            await op.sees(f"{done} of 2800 points stored; interrupted")
             assert done > 2
 
     run(lambda: way("sim:"))

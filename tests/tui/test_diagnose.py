@@ -2,7 +2,8 @@
 
 import json
 import re
-from dataclasses import replace
+import shlex
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import hidden
@@ -10,10 +11,12 @@ import numpy as np
 import pytest
 
 from analysis.ensemble import TOLERANCES
+from analysis.next_measurement import NextMeasurement
 from analysis.swept import check_together
 from daq.configs import config_path
 from daq.errors import InputError, LashbenchError
 from daq.formats import read_response
+from daq.plan import SweepPlan
 from sim.machine_code import code_folder
 from tui.cli import main
 
@@ -51,6 +54,8 @@ def test_the_papers_rows_are_not_put_to_a_unit_of_ones_own(capsys, tmp_path):
 
 class Told:
     """Stands for a diagnosis."""
+
+    next_measurement = None
 
     def to_json(self):
         return {"verdict": "consistent"}
@@ -92,6 +97,27 @@ def test_a_response_of_another_unit_is_said_to_be_one(calls, capsys):
     assert "warning: the response is of unit ADSS, not of EDSS\n" in capsys.readouterr().err
     main(["diagnose", SWEEP, "--unit", "adss"])
     assert "warning" not in capsys.readouterr().err
+
+
+def test_the_command_that_is_proposed_finds_a_unit_by_its_path(
+    calls, capsys, monkeypatch, tmp_path
+):
+    @dataclass
+    class Proposing(Told):
+        next_measurement: NextMeasurement
+
+        def summary(self):
+            return [self.next_measurement.command]
+
+    proposal = NextMeasurement("ADSS", SweepPlan((100.0, 120.0), (1.0,)), ("a", "b"), 3.0)
+    monkeypatch.setattr(
+        "analysis.diagnosis.diagnose_response", lambda *_, **__: Proposing(proposal)
+    )
+    own = tmp_path / "my gimbal.toml"
+    own.write_text(config_path("units", "adss").read_text(encoding="utf-8"), encoding="utf-8")
+    assert main(["diagnose", SWEEP, "--unit", str(own)]) == 0
+    words = shlex.split(capsys.readouterr().out)
+    assert words[words.index("--unit") + 1] == str(own)
 
 
 def test_a_figure_that_cannot_be_made_does_not_cost_the_answer(

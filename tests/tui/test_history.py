@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 from measuring import measuring, stopped
 
+from analysis import estimate as estimating
+from daq.errors import AnalysisError, LinkError
 from daq.formats import read_response
 from daq.store import Store
+from tui.reports import keep_estimate
 
 
 def test_an_empty_history_and_one_that_is_not_there(run, db):
@@ -102,18 +105,25 @@ def test_values_that_do_not_agree_are_not_passed_off_as_one(run, db):
     assert "differ by more than their errors" in run("history")[1]
 
 
-def test_missing_estimates_are_made_once_and_kept(run, db, monkeypatch):
-    from analysis import estimate as module
-    from daq.errors import AnalysisError
+class Result:
+    """An estimate of 0.3."""
 
+    def to_json(self):
+        number = {"value": 0.3, "std": 0.1}
+        return {"contribution_ratio": number, "b1_deg": number, "b2_deg": number}
+
+
+def ratios(run, *words):
+    code, out, _ = run("history", "--json", *words)
+    assert code == 0
+    ratios = [row["contribution_ratio"] for row in json.loads(out)["measurements"]]
+    return [None if ratio is None else ratio["value"] for ratio in ratios]
+
+
+def test_missing_estimates_are_made_once_and_kept(run, db, monkeypatch):
     run(*measuring())
     run(*measuring())
     calls = []
-
-    class Result:
-        def to_json(self):
-            number = {"value": 0.3, "std": 0.1}
-            return {"contribution_ratio": number, "b1_deg": number, "b2_deg": number}
 
     def estimate(response, unit, progress=None, **_):
         calls.append((unit.name, len(response)))
@@ -121,7 +131,7 @@ def test_missing_estimates_are_made_once_and_kept(run, db, monkeypatch):
             raise AnalysisError("no resonance in it")
         return Result()
 
-    monkeypatch.setattr(module, "estimate_response", estimate)
+    monkeypatch.setattr(estimating, "estimate_response", estimate)
     code, out, err = run("history", "--json")
     rows = json.loads(out)["measurements"]
     assert code == 0
@@ -131,6 +141,58 @@ def test_missing_estimates_are_made_once_and_kept(run, db, monkeypatch):
     again = run("history", "--json")[1]
     assert json.loads(again) == json.loads(out)
     assert calls == [("ADSS", 5), ("ADSS", 5)]
+    # What failed is tried once more where all is asked for.
+    assert ratios(run, "--estimate", "all") == [0.3, 0.3]
+    assert len(calls) == 3
+
+
+def test_an_estimate_of_points_that_were_measured_again_does_not_count(run, db, monkeypatch):
+    monkeypatch.setattr(estimating, "estimate_response", lambda *_, **__: Result())
+    run(*measuring())
+    with Store(db) as store:
+        estimated(store, 1, 0.9)
+    assert ratios(run, "--estimate", "none") == [0.9]
+    run(*measuring("--resume", 1, "--remeasure", "40:200"))
+    assert ratios(run, "--estimate", "none") == [None]
+    assert ratios(run) == [0.3]
+
+
+@pytest.mark.parametrize("failed", [False, True])
+def test_what_was_said_of_half_a_measurement_is_not_said_of_all_of_it(run, db, monkeypatch, failed):
+    monkeypatch.setattr(estimating, "estimate_response", lambda *_, **__: Result())
+    stopped(run, monkeypatch)
+    with Store(db) as store:
+        if failed:
+            store.add_estimate(1, "t", {"failed": "too few points"})
+        else:
+            estimated(store, 1, 0.9)
+    assert ratios(run) == [None if failed else 0.9]
+    run(*measuring("--resume", 1))
+    assert ratios(run) == [0.3]
+
+
+def test_an_estimate_is_not_kept_of_points_that_were_replaced_while_it_was_made(run, db):
+    run(*measuring())
+    with Store(db, read_only=True) as store:
+        before = store.measurement(1)
+    run(*measuring("--resume", 1, "--remeasure", "40:200"))
+    keep_estimate(db, before, Result().to_json())
+    assert ratios(run, "--estimate", "none") == [None]
+    with Store(db, read_only=True) as store:
+        again = store.measurement(1)
+    keep_estimate(db, again, Result().to_json())
+    assert ratios(run, "--estimate", "none") == [0.3]
+
+
+def test_a_lost_cluster_says_nothing_of_a_measurement(run, db, monkeypatch):
+    def lost(*_, **__):
+        raise LinkError("the Dask scheduler was lost")
+
+    run(*measuring())
+    monkeypatch.setattr(estimating, "estimate_response", lost)
+    assert run("history")[0] == 3
+    with Store(db, read_only=True) as store:
+        assert store.latest_estimates() == {}
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".h5", ".uff", ".mat"])

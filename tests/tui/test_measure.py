@@ -2,6 +2,7 @@
 
 import io
 import json
+from itertools import chain
 
 import numpy as np
 import pytest
@@ -191,3 +192,29 @@ def test_no_end_of_a_band_is_lost(run, db, band, direction):
         response = store.response(1)
     assert len(response) == points
     assert np.all(np.isfinite(response.gain_db))
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (("--integrate-cycles", "235"), 5, "integrate cycles 235 is outside the instrument's"),
+        (("--level", "0.0001"), 5, "below the smallest step"),
+        (
+            ("--start", "150", "--stop", "150.05"),
+            2,
+            "150.025 and 150.0375 Hz would both be measured",
+        ),
+        (("--notes", "a\udcffb"), 2, "notes 'a\\udcffb' is not one line of text"),
+        (("--serial", "a\nb"), 2, "serial 'a\\nb' is not one line of text"),
+    ],
+)
+@pytest.mark.parametrize("dry", [(), ("--dry-run",)])
+def test_what_cannot_be_set_or_shown_is_refused_before_anything_is_opened(
+    run, db, words, code, said, dry
+):
+    given = {"--unit": "adss", "--instrument": "sim:", "--level": "2", "--points": "5"}
+    given |= {"--start": "100", "--stop": "160"} | dict(zip(words[::2], words[1::2], strict=True))
+    ended, out, err = run("measure", *chain.from_iterable(given.items()), *dry)
+    assert (ended, out) == (code, "")
+    assert said in err
+    assert not db.exists()

@@ -25,7 +25,7 @@ def measuring(db, *words, points, instrument="sim:", **streams):
     program = subprocess.Popen(
         [
             sys.executable, "-m", "tui.cli", "measure", "--unit", "adss",
-            "--instrument", instrument, "--level", "2", "--start", "120", "--stop", "160",
+            "--instrument", instrument, "--level", "2", "--start", "60", "--stop", "400",
             "--points", str(points), "--settle-cycles", "4", "--integrate-cycles", "4",
             "--db", str(db), *words,
         ],
@@ -52,7 +52,7 @@ def test_a_terminal_that_takes_no_more_holds_neither_a_session_nor_a_signal_up(t
     db, out = tmp_path / "bench.db", tmp_path / "out.json"
     with (
         out.open("w") as file,
-        measuring(db, "--json", points=20_000, stdout=file, stderr=stalled) as program,
+        measuring(db, "--json", points=15_000, stdout=file, stderr=stalled) as program,
     ):
         end = time.monotonic() + 60.0
         while True:

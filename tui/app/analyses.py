@@ -20,6 +20,7 @@ from tui.app.messages import AnalysisDone, AnalysisFailed, AnalysisProgressed, J
 
 if TYPE_CHECKING:
     from daq.frf import FrequencyResponse
+    from daq.store_records import Measurement
     from sim.unit import Unit
 
 __all__ = ["Analyses", "Task", "diagnose", "read_result", "write_report"]
@@ -151,10 +152,11 @@ def read_result(task: Task, analyses: Analyses) -> None:
     def estimate() -> Mapping[str, Any]:
         with Store(task.db, read_only=True) as store:
             known = kept_estimate(store, task.measurement, task.unit)
+            measured = store.measurement(task.measurement)
         if known is not None:
             return known
         made = analyses.estimate(task.response(), task.unit, task.progress("result"))
-        _keep_estimate(task, made)
+        _keep_estimate(task, measured, made)
         return made
 
     task.run("result", features)
@@ -177,14 +179,11 @@ def write_report(task: Task, analyses: Analyses, diagnosis: Any, path: Path) -> 
     task.run("report", work)
 
 
-def _keep_estimate(task: Task, document: Mapping[str, Any]) -> None:
-    from importlib.metadata import version
-
-    from daq.store import Store
+def _keep_estimate(task: Task, measured: Measurement, document: Mapping[str, Any]) -> None:
+    from tui.reports import keep_estimate
 
     try:
-        with Store(task.db) as store:
-            store.add_estimate(task.measurement, f"lashbench {version('lashbench')}", document)
+        keep_estimate(task.db, measured, document)
     except LashbenchError as error:
         # It is shown all the same; the next look makes it once more.
         _LOG.warning("an estimate was not kept: %s", error)

@@ -6,13 +6,12 @@ instrument, draws nothing and decides nothing about a measurement.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from daq.errors import ConfigurationError, InputError
+from daq.errors import InputError
 from tui.app.run_view import RunView
 from tui.followed import following
 from tui.measure_options import PlanOptions
@@ -63,7 +62,10 @@ class Desk:
 
     db: Path
     unit_name: str = ""
+    """Name or path that `unit` was chosen by, or of which measurement it is."""
     unit: Unit | None = None
+    unit_text: str | None = None
+    """The file of a unit that came from the history and has no name or path."""
     serial: str = ""
     operator: str = ""
     notes: str = ""
@@ -105,9 +107,7 @@ class Desk:
         from sim.unit import load_unit
 
         unit = load_unit(name)
-        if name != self.unit_name:
-            self.options, self.given_plan, self.resume = PlanOptions(), None, None
-        self.unit_name, self.unit = name, unit
+        self._put(name, unit, None)
         return unit
 
     def take_up(self, measurement: Measurement) -> None:
@@ -124,22 +124,27 @@ class Desk:
         Raises
         ------
         ConfigurationError
-            If the history does not hold the file and there is none of that name.
+            As `tui.reports.unit_as_measured`; the one before stays.
         """
         from daq.configs import config_names
-        from sim.unit import unit_from_mapping
+        from sim.unit import load_unit
+        from tui.reports import unit_as_measured
 
-        header = measurement.header
-        self.serial = header.serial
+        header, unit = measurement.header, unit_as_measured(measurement)
         name = header.unit.lower()
-        if name in config_names("units"):
-            self.choose_unit(name)
-            return
-        text = header.configurations.get("unit")
-        if text is None:
-            raise ConfigurationError(f"unit {header.unit!r} has no file in the history")
-        self.unit = unit_from_mapping(tomllib.loads(text), f"unit of measurement {measurement.id}")
-        self.unit_name = name
+        if name in config_names("units") and unit == load_unit(name):
+            self._put(name, unit, None)
+        else:
+            # Another file of that name may have other numbers: they are this measurement's.
+            text = header.configurations["unit"]
+            self._put(f"unit of measurement {measurement.id}", unit, text)
+        self.serial = header.serial
+
+    def _put(self, name: str, unit: Unit, text: str | None) -> None:
+        """Another unit has a sweep of its own."""
+        if name != self.unit_name:
+            self.options, self.given_plan, self.resume = PlanOptions(), None, None
+        self.unit_name, self.unit, self.unit_text = name, unit, text
 
     @property
     def recipe(self) -> str | None:
@@ -165,11 +170,13 @@ class Desk:
         # A plan that came whole is no recipe's, so a recipe's limits are not its limits.
         recipe = self.recipe if fresh and self.given_plan is None else None
         options = self._options() if fresh else PlanOptions()
+        # Who began a measurement, and what was noted then, stays with it.
+        remarks = {"operator": self.operator, "notes": self.notes} if fresh else {}
         request = session_request(
             options, self.unit_name, self.unit, self.url, self.db,
             recipe=recipe, bench="default",
             resume=self.resume, remeasure=remeasure_hz, run_in=None,
-            remarks={"serial": self.serial, "operator": self.operator, "notes": self.notes},
+            remarks={"serial": self.serial, **remarks}, unit_text=self.unit_text,
         )  # fmt: skip
         if fresh and self.given_plan is not None and request.header is not None:
             check_plan(self.given_plan, request.limits)

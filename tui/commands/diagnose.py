@@ -5,6 +5,7 @@ Owns the options of the verb. The diagnosis is the analysis's.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -76,7 +77,7 @@ def diagnose(
             response, subject, further=others, cache=cache_folder(), executor=executor,
             progress=console.progress,
         )  # fmt: skip
-    _tell(result, json, console)
+    _tell(_proposing(result, unit), json, console)
     if plots is not None:
         from analysis.diagnosis_figures import draw_diagnosis
 
@@ -92,6 +93,14 @@ def _diagnose_paper(unit: Unit, plots: Path | None, json: bool, console: Console
     if plots is not None:
         for path in result.plot(plots):
             console.note(f"wrote {path}")
+
+
+def _proposing(result: Diagnosis, unit: str) -> Diagnosis:
+    """With the unit as it was given in the proposed command: a file is found by its path alone."""
+    proposal = result.next_measurement
+    if proposal is None:
+        return result
+    return replace(result, next_measurement=replace(proposal, unit=unit))
 
 
 def _tell(result: Diagnosis | PaperDiagnosis, json: bool, console: Console) -> None:

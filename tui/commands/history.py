@@ -7,18 +7,19 @@ are made by the analysis and kept, so that the next look is quick.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from daq.errors import ConfigurationError, InputError, LashbenchError
+from daq.errors import AnalysisError, ConfigurationError, InputError, LashbenchError
 from tui.executors import executor_at
 from tui.history_rows import estimated_groups, measurement_row, trend_lines, trend_rows
 from tui.options import Cluster, Json
 from tui.output import Console, Injected
 from tui.places import cache_folder, history_path
+from tui.reports import estimates_in_force, keep_estimate, unit_as_measured
 
 if TYPE_CHECKING:
     from analysis.executor import Executor
@@ -43,8 +44,8 @@ def history(
 ) -> None:
     """List the measurements of a bench, oldest first, with the trend of r, b1 and b2.
 
-    Complete measurements that were not estimated yet are estimated now, which
-    takes a while, and the result is kept in the history.
+    Complete measurements that were not estimated since their last point are
+    estimated now, which takes a while, and the result is kept in the history.
 
     Parameters
     ----------
@@ -53,16 +54,17 @@ def history(
     unit
         Only measurements of this unit: adss, edss, the path of a unit file, or a name.
     estimate
-        Which missing estimates to make: none, all, or some, that is to begin
-        no more of them after 45 s.
+        Which missing estimates to make: none, all, those that failed once more
+        among them, or some, that is to begin no more of them after 45 s.
     """
     from daq.store import Store
 
     db = history_path(db)
     with Store(db, read_only=True) as store:
         measurements = store.measurements(_unit_name(unit, store))
-        known = {key: dict(e.document) for key, e in store.latest_estimates().items()}
-    lacking = [m for m in measurements if m.state == "complete" and m.id not in known]
+        known = estimates_in_force(store, measurements)
+    done = {key for key, document in known.items() if estimate != "all" or "failed" not in document}
+    lacking = [m for m in measurements if m.state == "complete" and m.id not in done]
     if estimate != "none" and lacking:
         with executor_at(cluster) as executor:
             known |= _estimates(db, lacking, estimate == "all", executor, console)
@@ -100,14 +102,10 @@ def _estimates(
     every: bool,
     executor: Executor | None,
     console: Console,
-) -> dict[int, dict[str, Any]]:
+) -> dict[int, Mapping[str, Any]]:
     """Make estimates and keep them where the history may be written."""
-    from importlib.metadata import version
-
-    from daq.store import Store
-
     began_s = time.monotonic()
-    made: dict[int, dict[str, Any]] = {}
+    made: dict[int, Mapping[str, Any]] = {}
     for count, measurement in enumerate(lacking):
         if not every and made and time.monotonic() - began_s > _BUDGET_S:
             console.note(
@@ -118,10 +116,7 @@ def _estimates(
         console.note(f"estimating measurement {measurement.id}")
         made[measurement.id] = _estimate(db, measurement, executor, console)
         try:
-            with Store(db) as store:
-                store.add_estimate(
-                    measurement.id, f"lashbench {version('lashbench')}", made[measurement.id]
-                )
+            keep_estimate(db, measurement, made[measurement.id])
         except LashbenchError as error:
             console.note(f"the estimate is shown but not kept: {error}")
     return made
@@ -130,27 +125,19 @@ def _estimates(
 def _estimate(
     db: Path, measurement: Measurement, executor: Executor | None, console: Console
 ) -> dict[str, Any]:
-    import tomllib
-
     from analysis.estimate import estimate_response
     from daq.store import Store
-    from sim.unit import load_unit, unit_from_mapping
 
-    text = measurement.header.configurations.get("unit")
     try:
         with Store(db, read_only=True) as store:
             response = store.response(measurement.id)
-        name = f"unit of measurement {measurement.id}"
-        unit = (
-            load_unit(measurement.header.unit)
-            if text is None
-            else unit_from_mapping(tomllib.loads(text), source=name)
-        )
+        unit = unit_as_measured(measurement)
         result = estimate_response(
             response, unit, progress=console.progress, cache=cache_folder(), executor=executor
         )
         content: dict[str, Any] = result.to_json()
-    except (LashbenchError, ValueError) as error:
+    except (AnalysisError, InputError, ValueError) as error:
+        # A lost cluster is not among them: it says nothing of the data, and ends the verb.
         console.note(f"measurement {measurement.id} gives no estimate: {error}")
         return {"failed": str(error)}
     return content

@@ -6,6 +6,7 @@ here: a session gets one when its result is opened.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from tui.app.widgets.bode import BodePlot
 from tui.app.widgets.panel import Panel
 from tui.app.widgets.traces import traces_of_response
 from tui.history_rows import measurement_row, trend_lines, trend_rows
+from tui.reports import estimates_in_force
 
 __all__ = ["HistoryScreen"]
 
@@ -177,10 +179,10 @@ contribution ratio of every estimated session with its error bar. U lists all un
             for m in self.bench.measurements()
             if m.points and unit in (None, m.header.unit.lower())
         ][-_SHOWN:]
-        known = {}
+        known: Mapping[int, Mapping[str, Any]] = {}
         if measurements:
             with Store(desk.db, read_only=True) as store:
-                known = {key: dict(e.document) for key, e in store.latest_estimates().items()}
+                known = estimates_in_force(store, measurements)
         self._rows = [measurement_row(m, known.get(m.id, {})) for m in measurements]
 
     def _fill(self) -> None:

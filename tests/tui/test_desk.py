@@ -1,0 +1,114 @@
+"""The desk of the bench screen: with which unit a stored measurement is opened."""
+
+from dataclasses import replace
+
+import pytest
+from measuring import measuring
+from screen import operated
+from screen import run as run_screen
+
+from daq.configs import config_path
+from daq.errors import ConfigurationError, InputError
+from daq.store import Store
+from sim.unit import load_unit
+from tui.app.desk import Desk
+
+SHIPPED = load_unit("adss")
+
+
+@pytest.fixture
+def measured(run, db, tmp_path):
+    """Measure with an own unit file, which is gone afterwards; the measurement and that text."""
+
+    def measure(name, *words):
+        text = config_path("units", "adss").read_text(encoding="utf-8")
+        for old, new in (
+            ('name = "ADSS"', f'name = "{name}"'),
+            ("J_L = 2.75e-3", "J_L = 5.0e-3"),
+            ("source_vpk = 5.0", "source_vpk = 3.0"),
+        ):
+            assert text.count(old) == 1
+            text = text.replace(old, new)
+        file = tmp_path / "own.toml"
+        file.write_text(text, encoding="utf-8")
+        assert run(*measuring(*words, unit=file))[0] == 0
+        file.unlink()
+        with Store(db, read_only=True) as store:
+            return store.measurements()[-1], text
+
+    return measure
+
+
+def with_unit_text(measurement, text):
+    header = replace(measurement.header, configurations={} if text is None else {"unit": text})
+    return replace(measurement, header=header)
+
+
+@pytest.mark.parametrize("name", ["ADSS", "gär"])
+def test_a_measurement_is_opened_with_the_unit_file_it_was_made_with(measured, db, name):
+    measurement, text = measured(name, "--serial", "7")
+    desk = Desk(db)
+    desk.choose_unit_of(measurement)
+    assert (desk.unit.name, desk.serial) == (name, "7")
+    assert (desk.unit.load.J_L, desk.unit.limits.source_vpk) == (5.0e-3, 3.0)
+    assert desk.recipe is None
+    # A new sweep of it is of that unit, too.
+    request = desk.request()
+    assert request.header.unit == name
+    assert request.header.configurations["unit"] == text
+    assert min(limits.source_vpk for limits in request.limits) == 3.0
+    desk.choose_unit("adss")
+    assert (desk.unit, desk.recipe) == (SHIPPED, "adss")
+    assert "2.75e-3" in desk.request().header.configurations["unit"]
+
+
+def test_a_unit_as_it_is_shipped_keeps_its_recipe(run, db):
+    run(*measuring())
+    with Store(db, read_only=True) as store:
+        measurement = store.measurement(1)
+    for one in (measurement, with_unit_text(measurement, None)):
+        desk = Desk(db)
+        desk.choose_unit_of(one)
+        assert (desk.unit_name, desk.unit, desk.recipe) == ("adss", SHIPPED, "adss")
+
+
+def test_a_unit_that_the_history_does_not_hold_leaves_the_desk_as_it_is(measured, db):
+    measurement, text = measured("gär", "--serial", "7")
+    desk = Desk(db)
+    desk.choose_unit("edss")
+    for gone, said in ((None, "'gär' has no file in the history"), ("[", "is not valid TOML")):
+        with pytest.raises(ConfigurationError, match=said):
+            desk.choose_unit_of(with_unit_text(measurement, gone))
+    assert (desk.unit.name, desk.serial) == ("EDSS", "")
+
+
+def test_going_on_keeps_who_began_and_refuses_another_serial_number(measured, db):
+    measurement, _ = measured("gär", "--operator", "anna", "--notes", "one", "--serial", "7")
+    desk = Desk(db)
+    desk.take_up(measurement)
+    assert (desk.operator, desk.notes) == ("anna", "one")
+    desk.operator = "bob"
+    assert desk.request().resume == 1
+    desk.serial = "8"
+    with pytest.raises(InputError, match="serial '8' was given and it has '7'"):
+        desk.request()
+
+
+def test_a_unit_from_the_history_is_measured_anew_on_the_screen(measured, db):
+    _, text = measured("gär")
+
+    async def way():
+        async with operated(db, (120, 40)) as op:
+            await op.press("7", "u", "enter")
+            await op.sees("[5 Result]", "r = 0.310")
+            await op.press("2")
+            await op.connects("sim:")
+            await op.plans(start="125", stop="150", points="6")
+            await op.checks()
+            await op.press("ctrl+n", "s")
+            await op.sees("6 of 6 points stored; complete")
+
+    run_screen(way)
+    with Store(db, read_only=True) as store:
+        header = store.measurement(2).header
+    assert (header.unit, header.configurations["unit"]) == ("gär", text)
