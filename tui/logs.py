@@ -19,13 +19,17 @@ LEVELS = ("debug", "info", "warning", "error")
 """What ``--log-level`` takes, from most to least that is written."""
 
 _BYTES = 1_000_000
+_WARNINGS = "py.warnings"
+"""Where Python puts what it and libraries warn of."""
 
 
 def silence() -> None:
-    """Let nothing of the log reach stderr where no file is written."""
-    logger = logging.getLogger("lashbench")
-    if not logger.handlers:
-        logger.addHandler(logging.NullHandler())
+    """Let nothing of the log reach stderr where no file is written, nor what libraries warn of."""
+    logging.captureWarnings(True)
+    for name in ("lashbench", _WARNINGS):
+        logger = logging.getLogger(name)
+        if not logger.handlers:
+            logger.addHandler(logging.NullHandler())
 
 
 @contextmanager
@@ -46,6 +50,8 @@ def logging_to_file(level: str = "info") -> Iterator[Path | None]:
         return
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
     logger.addHandler(handler)
+    warned = logging.getLogger(_WARNINGS)
+    warned.addHandler(handler)
     before = logger.level
     logger.setLevel(level.upper())
     try:
@@ -53,4 +59,5 @@ def logging_to_file(level: str = "info") -> Iterator[Path | None]:
     finally:
         logger.setLevel(before)
         logger.removeHandler(handler)
+        warned.removeHandler(handler)
         handler.close()

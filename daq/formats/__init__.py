@@ -81,6 +81,8 @@ def check_writable(path: str | Path) -> None:
 
 def _module(path: str | Path, known: dict[str, str], verb: str) -> str:
     suffix = Path(path).suffix.lower()
+    if suffix not in known and Path(path).is_dir():
+        raise InputError(f"{path}: is a directory; give a file")
     if suffix not in known:
         raise InputError(
             f"{path}: cannot {verb} files that end in {suffix or 'nothing'!r}; "

@@ -208,6 +208,8 @@ def test_what_is_no_file_is_refused(tmp_path, suffix):
     folder.mkdir()
     with pytest.raises(FileFormatError, match="is a directory"):
         read_response(folder)
+    with pytest.raises(InputError, match="is a directory; give a file"):
+        read_response(tmp_path)
     empty = tmp_path / f"empty{suffix}"
     empty.touch()
     with pytest.raises(FileFormatError, match="is empty"):

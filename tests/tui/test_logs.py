@@ -1,6 +1,9 @@
 """The log that a user can turn on: what goes into it, and that it is never in the way."""
 
 import logging
+import os
+import subprocess
+import sys
 
 import pytest
 
@@ -79,3 +82,23 @@ def test_a_long_log_is_turned_over(monkeypatch):
             logging.getLogger("lashbench").info("line %d of many", number)
     assert log_path().stat().st_size <= 2000
     assert log_path().with_name("lashbench.log.1").exists()
+
+
+def test_what_libraries_warn_of_is_for_the_log_alone(tmp_path):
+    program = "\n".join(
+        [
+            "import warnings",
+            "from tui import cli",
+            "from tui.commands import extract",
+            "def warn(**_): warnings.warn('overflow encountered', RuntimeWarning)",
+            "extract.extract = warn",
+            "import sys; sys.exit(cli.main(sys.argv[1:]))",
+        ]
+    )
+    for words in ([], ["--log-level", "info"]):
+        ended = subprocess.run(
+            [sys.executable, "-c", program, "extract", *words],
+            capture_output=True, text=True, check=True, env=os.environ,
+        )  # fmt: skip
+        assert "overflow" not in ended.stderr
+    assert "overflow encountered" in log_path().read_text()
