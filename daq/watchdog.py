@@ -24,7 +24,8 @@ from daq.errors import InputError, LashbenchError
 __all__ = ["Watchdog", "main"]
 
 _DONE = b"done\n"
-_TRIES = 5
+_TRIES, _TRYING_S = 5, 25.0
+"""How often the instrument is opened anew, and until when: the next session waits for this one."""
 _BETWEEN_S = 1.0
 _DISMISSAL_S = 5.0
 _NO_WORD = "the session ended without proving the source off"
@@ -108,7 +109,7 @@ def _make_safe(url: str) -> tuple[str, str]:
     from daq.hp35670a import HP35670A
     from daq.transports.open import open_transport
 
-    state, found = SourceState.UNKNOWN, ""
+    state, found, until_s = SourceState.UNKNOWN, "", time.monotonic() + _TRYING_S
     for _ in range(_TRIES):
         try:
             analyser = HP35670A(open_transport(url))
@@ -118,7 +119,7 @@ def _make_safe(url: str) -> tuple[str, str]:
             state = analyser.make_safe()
             analyser.close()
             found = f"; source {state.value}"
-        if state is SourceState.CONFIRMED_OFF:
+        if state is SourceState.CONFIRMED_OFF or time.monotonic() > until_s:
             break
         time.sleep(_BETWEEN_S)
     return f"{_NO_WORD}{found}", state.value

@@ -105,7 +105,7 @@ def bench_session(
     """
     from daq.bench_lock import BenchLock
     from daq.session import Session
-    from daq.session_events import Opened, Warned
+    from daq.session_events import CheckLine, Opened, Warned
     from daq.store import Store
     from daq.watchdog import Watchdog
 
@@ -123,8 +123,13 @@ def bench_session(
         with closing(session.run()) as events:
             for event in events:
                 if isinstance(event, Opened) and is_real:
-                    watchdog = Watchdog(url, history, event.measurement, lock.descriptor)
-                    watch.callback(_stand_down, watchdog, store, event.measurement)
+                    measurement = event.measurement
+                    watchdog = Watchdog(url, history, measurement, lock.descriptor)
+                    watch.callback(watchdog.dismiss)
+                if isinstance(event, CheckLine) and event.name == "source" and is_real:
+                    # It is an analyser that may drive, and not something else that keeps silent.
+                    watch.pop_all()
+                    watch.callback(_stand_down, watchdog, store, measurement)
                 while faults:
                     yield Warned(faults.pop(0))
                 yield event

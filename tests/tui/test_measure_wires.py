@@ -1,6 +1,7 @@
 """The same measurement over every wire, and what becomes of it when its program is killed."""
 
 import random
+import socket
 import time
 
 import numpy as np
@@ -113,6 +114,21 @@ def test_a_watchdog_goes_on_where_the_source_could_not_be_proven_off(tmp_path, m
             assert store.measurement(1).source_state is SourceState.CONFIRMED_OFF
         with BenchLock(db):
             assert source_state(url) is SourceState.CONFIRMED_OFF
+
+
+def test_no_watchdog_is_left_with_what_is_no_analyser(tmp_path, monkeypatch, capsys):
+    """Somebody gave a wrong address: the next session must not wait."""
+    monkeypatch.setattr("daq.hp35670a.Timing", lambda: Timing(reply_s=0.3, block_s=1.0))
+    monkeypatch.setattr("daq.hp35670a_safe._BUDGET_S", 0.5)
+    db = tmp_path / "bench.db"
+    short = ["--level", "1", "--start", "130", "--stop", "170", "--points", "9", *QUICK]
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        url = f"TCPIP::127.0.0.1::{silent.getsockname()[1]}::SOCKET"
+        words = ["measure", "--unit", "adss", "--instrument", url, "--db", str(db), "--yes"]
+        assert cli.main([*words, *short]) == 4
+        assert "SOURCE OFF UNKNOWN" in capsys.readouterr().err
+        with BenchLock(db, patience_s=0.2):
+            pass
 
 
 def test_without_a_watchdog_the_next_start_finds_the_source_driving(tmp_path, monkeypatch, capsys):
