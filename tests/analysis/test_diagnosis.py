@@ -111,19 +111,8 @@ def test_one_level_without_phase_still_gets_a_verdict_and_asks_for_more(cache):
     json.dumps(document, allow_nan=False)
 
 
-QUICK = ("09",)
-"""Sets of every test run; the others are judged by `make blind`."""
-
-
-@pytest.mark.parametrize(
-    "number",
-    [
-        pytest.param(
-            f"{i:02d}", marks=pytest.mark.slow if f"{i:02d}" in QUICK else pytest.mark.study
-        )
-        for i in range(1, 13)
-    ],
-)
+@pytest.mark.study
+@pytest.mark.parametrize("number", [f"{i:02d}" for i in range(1, 13)])
 def test_practice_sets_of_another_program(number, tmp_path, practice_cache):
     response = read_response(PRACTICE / f"practice-{number}.csv")
     judge_practice(number, response, practice_cache, tmp_path)

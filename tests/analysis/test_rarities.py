@@ -8,7 +8,10 @@ from sim.catalogue import CATALOGUE, COMMON
 RARE = [(name,) for name, effect in CATALOGUE.items() if effect.rare]
 
 
-@pytest.mark.parametrize(("effect", "seed"), [("motor-inertia", 2), ("amplifier-dead-zone", 3)])
+@pytest.mark.parametrize(
+    ("effect", "seed"),
+    [pytest.param("motor-inertia", 2, marks=pytest.mark.study), ("amplifier-dead-zone", 3)],
+)
 def test_a_rare_cause_is_named_where_it_is_hidden(runs, effect, seed):
     _, verdict = synthetic_search.diagnosed((effect,), [0.8], seed)
     assert (verdict.word, verdict.best.effects) == ("explained", (effect,))

@@ -1,4 +1,4 @@
-"""A dozen runs of the fault campaign; `make faults` runs hundreds."""
+"""Nine runs of the fault campaign; `make faults` runs hundreds."""
 
 from concurrent.futures import ThreadPoolExecutor
 from itertools import chain
@@ -27,16 +27,12 @@ from tui.measure_options import session_request
 KINDS = (
     ("tcp", None, "sigint"),
     ("prologix_tcp", None, "kill"),
-    ("tcp", None, "kill-both"),
     ("loopback", None, "full-disk"),
     ("tcp", None, "read-only"),
     ("loopback", None, "held-briefly"),
     ("tcp", None, "intruder"),
-    ("tcp", None, "clock-jumps"),
-    ("loopback", None, "reader"),
     ("ar488_pty", "truncated-block:phase=read-out,point=2", None),
     ("tcp", "dropped-connection:phase=sweep,point=5", None),
-    ("loopback", None, "sighup"),
     ("loopback", "hardware-error:phase=sweep,point=9", None),
 )
 
