@@ -301,7 +301,7 @@ def test_points_stay_on_the_screen_where_going_on_with_them_fails(tmp_path):
             await op.press("1")
             await op.sees("Session 1 is under way: step 4")
             await op.press("ctrl+x")
-            await op.sees("SOURCE OFF (confirmed)", "#1 interrupted")
+            await op.sees("#1 interrupted", "1 interrupted: Enter on RESUME goes on")
             done = op.app.desk.run.done
             op.app.desk.url = "TCPIP::127.0.0.1::1::SOCKET"
             await op.goes_to(4)

@@ -46,6 +46,9 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
     UnitScreen #sessions { height: 1fr; }
     """
 
+    _listed_beside: int | None = None
+    """The session that was under way when the others were listed."""
+
     def body(self) -> ComposeResult:
         """Unit and operator on top, sessions below."""
         with Horizontal(id="choice"):
@@ -82,7 +85,9 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
         self._list_sessions()
 
     def show_body(self) -> None:
-        """Parameters and limits of the unit chosen."""
+        """Parameters and limits of the unit chosen; the sessions where one began or ended."""
+        if self._under_way() != self._listed_beside:
+            self._list_sessions()
         unit = self.desk.unit
         if unit is None:
             return
@@ -194,7 +199,8 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
         return [Option(name.upper(), id=name) for name in config_names("units")]
 
     def _list_sessions(self) -> None:
-        self._measurements = self._recent()
+        self._listed_beside = running = self._under_way()
+        self._measurements = self._recent(running)
         table = self.query_one("#sessions", DataTable)
         table.clear()
         for measurement in self._measurements:
@@ -214,15 +220,17 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
         words = f"Sessions of this bench ({self.desk.db})"
         if interrupted:
             words = f"{interrupted} interrupted: Enter on RESUME goes on   {words}"
-        elif self.desk.run.live and self.desk.run.measurement is not None:
-            words = f"Session {self.desk.run.measurement} is under way: step 4   {words}"
+        elif running is not None:
+            words = f"Session {running} is under way: step 4   {words}"
         elif not self._measurements:
             words = f"No sessions yet in {self.desk.db}"
         self.query_one("#sessions-heading", Static).update(words)
 
-    def _recent(self) -> list[Measurement]:
+    def _under_way(self) -> int | None:
+        return self.desk.run.measurement if self.desk.run.live else None
+
+    def _recent(self, running: int | None) -> list[Measurement]:
         """Interrupted ones with points first, then the latest; checks without a sweep left out."""
         found = [m for m in self.bench.measurements() if m.points > 0]
-        running = self.desk.run.measurement if self.desk.run.live else None
         latest = [m for m in reversed(found) if m.id != running][:_RECENT]
         return sorted(latest, key=lambda m: m.state != "interrupted")
