@@ -122,8 +122,8 @@ def planned_settings(
 
 def check_sweep(
     plan: SweepPlan,
-    slew_vpk_per_s: float = 0.0,
-    input_range_vpk: tuple[float | None, float | None] = (None, None),
+    slew_vpk_per_s: float,
+    input_range_vpk: tuple[float | None, float | None],
     *,
     may_repeat: bool = False,
 ) -> None:

@@ -32,7 +32,7 @@ class Narrator:
         self._file = stream.fileno()
         self._encoding = stream.encoding or "utf-8"
         # Nothing else may be put into by a signal handler at any moment.
-        self._waiting: SimpleQueue[bytes | threading.Event] = SimpleQueue()
+        self._waiting: SimpleQueue[bytes | threading.Event | None] = SimpleQueue()
         # Not the stream's own writing: that holds a lock which the end of the program asks for.
         self._writer = threading.Thread(target=self._write, name="narrator", daemon=True)
         self._writer.start()
@@ -48,9 +48,12 @@ class Narrator:
         self._waiting.put(said)
         return said.wait(patience_s)
 
+    def end(self) -> None:
+        """Nothing more will be said."""
+        self._waiting.put(None)
+
     def _write(self) -> None:
-        while True:
-            piece = self._waiting.get()
+        while (piece := self._waiting.get()) is not None:
             if isinstance(piece, threading.Event):
                 piece.set()
                 continue

@@ -110,6 +110,7 @@ class Console:
         finally:
             if narrator.has_said_all(_PATIENCE_S):
                 self._live.narrator = None
+                narrator.end()
 
     @property
     def watched(self) -> bool:

@@ -19,13 +19,15 @@ from __future__ import annotations
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    import asyncio
+
     from daq.control import SessionControl
 
-__all__ = ["listening"]
+__all__ = ["ending_on_signals", "listening"]
 
 
 @contextmanager
@@ -52,6 +54,26 @@ def listening(control: SessionControl, told: Callable[[str], None]) -> Iterator[
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def ending_on_signals(loop: asyncio.AbstractEventLoop, end: Callable[[], None]) -> None:
+    """Let signals that end a program end one that draws a screen; nothing outside the main thread.
+
+    Parameters
+    ----------
+    loop
+        Of the screen, which runs.
+    end
+        Called in it, with every such signal.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        return
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        with suppress(AttributeError, NotImplementedError, RuntimeError, ValueError):
+            loop.add_signal_handler(getattr(signal, name), end)
+    if hasattr(signal, "SIGTSTP"):
+        # A halted program would leave the source driving.
+        signal.signal(signal.SIGTSTP, signal.SIG_IGN)
 
 
 def _handlers(control: SessionControl, told: Callable[[str], None]) -> dict[str, Any]:

@@ -41,7 +41,6 @@ class Recorder:
         The wire; closed with the recorder.
     path
         New file; an existing one is refused, since a transcript is evidence.
-
     fault
         Where to say that the file takes no more: the dialogue goes on without it, as a source that
         drives must be made safe over it.

@@ -9,6 +9,7 @@ from screen import run as run_screen
 
 from daq.configs import config_path
 from daq.errors import ConfigurationError, InputError
+from daq.plan import SweepPlan
 from daq.store import Store
 from sim.unit import load_unit
 from tui.app.desk import Desk
@@ -91,6 +92,14 @@ def test_going_on_keeps_who_began_and_refuses_another_serial_number(measured, db
     assert desk.request().resume == 1
     desk.serial = "8"
     with pytest.raises(InputError, match="serial '8' was given and it has '7'"):
+        desk.request()
+
+
+def test_a_proposed_plan_that_the_analyser_cannot_be_set_to_is_refused(db):
+    desk = Desk(db)
+    desk.choose_unit("adss")
+    desk.given_plan = SweepPlan((100.0, 100.01, 110.0), (2.0,))
+    with pytest.raises(InputError, match="100 and 100.01 Hz would both be measured at 100 Hz"):
         desk.request()
 
 

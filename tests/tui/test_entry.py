@@ -38,9 +38,10 @@ def test_it_hands_on_to_the_command_line(monkeypatch):
     [("2>&-", 0, ""), ("<&-", 0, ""), (">&-", 1, "error: there is no stdout to write")],
 )
 def test_streams_that_the_caller_closed(closed, code, said):
-    words = "dry --unit adss --instrument sim: --level 2 --start 100 --stop 110 --points 3"
+    words = "measure --dry-run --json --unit adss --instrument sim: --level 2"
+    words += " --start 100 --stop 110 --points 3"
     program = "from tui.entry import main; raise SystemExit(main())"
-    line = f'"{sys.executable}" -c "{program}" {words.replace("dry", "measure --dry-run --json")}'
+    line = f'"{sys.executable}" -c "{program}" {words}'
     run = subprocess.run(
         ["/bin/sh", "-c", f"{line} {closed}"], capture_output=True, text=True, check=False
     )

@@ -92,6 +92,9 @@ def test_what_is_said_is_written_in_order_and_what_is_fleeting_may_be_left_out(s
         for number in range(_AHEAD):
             narrator.say(f"{number}\n")
         assert narrator.has_said_all(5.0)
+        narrator.end()
+        narrator._writer.join(5.0)
+        assert not narrator._writer.is_alive()
     with os.fdopen(reading) as written:
         assert written.read().split() == [str(number) for number in range(_AHEAD)]
     with os.fdopen(os.dup(stalled), "w") as stream:

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import signal
-import threading
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import partial
@@ -37,6 +35,7 @@ from tui.app.session_keeper import SessionKeeper
 from tui.app.step_screen import STEPS, StepScreen
 from tui.app.style import STYLE
 from tui.entry import INTERRUPTED
+from tui.signals import ending_on_signals
 
 if TYPE_CHECKING:
     from daq.store_records import Measurement
@@ -241,15 +240,8 @@ class BenchApp(App[int]):
         self._close_messages_no_wait()
 
     def _listen_to_signals(self) -> None:
-        if self.is_headless or threading.current_thread() is not threading.main_thread():
-            return
-        loop = asyncio.get_running_loop()
-        for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-            with suppress(AttributeError, NotImplementedError, RuntimeError, ValueError):
-                loop.add_signal_handler(getattr(signal, name), self._end_at_once)
-        if hasattr(signal, "SIGTSTP"):
-            # A halted program would leave the source driving.
-            signal.signal(signal.SIGTSTP, signal.SIG_IGN)
+        if not self.is_headless:
+            ending_on_signals(asyncio.get_running_loop(), self._end_at_once)
 
     # ------------------------------------------------------------ sessions
 

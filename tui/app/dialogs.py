@@ -44,7 +44,7 @@ class ErrorDialog(Dialog):
 
     BINDINGS = [
         Binding("enter", "answer(True)", "Close", priority=True),
-        Binding("c", "copy", "Copy"),
+        Binding("c,C", "copy", "Copy"),
     ]
 
     def __init__(self, title: str, text: str) -> None:

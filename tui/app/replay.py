@@ -47,8 +47,8 @@ class ReplayApp(App[int]):
         Binding("minus", "slower", "Slower", key_display="-"),
         Binding("full_stop", "jump(1)", "Forward", key_display="."),
         Binding("comma", "jump(-1)", "Back", key_display=","),
-        Binding("e", "end", "End"),
-        Binding("q", "quit", "Quit"),
+        Binding("e,E", "end", "End"),
+        Binding("q,Q", "quit", "Quit"),
     ]
 
     def __init__(self, recording: Recording, speed: float = 1.0) -> None:
