@@ -78,7 +78,7 @@ def test_the_replay_plays_pauses_and_ends(history):
             assert app.speed == pytest.approx(4e-3)
             await pilot.pause(0.3)
             assert app.at_s == held_s
-            await pilot.press("space", "e")
+            await pilot.press("space", "E")
             screen = text_of(app)
             assert ", 9 points" in screen
             assert "END" in screen

@@ -98,8 +98,8 @@ def test_going_on_keeps_who_began_and_refuses_another_serial_number(measured, db
 def test_a_proposed_plan_that_the_analyser_cannot_be_set_to_is_refused(db):
     desk = Desk(db)
     desk.choose_unit("adss")
-    desk.given_plan = SweepPlan((100.0, 100.01, 110.0), (2.0,))
-    with pytest.raises(InputError, match="100 and 100.01 Hz would both be measured at 100 Hz"):
+    desk.given_plan = SweepPlan((100.0, 100.005, 110.0), (2.0,))
+    with pytest.raises(InputError, match="100 and 100.005 Hz would both be measured at 100 Hz"):
         desk.request()
 
 
