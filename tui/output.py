@@ -23,7 +23,7 @@ from daq.errors import LashbenchError
 from tui.narrator import Narrator
 from tui.pace import Pace, duration
 
-__all__ = ["Console", "Injected", "as_json", "hush"]
+__all__ = ["Console", "Injected", "as_json", "hush", "readers_may_leave"]
 
 _LOG = logging.getLogger("lashbench.console")
 
@@ -198,6 +198,18 @@ def hush(stream: TextIO) -> None:
     """Send what is left for a stream nowhere: Python would complain of it once more at its end."""
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+@contextmanager
+def readers_may_leave() -> Iterator[None]:
+    """Print where the exit code says something, too: it counts, whether or not all was read.
+
+    Elsewhere a reader who has seen enough ends a verb, and that is no failure (`tui.cli`).
+    """
+    try:
+        yield
+    except BrokenPipeError:
+        hush(sys.stdout)
 
 
 def as_json(content: Mapping[str, Any]) -> str:

@@ -1,8 +1,10 @@
 """The verb diagnose: what it refuses, what it hands on, and a cause hidden behind the analyser."""
 
 import json
+import os
 import re
 import shlex
+import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -134,6 +136,21 @@ def test_a_figure_that_cannot_be_made_does_not_cost_the_answer(
     told = capsys.readouterr()
     assert json.loads(told.out) == {"verdict": "consistent"}
     assert told.err.splitlines()[-1].startswith("error: a.png: could not be written")
+
+
+def test_who_reads_no_answer_may_still_want_its_figures(calls, capfd, monkeypatch, tmp_path):
+    import analysis.diagnosis_figures
+
+    reading, writing = os.pipe()
+    os.close(reading)
+    monkeypatch.setattr(
+        analysis.diagnosis_figures, "draw_diagnosis", lambda result, folder: [folder / "a.png"]
+    )
+    with os.fdopen(writing, "w") as nobody, monkeypatch.context() as patch:
+        patch.setattr(sys, "stdout", nobody)
+        words = ["diagnose", SWEEP, "--unit", "adss", "--plots", str(tmp_path / "out")]
+        assert main(words) == 0
+    assert "a.png" in capfd.readouterr().err
 
 
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="no folder that nobody may fill")

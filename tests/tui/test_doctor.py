@@ -1,7 +1,11 @@
 """The doctor: every check with its failing case made to happen, and the remedy it then names."""
 
 import json
+import os
 import re
+import shlex
+import shutil
+import subprocess
 import sys
 from importlib import metadata
 from types import SimpleNamespace
@@ -44,6 +48,25 @@ def test_the_exit_code_tells_a_failure_from_a_note(told, capsys):
     out = capsys.readouterr().out
     assert "FAIL  c: broken\n      -> mend c\n" in out
     assert out.endswith("\n2 to mend\n")
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash, which tells each exit code")
+@pytest.mark.parametrize(("words", "reader"), [("", "head -n 1"), ("", "true"), ("--json", "true")])
+def test_who_reads_a_line_or_none_does_not_hide_that_something_failed(tmp_path, words, reader):
+    """Through a real pipe: who is gone before the first line, and who leaves after it."""
+    (tmp_path / "file").write_text("")
+    lashbench = f"{shlex.quote(sys.executable)} -m tui.cli"
+    said = subprocess.run(
+        ["bash", "-c", f"{lashbench} doctor {words} | {reader} > read; echo ${{PIPESTATUS[0]}}"],
+        env=os.environ | {"XDG_DATA_HOME": str(tmp_path / "file")},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=120.0,
+    )
+    # No history can be made in a file. The interpreter does not complain of the pipe, either.
+    assert (said.stdout, said.stderr) == ("1\n", "")
+    assert len((tmp_path / "read").read_text().splitlines()) == (reader != "true")
 
 
 def test_json_is_one_document_with_every_remedy(told, capsys):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from daq.errors import InputError
 from tui.executors import executor_at
 from tui.options import Cluster, Json, Plots, UnitName, prepare_directory
-from tui.output import Console, Injected
+from tui.output import Console, Injected, readers_may_leave
 from tui.places import cache_folder
 
 if TYPE_CHECKING:
@@ -105,7 +105,9 @@ def _proposing(result: Diagnosis, unit: str) -> Diagnosis:
 
 def _tell(result: Diagnosis | PaperDiagnosis, json: bool, console: Console) -> None:
     """The answer itself, before any picture of it: that may fail, and must not cost it."""
-    if json:
-        console.document(result.to_json())
-    else:
-        console.data("\n".join(result.summary()))
+    # Who reads no more of it may still want the pictures.
+    with readers_may_leave():
+        if json:
+            console.document(result.to_json())
+        else:
+            console.data("\n".join(result.summary()))

@@ -15,7 +15,7 @@ from tui.checkup.self_test import check_itself
 from tui.checkup.software import check_engine, check_packages, check_python
 from tui.checkup.surroundings import check_folders, check_terminal
 from tui.options import Json
-from tui.output import Console, Injected
+from tui.output import Console, Injected, readers_may_leave
 
 __all__ = ["CHECKS", "doctor"]
 
@@ -44,13 +44,16 @@ def doctor(*, json: Json = False, console: Injected) -> int:
     for finding in examine(_announced(console)):
         findings.append(finding)
         if not json:
-            console.data(_line(finding))
+            # The verdict is on all of it, however much of it is read.
+            with readers_may_leave():
+                console.data(_line(finding))
     failed = sum(finding.state == "failed" for finding in findings)
-    if json:
-        checks = [asdict(finding) for finding in findings]
-        console.document({"ok": not failed, "failed": failed, "checks": checks})
-    else:
-        console.data(f"\n{failed} to mend" if failed else "\nall that is needed is there")
+    with readers_may_leave():
+        if json:
+            checks = [asdict(finding) for finding in findings]
+            console.document({"ok": not failed, "failed": failed, "checks": checks})
+        else:
+            console.data(f"\n{failed} to mend" if failed else "\nall that is needed is there")
     return 1 if failed else 0
 
 

@@ -20,7 +20,7 @@ from daq.errors import InputError, LashbenchError, MeasurementError
 from tui.entry import INTERRUPTED
 from tui.measure_options import PlanOptions, read_band, session_request
 from tui.options import Json, Real, UnitName, Whole
-from tui.output import Console, Injected, hush
+from tui.output import Console, Injected, readers_may_leave
 from tui.places import history_path
 
 if TYPE_CHECKING:
@@ -259,10 +259,8 @@ def _decibels(gain: complex) -> str:
 
 def _report(finished: Finished, json: bool, console: Console, again: str) -> None:
     """Say how it ended; who reads no more must not keep the error and the exit code back."""
-    try:
+    with readers_may_leave():
         _say_how_it_ended(finished, json, console, again)
-    except BrokenPipeError:
-        hush(sys.stdout)
 
 
 def _say_how_it_ended(finished: Finished, json: bool, console: Console, again: str) -> None:
