@@ -150,7 +150,7 @@ def observe(*responses: FrequencyResponse) -> Observation:
         If one holds no usable point, or does not know a source level.
     InputError
         If one states a DC offset that is no voltage, a sweep that lasts too long, or voltages that
-        no bench has.
+        no bench has, or holds a frequency twice at one level.
     """
     swept = [level for number, one in enumerate(responses) for level in _levels(number, one)]
     # Levels that are alike keep their order: sweeps stay as they were given.
@@ -227,10 +227,23 @@ def _levels(number: int, response: FrequencyResponse) -> Iterator[_Level]:
     least_v = np.sqrt(2.0) * LEAST_NOISE * np.max(np.abs(kept.gain) * kept.source_vpk)
     for source_vpk in kept.levels_vpk:
         readings = kept.at_level(source_vpk)
+        _refuse_repeated(readings.frequency_hz, source_vpk)
         scatter = readings.gain_std_db / DB_PER_NEPER * np.sqrt(2.0 / _components(response))
         least = least_v / (np.abs(readings.gain) * readings.source_vpk)
         scatter = np.where(scatter > 0, np.maximum(scatter, least), scatter)
         yield _Level(number, float(source_vpk), readings, scatter)
+
+
+def _refuse_repeated(frequency_hz: NDArray[np.float64], source_vpk: float) -> None:
+    """A file may keep two readings of one frequency; simulations go there once a sweep."""
+    twice = np.unique(frequency_hz[1:][np.diff(frequency_hz) == 0.0])
+    if twice.size:
+        such = f", one of {twice.size} such frequencies" if twice.size > 1 else ""
+        raise InputError(
+            f"the response holds {twice[0]:.9g} Hz more than once at source level {source_vpk:g} V"
+            f"{such}, and a sweep is simulated with each once; leave one row of it in a CSV "
+            "(lashbench export writes a stored measurement as one)"
+        )
 
 
 def _components(response: FrequencyResponse) -> int:

@@ -1,5 +1,7 @@
 """Channels of comparison: what is kept of a response, and what a simulation is made to show."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -107,6 +109,20 @@ def test_a_sweep_without_end_is_refused(slip):
 def test_voltages_that_no_bench_has_are_refused(slip, said):
     with pytest.raises(InputError, match=said):
         observe(response(**slip))
+
+
+def test_two_readings_of_one_frequency_are_named_by_frequency_and_level():
+    twice = response(frequencies=(100.0, 110.015625, 110.015625))
+    said = r"holds 110\.015625 Hz more than once at source level 1\.5 V, .*; leave one row of it"
+    with pytest.raises(InputError, match=said):
+        observe(twice)
+    with pytest.raises(InputError, match=r" 100 Hz .* 2\.5 V, one of 2 such frequencies, "):
+        observe(response((2.5,), (100.0, 100.0, 110.0, 110.0, 110.0)))
+    # Either of them will do; one that is spoilt is out already, and another sweep is no repetition.
+    for flags in ([0, 0, PointFlag.SPOILT] * 2, [0, PointFlag.SPOILT, 0] * 2):
+        ((plan, _),) = observe(replace(twice, flags=np.array(flags))).plans
+        assert plan.frequencies_hz == (100.0, 110.015625)
+    assert len(observe(response(), response(gain=0.2))) == 12
 
 
 def test_voltages_up_to_a_kilovolt_are_not():
