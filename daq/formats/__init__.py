@@ -12,6 +12,7 @@ from importlib import import_module
 from pathlib import Path
 
 from daq.errors import FileFormatError, InputError
+from daq.formats.believable import disbelief
 from daq.frf import FrequencyResponse
 
 __all__ = ["READABLE", "WRITABLE", "check_writable", "read_response", "write_response"]
@@ -44,9 +45,11 @@ def read_response(path: str | Path) -> FrequencyResponse:
     """
     response: FrequencyResponse = import_module(_module(path, READABLE, "read")).read(Path(path))
     try:
-        _ = response.dc_offset_v
+        found = disbelief("dc_offset_v", [response.dc_offset_v])
     except InputError as error:
         raise FileFormatError(f"{path}: {error}") from error
+    if found is not None:
+        raise FileFormatError(f"{path}: {found[1]}")
     return response
 
 

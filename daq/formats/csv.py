@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 from daq.bounded_text import parse_toml, read_bytes
 from daq.errors import FileFormatError, InputError
 from daq.formats.atomic import write_text
+from daq.formats.believable import disbelief
 from daq.formats.csv_columns import EXTRA_KEYS, extra_columns, extra_comments
 from daq.formats.toml import toml_key, toml_value
 from daq.frf import FrequencyResponse, PointFlag
@@ -101,10 +102,7 @@ def read(path: Path) -> FrequencyResponse:
     _check_order(table, procedure["direction"])
     phase = table["phase_deg"]
     known = np.isfinite(phase)
-    with np.errstate(over="ignore", under="ignore"):
-        magnitude = 10.0 ** (table["gain_db"] / 20.0)
-    for row in np.flatnonzero(~np.isfinite(magnitude) | (magnitude == 0.0)):
-        _refuse(table, row, f"gain_db {table['gain_db'][row]:g} is beyond any instrument")
+    magnitude = 10.0 ** (table["gain_db"] / 20.0)
     angle = np.radians(np.where(known, phase, 0.0))
     provenance = {k: v for k, v in table.comments.items() if k not in _PROCEDURE}
     if "spoilt_points" in table.comments:
@@ -151,8 +149,10 @@ def write(response: FrequencyResponse, path: Path) -> None:
         raise InputError(f"{path}: the provenance cannot be written ({error})") from error
     lines.append(",".join(COLUMNS))
     table = _Table(path, comments, tuple(len(lines) + 1 + row for row in range(len(kept))), columns)
+    # What would be refused when it is read is not written.
     _check_values(table)
     _check_order(table, kept.direction)
+    extra_columns(comments, len(kept), path)
     lines += [",".join(_cell(value) for value in row) for row in columns.tolist()]
     write_text(path, "\n".join(lines) + "\n")
 
@@ -348,6 +348,10 @@ def _check_values(table: _Table) -> None:
     for row in np.flatnonzero(table["gain_std_db"] < 0.0):
         value = table["gain_std_db"][row]
         _refuse(table, row, f"gain_std_db {value:g} is negative; give 0 or more, or nothing")
+    for name in COLUMNS:
+        found = disbelief(name, table[name])
+        if found is not None:
+            _refuse(table, *found)
 
 
 def _check_order(table: _Table, direction: str | None) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.errors import FileFormatError
+from daq.formats.believable import disbelief
 from daq.frf import FrequencyResponse
 
 __all__ = ["EXTRA_KEYS", "extra_columns", "extra_comments"]
@@ -44,7 +45,7 @@ def extra_columns(comments: Mapping[str, Any], rows: int, path: Path) -> dict[st
     Raises
     ------
     FileFormatError
-        If a key holds anything but one number (or pair) per row.
+        If a key holds anything but one number (or pair) per row, or one that cannot be.
     """
     columns: dict[str, Any] = {}
     for key, (name, is_complex) in _COLUMNS.items():
@@ -52,6 +53,9 @@ def extra_columns(comments: Mapping[str, Any], rows: int, path: Path) -> dict[st
             shape = (rows, 2) if is_complex else (rows,)
             values = _numbers(comments[key], shape, key, path)
             columns[name] = values.view(complex)[:, 0] if is_complex else values
+            found = disbelief(key, columns[name])
+            if found is not None:
+                raise FileFormatError(f"{path}: row {found[0] + 1}: {found[1]}")
     return columns
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.errors import FileFormatError
+from daq.formats.believable import check_reading
 from daq.formats.record import checked_file
 from daq.frf import FrequencyResponse, PointFlag
 
@@ -61,7 +62,7 @@ def read(path: Path) -> FrequencyResponse:
     if not (np.all(np.isfinite(gain)) and np.all(np.isfinite(frequency) & (frequency > 0))):
         raise FileFormatError(f"{path}: holds values that are no readings; give {_KIND}")
     overloaded = any(channel["overloaded"] for channel in channels)
-    return FrequencyResponse.from_arrays(
+    response = FrequencyResponse.from_arrays(
         frequency,
         math.nan,
         gain,
@@ -69,6 +70,8 @@ def read(path: Path) -> FrequencyResponse:
         flags=int(PointFlag.OVERLOAD) if overloaded else 0,
         provenance=_provenance(header, trace, channels, path),
     )
+    check_reading(response, path)
+    return response
 
 
 def _header(path: Path) -> Mapping[str, Any]:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from daq.bounded_text import parse_json
 from daq.errors import FileFormatError
 from daq.formats.atomic import write_text
+from daq.formats.believable import check_reading
 from daq.formats.record import ARRAYS, ROW_LIMIT, checked_file, response_from, taken_apart
 from daq.formats.uff_sets import GENERAL, RESPONSE, data_sets, function, private
 from daq.frf import FrequencyResponse
@@ -188,7 +189,7 @@ def _foreign(functions: list[Mapping[str, Any]], path: Path) -> FrequencyRespons
     ):
         raise FileFormatError(f"{path}: holds values that are no readings; give {_KIND}")
     titles = [title for title in (parts[0]["id1"].strip(),) if title not in ("", "NONE")]
-    return FrequencyResponse.from_arrays(
+    response = FrequencyResponse.from_arrays(
         frequency,
         np.repeat(levels, [len(found["x"]) for found in parts]),
         gain,
@@ -196,6 +197,8 @@ def _foreign(functions: list[Mapping[str, Any]], path: Path) -> FrequencyRespons
         phase_known=known,
         provenance={"kind": "measured", "file": path.name, "title": " ".join(titles)},
     )
+    check_reading(response, path)
+    return response
 
 
 def _levels(response: FrequencyResponse) -> list[float]:
