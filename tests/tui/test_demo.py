@@ -3,6 +3,7 @@
 import json
 import os
 import pty
+import shlex
 import subprocess
 import sys
 
@@ -125,9 +126,12 @@ def test_a_surprise_is_another_one_and_the_same_for_its_seed(quick, tmp_path, ca
     quick("load-inertia")
     results = []
     for seed in ("4", "4", "5"):
-        words = ["demo", "--surprise", "--seed", seed, "--json", "--out", str(tmp_path)]
+        words = ["demo", "--surprise", "--seed", seed, "--json", "--out", str(tmp_path / "a b")]
         assert main(words) == 0
-        results.append(json.loads(capsys.readouterr().out))
+        text, told = capsys.readouterr()
+        results.append(json.loads(text))
+        (line,) = (one for one in told.splitlines() if one.startswith("The same once more: "))
+        assert shlex.split(line.partition(": ")[2]) == ["lashbench", *words[:4], *words[5:]]
     same, again, other = (result["hidden"] for result in results)
     assert same == again != other
     assert results[0]["guess"] is None

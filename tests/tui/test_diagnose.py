@@ -101,8 +101,9 @@ def test_a_response_of_another_unit_is_said_to_be_one(calls, capsys):
     assert "warning" not in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("asked", ["response", "paper"])
 def test_the_command_that_is_proposed_finds_a_unit_by_its_path(
-    calls, capsys, monkeypatch, tmp_path
+    calls, capsys, monkeypatch, tmp_path, asked
 ):
     @dataclass
     class Proposing(Told):
@@ -112,12 +113,12 @@ def test_the_command_that_is_proposed_finds_a_unit_by_its_path(
             return [self.next_measurement.command]
 
     proposal = NextMeasurement("ADSS", SweepPlan((100.0, 120.0), (1.0,)), ("a", "b"), 3.0)
-    monkeypatch.setattr(
-        "analysis.diagnosis.diagnose_response", lambda *_, **__: Proposing(proposal)
-    )
+    for diagnosing in ("diagnosis.diagnose_response", "paper_diagnosis.diagnose_paper"):
+        monkeypatch.setattr(f"analysis.{diagnosing}", lambda *_, **__: Proposing(proposal))
     own = tmp_path / "my gimbal.toml"
     own.write_text(config_path("units", "adss").read_text(encoding="utf-8"), encoding="utf-8")
-    assert main(["diagnose", SWEEP, "--unit", str(own)]) == 0
+    measured = SWEEP if asked == "response" else "--paper"
+    assert main(["diagnose", measured, "--unit", str(own)]) == 0
     words = shlex.split(capsys.readouterr().out)
     assert words[words.index("--unit") + 1] == str(own)
 

@@ -84,6 +84,21 @@ def test_json_is_one_document_with_every_remedy(told, capsys):
     }
 
 
+def test_what_is_to_be_installed_can_be_pasted_where_python_lies_in_a_folder_with_a_space(
+    monkeypatch,
+):
+    python = "/home/a b/.venv/bin/python"
+    monkeypatch.setattr(sys, "executable", python)
+    monkeypatch.setattr(software.metadata, "requires", lambda _: ["no-such-package>=1"])
+    (finding,) = software.check_packages()
+    words = [python, "-m", "pip", "install", "no-such-package>=1"]
+    assert shlex.split(finding.remedy) == words
+    # Where it lies in none, nothing is quoted but what has to be.
+    monkeypatch.setattr(sys, "executable", "/usr/bin/python3")
+    (finding,) = software.check_packages()
+    assert finding.remedy == "/usr/bin/python3 -m pip install 'no-such-package>=1'"
+
+
 def test_this_installation_is_well(capsys):
     assert main(["doctor", "--json"]) == 0, capsys.readouterr()
     checks = {line["name"]: line for line in json.loads(capsys.readouterr().out)["checks"]}

@@ -45,6 +45,32 @@ def test_what_is_said_to_go_on_with_goes_on(run, db, monkeypatch):
         assert store.measurement(1).state == "complete"
 
 
+def test_it_goes_on_with_the_unit_bench_and_recipe_that_it_was_begun_with(
+    run, db, monkeypatch, tmp_path
+):
+    """Files of one's own are found by their paths, and their limits hold to the end."""
+    own = {}
+    for kind, name in (("units", "adss"), ("benches", "default"), ("recipes", "adss")):
+        own[kind] = tmp_path / f"my {kind}.toml"
+        own[kind].write_text(config_path(kind, name).read_text(encoding="utf-8"))
+    files = ["--bench", str(own["benches"]), "--recipe", str(own["recipes"])]
+    with monkeypatch.context() as patch:
+        at_point(patch, 2, lambda: signal.raise_signal(signal.SIGTERM))
+        _, _, err = run(*measuring(*files, unit=str(own["units"])))
+    (line,) = (line for line in err.splitlines() if line.startswith("go on with: lashbench "))
+    words = shlex.split(line)[4:]
+    assert [words[words.index(option) + 1] for option in ("--unit", "--bench", "--recipe")] == [
+        str(own[kind]) for kind in ("units", "benches", "recipes")
+    ]
+    text = own["benches"].read_text()
+    own["benches"].write_text(re.sub(r"(?m)^source_vpk = .*", "source_vpk = 0.1", text))
+    assert run(*words, history=False)[0] == 5
+    own["benches"].write_text(text)
+    assert run(*words, history=False)[0] == 0
+    with Store(db) as store:
+        assert store.measurement(1).state == "complete"
+
+
 def test_ctrl_backslash_aborts_for_good(run, monkeypatch):
     with monkeypatch.context() as patch:
         at_point(patch, 2, lambda: signal.raise_signal(signal.SIGQUIT))

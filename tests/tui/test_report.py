@@ -1,16 +1,21 @@
 """The verb report: files and stored measurements, with and without a diagnosis."""
 
+import html
 import json
 import re
+import shlex
 import threading
+from dataclasses import replace
 
 import pytest
 import report_makings as makings
 
 import analysis.diagnosis
 import analysis.estimate
-from daq.configs import sample_path
+from analysis.next_measurement import NextMeasurement
+from daq.configs import config_path, sample_path
 from daq.errors import AnalysisError
+from daq.plan import SweepPlan
 from daq.store import Store
 from sim.unit import load_unit
 from tui import cli
@@ -93,6 +98,28 @@ def test_a_diagnosis_stands_in_the_report(found, calls, monkeypatch, tmp_path):
     out = tmp_path / "r.html"
     assert cli.main(["report", SAMPLE, "--unit", "adss", "--out", str(out)]) == 0
     assert data_of(out)["diagnosis"]["verdict"] == "explained"
+
+
+def test_the_command_on_a_report_finds_a_unit_by_its_path(
+    found, calls, monkeypatch, tmp_path, capsys
+):
+    plan = SweepPlan((100.0, 120.0), (1.0,), settle_cycles=3, integrate_cycles=4)
+    # The name of the unit is that of one that comes with lashbench, and would pass for it.
+    proposal = NextMeasurement("ADSS", plan, ("a", "b"), 3.0)
+    proposing = replace(found, next_measurement=proposal)
+    monkeypatch.setattr(analysis.diagnosis, "diagnose_response", lambda *_, **__: proposing)
+    own = tmp_path / "my gimbal's.toml"
+    own.write_text(config_path("units", "adss").read_text(encoding="utf-8"), encoding="utf-8")
+    out = tmp_path / "r.html"
+    assert cli.main(["report", SAMPLE, "--unit", str(own), "--out", str(out)]) == 0
+    command = data_of(out)["diagnosis"]["next_measurement"]["plan"]["command"]
+    (shown,) = re.findall(r"<code>(lashbench .*?)</code>", out.read_text())
+    assert html.unescape(shown) == command
+    words = shlex.split(command)
+    assert words[words.index("--unit") + 1] == str(own)
+    words[words.index("URL")] = "sim:"
+    assert cli.main([*words[1:], "--dry-run"]) == 0
+    assert "2 points" in capsys.readouterr().out
 
 
 def test_a_report_on_a_stored_measurement(calls, bench, tmp_path):

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from tui.checkup.finding import Finding, failed, noted, passed
+from tui.pasted import pip_install
 
 __all__ = ["check_serial_ports", "check_visa"]
 
@@ -87,7 +88,7 @@ def check_visa() -> Iterator[Finding]:
         pyvisa.ResourceManager("@py").close()
     # PyVISA raises ValueError, OSError or what a broken library raises.
     except Exception as error:
-        remedy = f"{sys.executable} -m pip install --force-reinstall pyvisa-py"
+        remedy = pip_install("--force-reinstall", "pyvisa-py")
         yield failed("VISA on a LAN", f"no back end: {' '.join(str(error).split())}", remedy)
     else:
         yield passed("VISA on a LAN", f"PyVISA {pyvisa.__version__} with pyvisa-py")

@@ -15,6 +15,7 @@ from importlib import import_module, metadata
 from pathlib import Path
 
 from tui.checkup.finding import Finding, failed, noted, passed
+from tui.pasted import pip_install
 
 __all__ = ["check_engine", "check_packages", "check_python", "satisfies"]
 
@@ -44,7 +45,7 @@ def check_packages() -> Iterator[Finding]:
         yield passed("packages", ", ".join(sound))
     for name, fault in faults.items():
         spec = f"{name}{wanted[name]}"
-        yield failed(f"package {name}", fault, f"{sys.executable} -m pip install '{spec}'")
+        yield failed(f"package {name}", fault, pip_install(spec))
 
 
 def check_engine() -> Iterator[Finding]:

@@ -17,6 +17,7 @@ from daq.errors import InputError
 from tui.entry import INTERRUPTED
 from tui.options import Json, Whole, prepare_directory
 from tui.output import Console, Injected
+from tui.pasted import pasted
 from tui.places import cache_folder
 
 if TYPE_CHECKING:
@@ -75,7 +76,8 @@ def demo(
     tell(f"\nThe report is {(out / 'report.html').resolve()}")
     tell(f"History, response and figures are in {out}/.")
     if surprise:
-        tell(f"The same once more: lashbench demo --surprise --seed {hidden.seed}")
+        again = ["lashbench", "demo", "--surprise", "--seed", str(hidden.seed), "--out", str(out)]
+        tell(f"The same once more: {pasted(again)}")
     console.note(f"done in {document['elapsed_s']:.0f} s")
     return 0
 

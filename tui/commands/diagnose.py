@@ -5,7 +5,6 @@ Owns the options of the verb. The diagnosis is the analysis's.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +12,7 @@ from daq.errors import InputError
 from tui.executors import executor_at
 from tui.options import Cluster, Json, Plots, UnitName, prepare_directory
 from tui.output import Console, Injected, readers_may_leave
+from tui.pasted import proposing
 from tui.places import cache_folder
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def diagnose(
     if plots is not None:
         prepare_directory(plots)
     if file is None:
-        _diagnose_paper(subject, plots, json, console)
+        _diagnose_paper(subject, unit, plots, json, console)
         return
     from daq.formats import read_response
 
@@ -77,7 +77,7 @@ def diagnose(
             response, subject, further=others, cache=cache_folder(), executor=executor,
             progress=console.progress,
         )  # fmt: skip
-    _tell(_proposing(result, unit), json, console)
+    _tell(proposing(result, unit), json, console)
     if plots is not None:
         from analysis.diagnosis_figures import draw_diagnosis
 
@@ -85,22 +85,16 @@ def diagnose(
             console.note(f"wrote {path}")
 
 
-def _diagnose_paper(unit: Unit, plots: Path | None, json: bool, console: Console) -> None:
+def _diagnose_paper(
+    subject: Unit, unit: str, plots: Path | None, json: bool, console: Console
+) -> None:
     from analysis.paper_diagnosis import diagnose_paper
 
-    result = diagnose_paper(unit, progress=console.progress)
-    _tell(result, json, console)
+    result = diagnose_paper(subject, progress=console.progress)
+    _tell(proposing(result, unit), json, console)
     if plots is not None:
         for path in result.plot(plots):
             console.note(f"wrote {path}")
-
-
-def _proposing(result: Diagnosis, unit: str) -> Diagnosis:
-    """With the unit as it was given in the proposed command: a file is found by its path alone."""
-    proposal = result.next_measurement
-    if proposal is None:
-        return result
-    return replace(result, next_measurement=replace(proposal, unit=unit))
 
 
 def _tell(result: Diagnosis | PaperDiagnosis, json: bool, console: Console) -> None:

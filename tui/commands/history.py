@@ -75,7 +75,7 @@ def history(
     if json:
         console.document({"measurements": rows, "trends": trends})
     elif not rows:
-        console.data("no measurements; make one with: lashbench measure")
+        console.data("no measurements; lashbench measure --help says how to make one")
     else:
         console.data("\n".join([_table(rows), *_pictures(rows), *trend_lines(trends)]))
 

@@ -7,7 +7,6 @@ exit code. The session itself, and that it ends safe, is the engine's.
 from __future__ import annotations
 
 import math
-import shlex
 import sys
 from contextlib import closing, suppress
 from dataclasses import asdict
@@ -21,6 +20,7 @@ from tui.entry import INTERRUPTED
 from tui.measure_options import PlanOptions, read_band, session_request
 from tui.options import Json, Real, UnitName, Whole
 from tui.output import Console, Injected, readers_may_leave
+from tui.pasted import pasted
 from tui.places import history_path
 
 if TYPE_CHECKING:
@@ -134,7 +134,10 @@ def measure(
     _confirm(instrument, request, db, yes)
     again = ["lashbench", "measure", "--unit", unit, "--instrument", instrument]
     again += ["--db", str(db)] if is_given else []
-    return _run(instrument, subject, db, request, transcript, json, console, shlex.join(again))
+    # Their limits, slew and ranges hold for what is left, too.
+    again += [] if bench == "default" else ["--bench", bench]
+    again += [] if recipe is None else ["--recipe", recipe]
+    return _run(instrument, subject, db, request, transcript, json, console, pasted(again))
 
 
 def _show_plan(request: SessionRequest, db: Path, json: bool, console: Console) -> None:

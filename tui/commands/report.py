@@ -15,9 +15,11 @@ from cyclopts import Parameter
 from daq.errors import InputError, LashbenchError
 from tui.options import UnitName
 from tui.output import Console, Injected
+from tui.pasted import proposing
 from tui.places import cache_folder, history_path
 
 if TYPE_CHECKING:
+    from analysis.diagnosis import Diagnosis
     from analysis.report_data import Origin
     from daq.frf import FrequencyResponse
     from sim.unit import Unit
@@ -77,6 +79,8 @@ def report(
     if estimate is None:
         estimate = _estimate(response, subject, remarks, console)
     diagnosis = _diagnose(response, subject, remarks, console) if diagnose else None
+    if diagnosis is not None:
+        diagnosis = proposing(diagnosis, unit)
     if not diagnose:
         remarks["diagnosis"] = "No diagnosis was made: it was left out on request."
     from analysis.report import write_report
@@ -129,7 +133,7 @@ def _estimate(
 
 def _diagnose(
     response: FrequencyResponse, unit: Unit, remarks: dict[str, str], console: Console
-) -> Any:
+) -> Diagnosis | None:
     from analysis.diagnosis import diagnose_response
 
     console.note("diagnosing")
