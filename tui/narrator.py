@@ -37,10 +37,17 @@ class Narrator:
         self._writer = threading.Thread(target=self._write, name="narrator", daemon=True)
         self._writer.start()
 
-    def say(self, text: str, fleeting: bool = False) -> None:
-        """Have something written; what is `fleeting` only while little else waits."""
-        if not fleeting or self._waiting.qsize() < _AHEAD:
-            self._waiting.put(text.encode(self._encoding, "replace"))
+    def say(self, text: str, fleeting: bool = False) -> bool:
+        """Have something written, `fleeting` only while little else waits; whether it will be."""
+        if fleeting and self._waiting.qsize() >= _AHEAD:
+            return False
+        self._waiting.put(text.encode(self._encoding, "replace"))
+        return True
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether something waits to be written."""
+        return not self._waiting.empty()
 
     def has_said_all(self, patience_s: float) -> bool:
         """Whether all was written, in so long at most."""

@@ -1,8 +1,9 @@
-"""The bench screen on a real terminal, told to end by a signal, and left with a source not off."""
+"""The screens on a real terminal: ended by a signal, frozen, gone, left with a source not off."""
 
 import asyncio
 import os
 import pty
+import select
 import signal
 import subprocess
 import sys
@@ -45,14 +46,48 @@ code = app.run()
 sys.exit(code if code is not None else app.return_code or 0)
 """
 
+CROWDED = PROGRAM.replace("        assert self.keeper.start(hold=False)\n", "").replace(
+    "app = Driven",
+    """
+class Driven(Driven):
+    drawn = 0
+
+    def on_mount(self):
+        # Not while the first step looks for a history, which the session is about to make.
+        self.set_timer(0.5, lambda: self.keeper.start(hold=False))
+        self.set_interval(0.02, self.draw)
+
+    def draw(self):
+        if self.drawn == 0 and self.desk.run.done > 0:
+            self.go(4)
+        if Path(sys.argv[1] + "-crowd").exists():
+            self.screen.refresh()
+            self.drawn += 1
+            if self.drawn == 100:
+                self.go(1)
+
+app = Driven""",
+)
+"""Draws all of the screen again and again while a file is there, and another step after a while."""
+
+REPLAY = """
+import sys
+from pathlib import Path
+from tui.app.recording import read_recording
+from tui.app.replay import ReplayApp
+sys.exit(ReplayApp(read_recording(Path(sys.argv[1]), None)).run() or 0)
+"""
+
+SLOW = "sim:?ratio=0.3&seed=1&speed=realtime"
+
 
 @pytest.fixture
 def on_terminal():
     """Start the program on a terminal of its own, whose screen somebody reads."""
     started = []
 
-    def start(*words):
-        started.append(OnTerminal(*words))
+    def start(*words, program=PROGRAM):
+        started.append(OnTerminal(program, *words))
         return started[-1]
 
     yield start
@@ -62,27 +97,50 @@ def on_terminal():
 
 
 class OnTerminal:
-    """The program, and what it drew."""
+    """The program, in a session that the terminal sends no signals to, and what it drew."""
 
-    def __init__(self, *words):
-        ours, theirs = pty.openpty()
+    def __init__(self, program, *words):
+        self._ours, theirs = pty.openpty()
         self.program = subprocess.Popen(
-            [sys.executable, "-c", PROGRAM, *words], stdin=theirs, stdout=theirs, stderr=theirs
-        )
+            [sys.executable, "-c", program, *words],
+            stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=True,
+        )  # fmt: skip
         os.close(theirs)
         self.seen = b""
-        self._reader = threading.Thread(target=self._read, args=(ours,), daemon=True)
+        self._looks = threading.Event()
+        self.look()
+
+    def look(self):
+        self._looks.set()
+        self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
-    def _read(self, terminal):
-        while True:
+    def look_away(self):
+        self._looks.clear()
+        self._reader.join()
+
+    def go_away(self):
+        self.look_away()
+        os.close(self._ours)
+
+    def _read(self):
+        while self._looks.is_set():
+            # One that waits in a read would keep the terminal open when it is closed.
+            if not select.select([self._ours], [], [], 0.05)[0]:
+                continue
             try:
-                some = os.read(terminal, 65536)
+                some = os.read(self._ours, 65536)
             except OSError:
                 return
             if not some:
                 return
             self.seen += some
+
+    def sees(self, words, within_s=20.0):
+        end = time.monotonic() + within_s
+        while words not in self.seen:
+            assert time.monotonic() < end, self.seen[-2000:]
+            time.sleep(0.05)
 
     def ended(self, within_s=30.0):
         code = self.program.wait(within_s)
@@ -153,3 +211,45 @@ def test_a_screen_that_is_taken_away_ends_the_session(tmp_path, on_terminal):
     assert begun(db).state == "interrupted"
     assert begun(db).source_state is SourceState.CONFIRMED_OFF
     assert begun(db).points < 2500
+
+
+def test_a_terminal_that_goes_away_without_a_signal_ends_session_and_screen(tmp_path, on_terminal):
+    db = tmp_path / "bench.db"
+    terminal = on_terminal(str(db), "sim:?ratio=0.3&seed=1")
+    driving(db)
+    terminal.go_away()
+    assert terminal.ended() == 130
+    assert begun(db).state == "interrupted"
+    assert begun(db).source_state is SourceState.CONFIRMED_OFF
+    replay = on_terminal(str(db), program=REPLAY)
+    replay.sees(b"REPLAY, no instrument")
+    replay.go_away()
+    assert replay.ended() == 130
+
+
+def test_a_source_that_is_not_off_when_the_terminal_is_gone_is_an_exit_code(tmp_path, on_terminal):
+    db = tmp_path / "bench.db"
+    terminal = on_terminal(str(db), "sim:?fault=silence:point=5")
+    driving(db)
+    terminal.go_away()
+    assert terminal.ended(60.0) == 1
+    assert begun(db).source_state is SourceState.UNKNOWN
+
+
+def test_a_terminal_that_takes_no_more_holds_no_signal_up_and_is_drawn_anew(tmp_path, on_terminal):
+    db, crowd = tmp_path / "bench.db", tmp_path / "bench.db-crowd"
+    terminal = on_terminal(str(db), SLOW, program=CROWDED)
+    driving(db)
+    terminal.sees(b"[4 Sweep]")
+    for told_to_end in (False, True):
+        terminal.look_away()
+        terminal.seen = b""
+        crowd.touch()
+        time.sleep(4.0)
+        crowd.unlink()
+        if not told_to_end:
+            terminal.look()
+            terminal.sees(b"Unit under test")
+    terminal.program.send_signal(signal.SIGTERM)
+    assert terminal.ended() == 130
+    assert begun(db).source_state is SourceState.CONFIRMED_OFF

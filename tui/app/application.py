@@ -7,7 +7,6 @@ under `analyses`, and a step's screen draws what the desk holds.
 
 from __future__ import annotations
 
-import asyncio
 import logging
 from collections.abc import Callable, Iterable
 from contextlib import suppress
@@ -15,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
-from textual.app import App, SystemCommand
+from textual.app import SystemCommand
 from textual.binding import Binding, BindingType
 from textual.screen import ModalScreen, Screen
 
@@ -34,8 +33,8 @@ from tui.app.screens.instrument_screen import InstrumentScreen
 from tui.app.session_keeper import SessionKeeper
 from tui.app.step_screen import STEPS, StepScreen
 from tui.app.style import STYLE
+from tui.app.terminal_app import TerminalApp
 from tui.entry import INTERRUPTED
-from tui.signals import ending_on_signals
 
 if TYPE_CHECKING:
     from daq.store_records import Measurement
@@ -47,7 +46,7 @@ _REDRAW_S = 0.1
 _LOG = logging.getLogger("lashbench.screen")
 
 
-class BenchApp(App[int]):
+class BenchApp(TerminalApp):
     """The bench screen.
 
     Parameters
@@ -98,7 +97,6 @@ class BenchApp(App[int]):
         """Steps ready, first one on top, nothing connected."""
         self.push_screen(STEPS[0])
         self.set_interval(_REDRAW_S, self._redraw)
-        self._listen_to_signals()
 
     def on_unmount(self) -> None:
         """Whatever took the screen away: nobody could stop a session any more."""
@@ -185,8 +183,8 @@ class BenchApp(App[int]):
     def _end_and_leave(self) -> None:
         self.keeper.interrupt_then(self._leave)
 
-    def _end_at_once(self) -> None:
-        """A signal: nobody may be there to read a dialog."""
+    def end_at_once(self) -> None:
+        """A signal, or a terminal that is gone: nobody may be there to read a dialog."""
         self._told_to_end = True
         self._end_and_leave()
 
@@ -195,6 +193,7 @@ class BenchApp(App[int]):
         run, code, line = self.desk.run, INTERRUPTED if self._told_to_end else 0, None
         if run.source not in (None, SourceState.CONFIRMED_OFF):
             code, line = LashbenchError.exit_code, f"error: {run.source_text}"
+            _LOG.error("left with %s", run.source_text)
         self.exit(code, code, line)
 
     def get_system_commands(self, screen: Screen) -> Iterable[SystemCommand]:
@@ -238,10 +237,6 @@ class BenchApp(App[int]):
         line = f"error: internal: {type(error).__name__}: {error}. {self.log_words}"
         self._exit_renderables.append(line)
         self._close_messages_no_wait()
-
-    def _listen_to_signals(self) -> None:
-        if not self.is_headless:
-            ending_on_signals(asyncio.get_running_loop(), self._end_at_once)
 
     # ------------------------------------------------------------ sessions
 

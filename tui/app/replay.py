@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from typing import ClassVar
 
-from textual.app import App, ComposeResult
+from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Vertical
 from textual.widgets import Footer, ProgressBar, Static
@@ -16,6 +16,7 @@ from textual.widgets import Footer, ProgressBar, Static
 from daq.store_records import StoredPoint
 from tui.app.recording import Recording
 from tui.app.style import STYLE
+from tui.app.terminal_app import TerminalApp
 from tui.app.widgets.bode import BodePlot
 from tui.app.widgets.traces import traces_of_points
 from tui.app.words import point_words, span_words
@@ -28,7 +29,7 @@ _JUMP_S = 0.1
 """Part of the whole that a jump covers."""
 
 
-class ReplayApp(App[int]):
+class ReplayApp(TerminalApp):
     """Plays a recording.
 
     Parameters
