@@ -23,7 +23,7 @@ from daq.errors import LashbenchError
 from tui.narrator import Narrator
 from tui.pace import Pace, duration
 
-__all__ = ["Console", "Injected", "as_json", "hush", "readers_may_leave"]
+__all__ = ["Console", "Injected", "as_json", "hush", "readers_may_leave", "visible"]
 
 _LOG = logging.getLogger("lashbench.console")
 
@@ -67,7 +67,7 @@ class Console:
             raise LashbenchError("there is no stdout to write the result to; leave it open")
         self._clear()
         try:
-            print(_visible(text), flush=True)  # noqa: T201
+            print(visible(text), flush=True)  # noqa: T201
         except BrokenPipeError:
             raise
         except OSError as error:
@@ -85,13 +85,13 @@ class Console:
         _LOG.info("%s", text)
         if not self.quiet:
             self._clear()
-            self._narrate(f"{_visible(text)}\n")
+            self._narrate(f"{visible(text)}\n")
 
     def error(self, text: str) -> None:
         """Print an error to stderr, as one line whatever it holds."""
         _LOG.error("%s", " ".join(text.split()))
         self._clear()
-        self._narrate(f"error: {_visible(' '.join(text.split()))}\n")
+        self._narrate(f"error: {visible(' '.join(text.split()))}\n")
 
     @contextmanager
     def unhurried(self) -> Iterator[None]:
@@ -189,7 +189,7 @@ _CONTROLS = {code: f"\\x{code:02x}" for code in (*range(32), *range(127, 160))}
 del _CONTROLS[ord("\n")], _CONTROLS[ord("\t")]
 
 
-def _visible(text: str) -> str:
+def visible(text: str) -> str:
     """Text that tells a terminal nothing: files and histories may hold what would."""
     return text.translate(_CONTROLS)
 

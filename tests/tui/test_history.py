@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import sqlite3
 
 import numpy as np
@@ -9,9 +10,11 @@ import pytest
 from measuring import measuring, stopped
 
 from analysis import estimate as estimating
+from daq.configs import config_path
 from daq.errors import AnalysisError, LinkError
 from daq.formats import read_response
 from daq.store import Store
+from tui.layout import columns_of
 from tui.reports import keep_estimate
 
 
@@ -105,6 +108,46 @@ def test_values_that_do_not_agree_are_not_passed_off_as_one(run, db):
     assert trend["per_day"] is None
     assert trend["chi2"] == pytest.approx(2 * (0.2 / 0.05) ** 2)
     assert "differ by more than their errors" in run("history")[1]
+
+
+LONG = "Seeker gimbal of the second prototype, batch 2026-11, reworked"
+
+
+@pytest.mark.parametrize("serial", ["SN 7", "2026-11-" + 60 * "0" + "17 B", "歯車装置 七号機"])
+def test_every_line_fits_a_terminal_and_nothing_is_lost(run, db, tmp_path, serial):
+    own = tmp_path / "own.toml"
+    text = config_path("units", "adss").read_text(encoding="utf-8")
+    own.write_text(re.sub("(?m)^name = .*", f'name = "{LONG}"', text), encoding="utf-8")
+    for unit in ("adss", "adss", str(own)):
+        run(*measuring("--serial", serial, unit=unit))
+    with Store(db) as store:
+        for measurement, ratio in ((1, 0.2), (2, 0.6), (3, 0.4)):
+            estimated(store, measurement, ratio, std=0.0512)
+    # Weeks apart, with all that can be said of a trend.
+    with sqlite3.connect(db) as raw:
+        raw.execute("UPDATE measurements SET started = '2026-01-01T12:00:00+00:00' WHERE id = 1")
+    raw.close()
+    code, out, _ = run("history")
+    assert code == 0
+    assert max(map(columns_of, out.splitlines())) <= 80
+    # What wraps goes on in the same column or after two blanks; nothing is left out.
+    squeezed = re.sub(r"\s", "", out)
+    for word in (f"backlash of {LONG} {serial};", f"backlash of ADSS {serial};", "in 30 days"):
+        assert re.sub(r"\s", "", word) in squeezed
+    for said in ("5/5", "complete", "(SIMULATED)", "0.600 +- 0.051", "0.6000 +- 0.0512"):
+        assert said in out
+
+
+def test_long_numbers_leave_less_room_for_the_bar(run, db):
+    run(*measuring())
+    long, ratio = {"value": 123.4, "std": 123.4}, {"value": 0.5, "std": 0.1, "interval95": [0, 1]}
+    with Store(db) as store:
+        store.add_estimate(1, "t", {"contribution_ratio": ratio, "b1_deg": long, "b2_deg": long})
+    out = run("history")[1]
+    assert "--o--" not in out
+    assert "-o-" in out
+    assert max(map(len, out.splitlines())) == 80
+    assert out.count("123.4000 +- 123.4000") == 2
 
 
 class Result:

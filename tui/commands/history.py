@@ -15,7 +15,14 @@ from cyclopts import Parameter
 
 from daq.errors import AnalysisError, ConfigurationError, InputError, LashbenchError
 from tui.executors import executor_at
-from tui.history_rows import estimated_groups, measurement_row, trend_lines, trend_rows
+from tui.history_rows import (
+    QUANTITIES,
+    estimated_groups,
+    measurement_row,
+    trend_lines,
+    trend_rows,
+)
+from tui.layout import WIDTH, table_lines, wrapped
 from tui.options import Cluster, Json
 from tui.output import Console, Injected
 from tui.places import cache_folder, history_path
@@ -30,7 +37,8 @@ __all__ = ["history"]
 
 _BUDGET_S = 45.0
 """Time after which `--estimate some` begins no further estimate."""
-_BAR = 41
+_BAR, _LEAST_BAR = 41, 11
+"""Columns from a ratio of 0 to one of 1, and how few of them there may be beside long numbers."""
 
 
 def history(
@@ -77,7 +85,8 @@ def history(
     elif not rows:
         console.data("no measurements; lashbench measure --help says how to make one")
     else:
-        console.data("\n".join([_table(rows), *_pictures(rows), *trend_lines(trends)]))
+        told = [part for line in trend_lines(trends) for part in wrapped(line, indent="  ")]
+        console.data("\n".join([*_measured(rows), *_estimated(rows), *told]))
 
 
 def _unit_name(unit: str | None, store: Store) -> str | None:
@@ -143,13 +152,10 @@ def _estimate(
     return content
 
 
-def _table(rows: Sequence[dict[str, Any]]) -> str:
-    def shown(row: dict[str, Any], name: str, digits: int) -> str:
-        number = row[name]
-        return "-" if not number else f"{number['value']:.{digits}f} +- {number['std']:.{digits}f}"
-
-    return _aligned(
-        ("id", "started (UTC)", "unit", "serial", "state", "points", "r", "b1 / deg", "b2 / deg"),
+def _measured(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """What was measured when, and how far; names of units and specimens may be long."""
+    return table_lines(
+        ("id", "started (UTC)", "unit", "serial", "state", "points"),
         [
             (
                 str(row["id"]),
@@ -158,45 +164,53 @@ def _table(rows: Sequence[dict[str, Any]]) -> str:
                 row["serial"] or "-",
                 row["state"],
                 f"{row['points']}/{row['planned']}",
-                shown(row, "contribution_ratio", 3),
-                shown(row, "b1_deg", 4),
-                shown(row, "b2_deg", 4),
             )
             for row in rows
         ],
+        may_wrap=(2, 3),
     )
 
 
-def _aligned(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    widths = [max(len(row[column]) for row in (headers, *rows)) for column in range(len(headers))]
-    return "\n".join(
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in (headers, ["-" * width for width in widths], *rows)
-    )
-
-
-def _pictures(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """The contribution ratio of each unit as dots with error bars from 0 to 1."""
+def _estimated(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """The estimates of each unit, the contribution ratio as a dot with its bar from 0 to 1, too."""
     lines = []
     for (unit, serial), group in estimated_groups(rows).items():
         name = f"{unit} {serial}".strip()
-        lines += [
-            "",
-            f"contribution ratio of {name}, one standard error",
-            f"{'':6}0{'':{_BAR - 2}}1",
+        numbers = [
+            tuple(
+                _shown(row[name], digits)
+                for name, digits in zip(QUANTITIES, (3, 4, 4), strict=True)
+            )
+            for row in group
         ]
-        for row in group:
-            ratio = row["contribution_ratio"]
-            bar = _bar(ratio["value"], ratio["std"])
-            lines.append(f"{row['id']:>5} {bar}  {ratio['value']:.3f} +- {ratio['std']:.3f}")
+        head = ("r", "b1 / deg", "b2 / deg")
+        widths = [max(map(len, column)) for column in zip(head, *numbers, strict=True)]
+        left = max(5, *(len(str(row["id"])) for row in group))
+        bar = min(_BAR, max(_LEAST_BAR, WIDTH - left - 1 - sum(widths) - 2 * len(widths)))
+        title = f"backlash of {name}; contribution ratio r from 0 to 1; one standard error"
+        lines += ["", *wrapped(title)]
+        for key, picture, texts in [
+            ("", f"0{'':{bar - 2}}1", head),
+            *(
+                (str(row["id"]), _bar(row["contribution_ratio"], bar), texts)
+                for row, texts in zip(group, numbers, strict=True)
+            ),
+        ]:
+            cells = (f"{text:<{width}}" for text, width in zip(texts, widths, strict=True))
+            lines.append("  ".join((f"{key:>{left}} {picture}", *cells)).rstrip())
     return lines
 
 
-def _bar(value: float, std: float) -> str:
-    def place(ratio: float) -> int:
-        return round(min(max(ratio, 0.0), 1.0) * (_BAR - 1))
+def _shown(number: Mapping[str, float] | None, digits: int) -> str:
+    return "-" if not number else f"{number['value']:.{digits}f} +- {number['std']:.{digits}f}"
 
-    cells = ["."] * _BAR
+
+def _bar(ratio: Mapping[str, float], width: int) -> str:
+    def place(value: float) -> int:
+        return round(min(max(value, 0.0), 1.0) * (width - 1))
+
+    cells = ["."] * width
+    value, std = ratio["value"], ratio["std"]
     for cell in range(place(value - std), place(value + std) + 1):
         cells[cell] = "-"
     cells[place(value)] = "o"
