@@ -271,6 +271,7 @@ class Session:
 
     def _hold(self) -> Iterator[SessionEvent]:
         state = self._make_safe()
+        self._pace.held()
         self._journal.source(state)
         self._journal.note("pause", f"holding; source {state.value}")
         yield Paused(state)

@@ -137,15 +137,20 @@ class Pace:
     """How fast driving goes compared with the cycles alone, from the points so far."""
 
     def __init__(self) -> None:
-        self._began_s: float | None = None
+        self._latest_s: float | None = None
+        self._taken_s = 0.0
         self._driven_s = 0.0
+
+    def held(self) -> None:
+        """Nothing was measured for a while: the next point comes after work that others do not."""
+        self._latest_s = None
 
     def remaining_s(self, driven_s: float, left_s: float) -> float:
         """Time left, given the cycles of the point just taken and of all points to come, s."""
         now_s = time.monotonic()
-        if self._began_s is None:
-            # The first point came after set-up work that the others will not repeat.
-            self._began_s = now_s
-            return left_s
-        self._driven_s += driven_s
-        return left_s * (now_s - self._began_s) / self._driven_s
+        # The first point came after set-up work that the others will not repeat.
+        if self._latest_s is not None:
+            self._taken_s += now_s - self._latest_s
+            self._driven_s += driven_s
+        self._latest_s = now_s
+        return left_s * self._taken_s / self._driven_s if self._driven_s > 0 else left_s

@@ -79,7 +79,7 @@ class PointStored:
     elapsed_s: float
     """Since the session began."""
     remaining_s: float
-    """Estimated from the plan and the pace so far."""
+    """Estimated from the plan and the pace so far, pauses left out."""
 
 
 @dataclass(frozen=True, slots=True)

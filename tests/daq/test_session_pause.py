@@ -34,6 +34,20 @@ def test_a_pause_switches_the_source_off_and_goes_on_with_a_run_in(store):
     assert not np.any(store.response(1).flags)
 
 
+def test_time_in_a_pause_is_no_measuring_time(store):
+    control, paused_s = SessionControl(), 2.0
+
+    def hold():
+        control.pause()
+        threading.Timer(paused_s, control.go_on).start()
+
+    session = Session(FakeAnalyser(point_s=0.01), store, new(), control)
+    told = of(PointStored, Watch(session, 6, hold).run())
+    assert told[6].elapsed_s - told[5].elapsed_s > paused_s
+    for event in told[6:]:
+        assert event.remaining_s == pytest.approx(told[-1].elapsed_s - event.elapsed_s, abs=0.5)
+
+
 @pytest.mark.parametrize(
     ("cut", "state"), [("stop", "interrupted"), ("interrupt", "interrupted"), ("abort", "aborted")]
 )

@@ -47,6 +47,28 @@ def test_the_trial_point_is_not_called_off():
     assert held.source_text == "SOURCE OFF (confirmed)"
 
 
+def test_the_time_left_after_a_pause_is_said_to_come_after_the_run_in(tmp_path):
+    first = kinds.PointStored(stored(), 1, 6, 2.0, 65.0)
+    again = kinds.RunIn(1.5, first.stored.point, first.stored.point)
+    second = kinds.PointStored(stored(110.0, number=2), 2, 6, 9.0, 60.0)
+    begun = kinds.LevelStarted(1.5, 2)
+
+    async def way():
+        async with operated(tmp_path / "bench.db") as op:
+            op.app.desk.run = told(OPENED, begun, first)
+            op.app.go(4)
+            await op.sees("1 of 6 points stored; 1:05 left, done ")
+            op.app.desk.run = told(OPENED, begun, first, kinds.GoingOn(), begun, again)
+            op.app.redraw_now()
+            await op.sees("1 of 6 points stored; run-in, 1 points driven again; then 1:05")
+            op.app.desk.run.take(second)
+            op.app.redraw_now()
+            await op.sees("2 of 6 points stored; 1:00 left, done ")
+            op.app.desk.run.phase = "over"
+
+    run(way)
+
+
 @pytest.mark.parametrize("state", [SourceState.UNCONFIRMED, SourceState.UNKNOWN])
 def test_a_source_that_is_not_proven_off_says_what_to_do(state):
     assert "switch it off by hand" in told(OPENED, kinds.SourceSafe(state)).source_text

@@ -161,6 +161,6 @@ class RunView:
     def _point(self, event: kinds.PointStored) -> None:
         stored = event.stored
         self.points[stored.source_vpk, stored.requested_hz] = stored
-        self.latest = stored
+        self.latest, self.run_in = stored, 0
         self.done, self.total = event.done, event.total
         self.elapsed_s, self.remaining_s = event.elapsed_s, event.remaining_s

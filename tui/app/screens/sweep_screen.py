@@ -276,10 +276,12 @@ Marks: a letter shape per level, ! overload, ~ not periodic, - coarse, ? spoilt.
             stored = run.done
             return [*plan_words(run.plan, desk.url, stored), cursor or f"{stored} points stored"]
         progress = f"{run.done} of {run.total} points stored"
-        if run.phase == "sweeping" and run.remaining_s is not None:
-            progress += f"; {span_words(run.remaining_s)} left, done {clock_in(run.remaining_s)}"
-        elif run.phase == "sweeping" and run.run_in:
+        if run.phase == "sweeping" and run.run_in:
             progress += f"; run-in, {run.run_in} points driven again"
+            # No time of day: how long the run-in takes is not in it.
+            progress += f"; then {span_words(run.remaining_s)}" if run.remaining_s else ""
+        elif run.phase == "sweeping" and run.remaining_s is not None:
+            progress += f"; {span_words(run.remaining_s)} left, done {clock_in(run.remaining_s)}"
         elif run.finished is not None:
             done = run.finished
             progress += f"; {done.state}: {done.reason}; {done.flagged} flagged"
