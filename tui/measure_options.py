@@ -123,7 +123,8 @@ def session_request(
     from daq.store_records import MeasurementHeader
     from tui.bench import unit_limits
 
-    _check_printable(remarks)
+    if resume is None:
+        _check_printable(remarks)
     place = load_bench(bench)
     way = None if recipe is None else load_recipe(recipe)
     way_text = {} if recipe is None else {"recipe": _text("recipes", recipe)}

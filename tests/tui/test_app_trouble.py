@@ -193,12 +193,17 @@ def test_a_band_picked_on_the_plot_is_measured_again(tmp_path):
             await op.checks()
             await op.press("ctrl+n", "s")
             await op.sees("complete")
+            await op.goes_to(1)
+            await op.types("#notes", "for the next one")
+            await op.goes_to(4)
             await op.press("left", "b")
             await op.sees("Band from")
             await op.press("right", "right", "right", "b")
             await op.sees("Measure the band again?", "4 stored points")
             await op.press("b")
+            await op.sees("keeps its own", "yours were left out")
             await op.sees("16 of 16 points stored; complete")
+            assert op.app.desk.notes == ""
 
     run(lambda: way("sim:"))
     with Store(db, read_only=True) as store:

@@ -83,16 +83,53 @@ def test_a_unit_that_the_history_does_not_hold_leaves_the_desk_as_it_is(measured
     assert (desk.unit.name, desk.serial) == ("EDSS", "")
 
 
-def test_going_on_keeps_who_began_and_refuses_another_serial_number(measured, db):
+def test_going_on_keeps_what_was_noted_and_refuses_anything_else(measured, db):
     measurement, _ = measured("gär", "--operator", "anna", "--notes", "one", "--serial", "7")
-    desk = Desk(db)
-    desk.take_up(measurement)
-    assert (desk.operator, desk.notes) == ("anna", "one")
+    desk = Desk(db, operator="bob", serial="7")
+    assert desk.take_up(measurement) == (
+        "measurement 1 keeps its own operator; yours were left out"
+    )
+    assert (desk.serial, desk.operator, desk.notes) == ("7", "anna", "one")
+    assert desk.request().resume == desk.remarks_of == 1
+    for name, stored in (("operator", "anna"), ("notes", "one"), ("serial", "7")):
+        setattr(desk, name, "8")
+        with pytest.raises(InputError, match=f"{name} '8' was given and it has '{stored}'"):
+            desk.request()
+        setattr(desk, name, stored)
+    desk.begin_anew()
     desk.operator = "bob"
-    assert desk.request().resume == 1
-    desk.serial = "8"
-    with pytest.raises(InputError, match="serial '8' was given and it has '7'"):
-        desk.request()
+    assert desk.remarks_of is None
+    assert desk.request().header.operator == "bob"
+
+
+def test_remarks_can_be_changed_for_a_new_measurement_only(run, db):
+    assert run(*measuring("--operator", "anna", "--serial", "7"))[0] == 0
+    with Store(db) as store:
+        store.reopen(1)
+
+    async def way():
+        async with operated(db) as op:
+            fields = [
+                op.app.screen.query_one(f"#{name}") for name in ("serial", "operator", "notes")
+            ]
+            await op.types("#operator", "bob")
+            op.app.screen.query_one("#sessions").focus()
+            await op.press("enter")
+            await op.sees("[2 Instrument]", "measurement 1 keeps its own", "operator; yours were")
+            await op.goes_to(1)
+            await op.sees("session 1 keeps them as they are", "Enter on a unit: a new measurement")
+            assert [field.value for field in fields] == ["7", "anna", ""]
+            assert all(field.disabled for field in fields)
+            fields[2].value = "late"
+            await op.pilot.pause()
+            assert (op.app.desk.resume, op.app.desk.notes) == (1, "")
+            op.app.screen.query_one("#units").focus()
+            await op.press("enter")
+            assert not any(field.disabled for field in fields)
+            assert "keeps them as they are" not in op.screen
+            assert op.app.desk.resume is None
+
+    run_screen(way)
 
 
 def test_a_proposed_plan_that_the_analyser_cannot_be_set_to_is_refused(db):

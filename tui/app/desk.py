@@ -90,6 +90,11 @@ class Desk:
     reference_name: str = ""
 
     @property
+    def remarks_of(self) -> int | None:
+        """The measurement that serial number, operator and notes are of already: it keeps them."""
+        return (self.run.measurement if self.run.live else None) or self.resume
+
+    @property
     def simulated(self) -> bool:
         """Whether the instrument is a simulated one, as far as is known."""
         return self.url.strip().startswith("sim:") or (
@@ -110,13 +115,41 @@ class Desk:
         self._put(name, unit, None)
         return unit
 
-    def take_up(self, measurement: Measurement) -> None:
-        """Put the measurement that is to be resumed on the desk, with unit and address."""
+    def begin_anew(self) -> None:
+        """What was to be gone on with is left; the next session is a measurement of its own."""
+        if self.resume is not None:
+            self.resume = self.given_plan = None
+
+    def take_up(self, measurement: Measurement) -> str:
+        """Put the measurement that is to be resumed on the desk, with unit and address.
+
+        What to say of remarks that it overwrites, as `take_remarks`.
+        """
+        typed = self.serial
         self.choose_unit_of(measurement)
+        self.serial = typed
+        lost = self.take_remarks(measurement)
         header = measurement.header
-        self.operator, self.notes = header.operator, header.notes
         self.url, self.identity = header.address, None
         self.resume, self.given_plan = measurement.id, header.plan
+        return lost
+
+    def take_remarks(self, measurement: Measurement) -> str:
+        """Put serial number, operator and notes of a measurement on the desk: it keeps them.
+
+        What to say of those that are overwritten; empty where there are none.
+        """
+        lost = []
+        for name in ("serial", "operator", "notes"):
+            value = getattr(measurement.header, name)
+            if getattr(self, name) not in ("", value):
+                lost.append(name)
+            setattr(self, name, value)
+        if not lost:
+            return ""
+        return (
+            f"measurement {measurement.id} keeps its own {' and '.join(lost)}; yours were left out"
+        )
 
     def choose_unit_of(self, measurement: Measurement) -> None:
         """Put the unit of a stored measurement on the desk, as its file was then.
@@ -171,13 +204,12 @@ class Desk:
         # A plan that came whole is no recipe's, so a recipe's limits are not its limits.
         recipe = self.recipe if fresh and self.given_plan is None else None
         options = self._options() if fresh else PlanOptions()
-        # Who began a measurement, and what was noted then, stays with it.
-        remarks = {"operator": self.operator, "notes": self.notes} if fresh else {}
         request = session_request(
             options, self.unit_name, self.unit, self.url, self.db,
             recipe=recipe, bench="default",
             resume=self.resume, remeasure=remeasure_hz, run_in=None,
-            remarks={"serial": self.serial, **remarks}, unit_text=self.unit_text,
+            remarks={"serial": self.serial, "operator": self.operator, "notes": self.notes},
+            unit_text=self.unit_text,
         )  # fmt: skip
         if fresh and self.given_plan is not None and request.header is not None:
             check_plan(self.given_plan, request.limits)

@@ -256,6 +256,8 @@ Marks: a letter shape per level, ! overload, ~ not periodic, - coarse, ? spoilt.
         self.app.push_screen(dialog, lambda yes: self._again(low, high) if yes else None)
 
     def _again(self, low: float, high: float) -> None:
+        from daq.store import Store
+
         desk, keeper = self.desk, self.bench.keeper
 
         def begin() -> None:
@@ -263,7 +265,15 @@ Marks: a letter shape per level, ! overload, ~ not periodic, - coarse, ? spoilt.
             if run.measurement is None or (run.finished and run.finished.state == "aborted"):
                 self.notify("an aborted measurement stays as it is", severity="warning")
                 return
-            desk.resume, desk.given_plan = run.measurement, run.plan
+            try:
+                with Store(desk.db, read_only=True) as store:
+                    measurement = store.measurement(run.measurement)
+            except LashbenchError as error:
+                self.bench.show_error("Nothing was started", error)
+                return
+            if lost := desk.take_remarks(measurement):
+                self.notify(lost, severity="warning")
+            desk.resume, desk.given_plan = measurement.id, run.plan
             keeper.start(hold=False, remeasure_hz=(low, high))
             self.show()
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["UnitScreen"]
 
 _RECENT = 20
+_REMARKS = {"serial": "serial number", "operator": "operator", "notes": "notes"}
 
 
 class UnitScreen(StepScreen):
@@ -31,7 +32,8 @@ class UnitScreen(StepScreen):
     HELP = """
 Choose the unit under test: highlight it and press Enter, or type the path of a unit file.
 Its parameters and limits stand beside it. Serial number, operator and notes are kept with
-every measurement; Tab goes from field to field.
+every measurement as they are when it begins, and cannot be changed while it is under way or to
+be gone on with; Enter on a unit begins a new one. Tab goes from field to field.
 
 Below are the sessions of this bench. One that was interrupted comes first: highlight it and
 press Enter to go on with it where it ended. Enter on a complete one opens its result.
@@ -57,13 +59,12 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
                 yield OptionList(*self._units(), id="units", compact=True)
                 for name, label, hint in (
                     ("file", "unit file", "or the path of one"),
-                    ("serial", "serial number", ""),
-                    ("operator", "operator", ""),
-                    ("notes", "notes", ""),
+                    *((remark, _REMARKS[remark], "") for remark in _REMARKS),
                 ):
                     with Horizontal(classes="field"):
                         yield Label(label)
                         yield Input(id=name, placeholder=hint, compact=True)
+                yield Static("", id="whose")
                 yield Static("", id="limits", markup=False)
             with VerticalScroll(id="parameters", classes="pane"):
                 yield Static("", id="parameter-list", markup=False)
@@ -81,13 +82,16 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
         self.query_one("#sessions" if interrupted else "#units").focus()
 
     def arrive(self) -> None:
-        """Sessions as they are now."""
+        """Sessions as they are now, and what is on the desk wherever it came from."""
         self._list_sessions()
+        for name in _REMARKS:
+            self.query_one(f"#{name}", Input).value = getattr(self.desk, name)
 
     def show_body(self) -> None:
         """Parameters and limits of the unit chosen; the sessions where one began or ended."""
         if self._under_way() != self._listed_beside:
             self._list_sessions()
+        self._show_whose()
         unit = self.desk.unit
         if unit is None:
             return
@@ -126,22 +130,21 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
         """Chosen: on to who measures."""
         if event.option.id is not None:
             self._choose(event.option.id)
+            self._begin_anew()
         self.query_one("#serial", Input).focus()
 
     def on_input_changed(self, event: Input.Changed) -> None:
         """What is typed is on the desk at once."""
-        if event.input.id in ("serial", "operator", "notes"):
+        if event.input.id in _REMARKS and self.desk.remarks_of is None:
             setattr(self.desk, event.input.id, event.value.strip())
             self._show_frame()
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
         """Enter goes on; a typed file is read first."""
-        if (
-            event.input.id == "file"
-            and event.value.strip()
-            and not self._choose(event.value.strip())
-        ):
-            return
+        if event.input.id == "file" and event.value.strip():
+            if not self._choose(event.value.strip()):
+                return
+            self._begin_anew()
         if event.input.id == "notes":
             self.action_next()
         else:
@@ -168,14 +171,31 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
             self.notify("a session is under way; stop it first", severity="warning")
             return
         try:
-            self.desk.take_up(measurement)
+            lost = self.desk.take_up(measurement)
         except LashbenchError as error:
             self.bench.show_error("The session cannot be resumed", error)
             return
-        for name in ("serial", "operator", "notes"):
-            self.query_one(f"#{name}", Input).value = getattr(self.desk, name)
         self.notify(f"going on with measurement {measurement.id}: connect its instrument")
+        if lost:
+            self.notify(lost, severity="warning")
         self.bench.go(2)
+
+    def _begin_anew(self) -> None:
+        """A unit that is chosen, not merely looked at, is to be measured from the beginning."""
+        if not self.bench.keeper.busy:
+            self.desk.begin_anew()
+            self.show()
+
+    def _show_whose(self) -> None:
+        """Remarks of a measurement that has them already can be read, not changed."""
+        kept_by = self.desk.remarks_of
+        whose = self.query_one("#whose", Static)
+        whose.display = kept_by is not None
+        whose.update(
+            f"session {kept_by} keeps them as they are;\nEnter on a unit: a new measurement"
+        )
+        for name in _REMARKS:
+            self.query_one(f"#{name}", Input).disabled = kept_by is not None
 
     def _choose(self, name: str) -> bool:
         if self.bench.keeper.busy and name != self.desk.unit_name:
