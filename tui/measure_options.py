@@ -136,6 +136,7 @@ def session_request(
         plan, configurations = before.header.plan, before.header.configurations
         named = {name: text for name, text in remarks.items() if text}
         _check_same(before, options.given | {"unit": unit.name} | named)
+        _check_same_values(before, unit)
         # What options overrode of its own recipe is no contradiction.
         if way is not None and not way_text.items() <= configurations.items():
             sweep = way.sweep.model_dump()
@@ -334,6 +335,39 @@ def _check_same(before: Measurement, given: Mapping[str, Any], by: str = "") -> 
             f"measurement {before.id} is another one: {'; '.join(differ)}; leave that out, or "
             "start a new measurement"
         )
+
+
+def _check_same_values(before: Measurement, unit: Unit) -> None:
+    """The unit must be the one of before by its values, too; its limits are those of today.
+
+    Raises
+    ------
+    InputError
+        Names each value that differs.
+    """
+    from tui.reports import unit_as_measured
+    from tui.unit_differences import differing_values
+
+    if "unit" not in before.header.configurations:
+        return  # Nobody knows the values of before.
+    differ = [
+        f"{name} is {_shown(now)} and was {_shown(then)}"
+        for name, (now, then) in differing_values(
+            unit, unit_as_measured(before), limits=False
+        ).items()
+    ]
+    if differ:
+        raise InputError(
+            f"measurement {before.id} was begun with other values of unit {unit.name}: "
+            f"{', '.join(differ)}; give a unit file that has those, go on in `lashbench bench`, "
+            "which takes them from the history, or start a new measurement"
+        )
+
+
+def _shown(value: float | tuple[float, ...] | None) -> str:
+    if value is None:
+        return "left out"
+    return f"{value:.12g}" if isinstance(value, float) else str(list(value))
 
 
 def _spacing(plan: SweepPlan, asked: Spacing) -> str:

@@ -152,6 +152,26 @@ def test_resume_needs_no_plan_and_refuses_another_one(run, monkeypatch):
     assert run(*bare)[0] == 0
 
 
+def test_going_on_with_other_values_of_the_unit_is_refused_and_with_other_limits_is_not(
+    run, db, monkeypatch, tmp_path
+):
+    stopped(run, monkeypatch)
+    text = config_path("units", "adss").read_text()
+    own = tmp_path / "own.toml"
+    for old, new, code, said in (
+        ("R_m = 4.1", "R_m = 4.5", 2, "R_m is 4.5 and was 4.1; give a unit file that has those"),
+        ("J_L = 2.75e-3", "J_L = 5e-3", 2, "J_L is 0.005 and was 0.00275"),
+        ("source_vpk = 5.0", "source_vpk = 2.0", 5, "above the 2 V peak of unit ADSS"),
+        ("source_vpk = 5.0", "source_vpk = 4.0", 0, "2 of them stored"),
+    ):
+        assert text.count(old) == 1
+        own.write_text(text.replace(old, new))
+        ended, _, err = run("measure", "--unit", own, "--instrument", "sim:", "--resume", "1")
+        assert (ended, said in err) == (code, True), err
+    with Store(db, read_only=True) as store:
+        assert store.measurement(1).state == "complete"
+
+
 SAID = ["--serial", "S", "--operator", "anna", "--notes", "one", "--spacing", "log"]
 
 

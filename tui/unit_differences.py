@@ -1,0 +1,44 @@
+"""In which values two units of a name differ.
+
+Owns the comparison of unit files by what they say. It judges no difference and prints nothing.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sim.unit import Unit
+
+__all__ = ["differing_values"]
+
+Value = float | tuple[float, ...] | None
+
+
+def differing_values(
+    one: Unit, other: Unit, *, limits: bool = True
+) -> dict[str, tuple[Value, Value]]:
+    """Values of two units where they differ, by symbol, those of `one` first.
+
+    None stands for what a unit does not have: a limit, or a second stage.
+
+    Parameters
+    ----------
+    limits
+        Whether what a unit may be driven with, and may have as backlash, is compared, too.
+    """
+    ours, theirs = _values(one, limits), _values(other, limits)
+    return {
+        name: (ours.get(name), theirs.get(name))
+        for name in ours | theirs
+        if ours.get(name) != theirs.get(name)
+    }
+
+
+def _values(unit: Unit, limits: bool) -> dict[str, Value]:
+    return {
+        symbol: value
+        for section, values in unit.model_dump().items()
+        if isinstance(values, dict) and (limits or section != "limits")
+        for symbol, value in values.items()
+    }
