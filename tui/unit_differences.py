@@ -1,4 +1,4 @@
-"""In which values two units of a name differ.
+"""In which values two units of a name differ, and which of them one is.
 
 Owns the comparison of unit files by what they say. It judges no difference and prints nothing.
 """
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from sim.unit import Unit
 
-__all__ = ["differing_values"]
+__all__ = ["differing_values", "origin_words"]
 
 Value = float | tuple[float, ...] | None
 
@@ -33,6 +33,25 @@ def differing_values(
         for name in ours | theirs
         if ours.get(name) != theirs.get(name)
     }
+
+
+def origin_words(unit: Unit, name: str) -> str:
+    """Which unit it is that is none of those that come with lashbench, in two lines at most.
+
+    Parameters
+    ----------
+    name
+        Path of its file, or another name for it.
+    """
+    from daq.configs import config_names
+    from sim.unit import load_unit
+
+    if unit.name.lower() not in config_names("units"):
+        return name
+    differ = differing_values(unit, load_unit(unit.name.lower()))
+    if not differ:
+        return f"{name}\nas the shipped {unit.name}"
+    return f"{name}\ndiffers from the shipped one: {', '.join(differ)}"
 
 
 def _values(unit: Unit, limits: bool) -> dict[str, Value]:

@@ -63,6 +63,40 @@ def test_a_measurement_is_opened_with_the_unit_file_it_was_made_with(measured, d
     assert "2.75e-3" in desk.request().header.configurations["unit"]
 
 
+def test_the_screen_says_which_of_two_units_of_a_name_it_is(measured, db, tmp_path):
+    _, text = measured("ADSS")
+    own, same = tmp_path / "own.toml", tmp_path / "same.toml"
+    own.write_text(text.replace("R_m = 4.10", "R_m = 4.5"), encoding="utf-8")
+    same.write_bytes(config_path("units", "adss").read_bytes())
+    desk = Desk(db)
+    desk.choose_unit(str(own))
+    differs = "differs from the shipped one: R_m, J_L, source_vpk"
+    assert desk.unit_origin == f"{own}\n{differs}"
+    desk.choose_unit(str(same))
+    assert desk.unit_origin == f"{same}\nas the shipped ADSS"
+    desk.choose_unit("ADSS")
+    assert (desk.unit_origin, desk.unit_name, desk.recipe) == ("", "adss", "adss")
+
+    async def way():
+        async with operated(db) as op:
+            units = op.app.screen.query_one("#units")
+            assert units.highlighted == 0
+            assert "differs" not in op.screen
+            await op.press("7", "u", "enter")
+            await op.sees("[5 Result]")
+            await op.press("1")
+            await op.sees(
+                "unit of measurement 1", "differs from the shipped one: J_L,", "source_vpk"
+            )
+            assert units.highlighted is None
+            units.focus()
+            await op.press("down")
+            assert "differs" not in op.screen
+            assert op.app.desk.unit == SHIPPED
+
+    run_screen(way)
+
+
 def test_a_unit_as_it_is_shipped_keeps_its_recipe(run, db):
     run(*measuring())
     with Store(db, read_only=True) as store:

@@ -64,6 +64,8 @@ class Desk:
     unit_name: str = ""
     """Name or path that `unit` was chosen by, or of which measurement it is."""
     unit: Unit | None = None
+    unit_origin: str = ""
+    """Which one it is, where it is none of those that come with lashbench."""
     unit_text: str | None = None
     """The file of a unit that came from the history and has no name or path."""
     serial: str = ""
@@ -109,10 +111,12 @@ class Desk:
         ConfigurationError
             If there is none of that name or path; the one before stays.
         """
+        from daq.configs import config_names
         from sim.unit import load_unit
 
         unit = load_unit(name)
-        self._put(name, unit, None)
+        shipped = name.lower() in config_names("units")
+        self._put(name.lower() if shipped else name, unit, None)
         return unit
 
     def begin_anew(self) -> None:
@@ -175,9 +179,14 @@ class Desk:
 
     def _put(self, name: str, unit: Unit, text: str | None) -> None:
         """Another unit has a sweep of its own."""
+        from daq.configs import config_names
+        from tui.unit_differences import origin_words
+
         if name != self.unit_name:
             self.options, self.given_plan, self.resume = PlanOptions(), None, None
         self.unit_name, self.unit, self.unit_text = name, unit, text
+        shipped = text is None and name in config_names("units")
+        self.unit_origin = "" if shipped else origin_words(unit, name)
 
     @property
     def recipe(self) -> str | None:

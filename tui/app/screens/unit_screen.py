@@ -86,6 +86,10 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
         self._list_sessions()
         for name in _REMARKS:
             self.query_one(f"#{name}", Input).value = getattr(self.desk, name)
+        units = self.query_one("#units", OptionList)
+        places = {option.id: place for place, option in enumerate(units.options)}
+        # None of them, where another of that name is on the desk.
+        units.highlighted = places.get(self.desk.unit_name)
 
     def show_body(self) -> None:
         """Parameters and limits of the unit chosen; the sessions where one began or ended."""
@@ -100,7 +104,8 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
         cells.sort(key=len)  # the one with a long name goes on a line of its own
         half = len(cells) // 2
         pairs = [f"{left} {right}" for left, right in zip(cells[:half], cells[half:], strict=False)]
-        lines = [f"{unit.name}: SI units, b_t in degrees", *pairs, *cells[2 * half :]]
+        origin = self.desk.unit_origin.splitlines()
+        lines = [f"{unit.name}: SI units, b_t in degrees", *origin, *pairs, *cells[2 * half :]]
         self.query_one("#parameter-list", Static).update("\n".join(lines))
         self.query_one("#limits", Static).update(
             f"limits: {limits.source_vpk:g} V peak, offset {limits.source_offset_v:g} V\n"
