@@ -16,7 +16,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from daq.errors import InputError
+from daq.errors import ConfigurationError, InputError
 from tui.options import real_number
 
 if TYPE_CHECKING:
@@ -349,12 +349,15 @@ def _check_same_values(before: Measurement, unit: Unit) -> None:
     from tui.unit_differences import differing_values
 
     if "unit" not in before.header.configurations:
-        return  # Nobody knows the values of before.
+        return
+    try:
+        as_begun = unit_as_measured(before)
+    except ConfigurationError:
+        # Nobody knows the values of before; that keeps no sweep from being finished.
+        return
     differ = [
         f"{name} is {_shown(now)} and was {_shown(then)}"
-        for name, (now, then) in differing_values(
-            unit, unit_as_measured(before), limits=False
-        ).items()
+        for name, (now, then) in differing_values(unit, as_begun, limits=False).items()
     ]
     if differ:
         raise InputError(

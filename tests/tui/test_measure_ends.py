@@ -5,6 +5,7 @@ import os
 import re
 import shlex
 import signal
+import sqlite3
 import threading
 import time
 
@@ -170,6 +171,17 @@ def test_going_on_with_other_values_of_the_unit_is_refused_and_with_other_limits
         assert (ended, said in err) == (code, True), err
     with Store(db, read_only=True) as store:
         assert store.measurement(1).state == "complete"
+
+
+@pytest.mark.parametrize("kept", [{"unit": "["}, {"unit": "schema = 1"}, {}])
+def test_a_unit_file_of_before_that_cannot_be_read_keeps_no_sweep_from_being_finished(
+    run, db, monkeypatch, kept
+):
+    stopped(run, monkeypatch)
+    with sqlite3.connect(db) as history:
+        history.execute("UPDATE measurements SET configurations = ?", (json.dumps(kept),))
+    history.close()
+    assert run("measure", "--unit", "adss", "--instrument", "sim:", "--resume", "1")[0] == 0
 
 
 SAID = ["--serial", "S", "--operator", "anna", "--notes", "one", "--spacing", "log"]
