@@ -8,7 +8,7 @@ a sweep err together. It judges nothing.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,20 +30,19 @@ class OwnRun:
     """A run of a hypothesis in place of the observation.
 
     `place` (d,): where it was made. `alone`: the hypothesis's surface from
-    the half of its runs that deviates otherwise. `as_read` (3, rows): the run
+    the half of its runs that deviates otherwise, `others` (n,). `as_read` (3, rows): the run
     with reading noise, minus the true observation; `quiet` (rows,): its state.
     """
 
     place: NDArray[np.float64]
     alone: Surface
+    others: NDArray[np.bool_]
     as_read: NDArray[np.float64]
     quiet: NDArray[np.bool_]
 
     def seen_by(self, surface: Surface) -> Surface:
         """Another hypothesis's surface, relative to this run instead of the observation."""
-        motions = surface.motions.against(self.quiet)
-        difference = _wrapped(surface.difference - self.as_read)
-        return replace(surface, difference=difference, motions=motions)
+        return surface.against(self.as_read, self.quiet)
 
 
 def own_runs(candidate: Candidate, rng: np.random.Generator) -> Iterator[OwnRun]:
@@ -68,16 +67,8 @@ def own_runs(candidate: Candidate, rng: np.random.Generator) -> Iterator[OwnRun]
             continue
         as_read = surface.difference[i].copy()
         as_read[:2] += rng.standard_normal((2, len(noise))) * noise
-        moved = _wrapped(surface.difference[others] - as_read)
         quiet = surface.motions.quiet[i]
-        motions = surface.motions.of(others).against(quiet)
-        alone = replace(surface, places=surface.places[others], difference=moved, motions=motions)
+        alone = surface.of(others).against(as_read, quiet)
         if alone.lost(surface.places[i]) <= most_lost:
             taken += 1
-            yield OwnRun(surface.places[i], alone, as_read, quiet)
-
-
-def _wrapped(difference: NDArray[np.float64]) -> NDArray[np.float64]:
-    difference = difference.copy()
-    difference[:, 1] = np.angle(np.exp(1j * difference[:, 1]))
-    return difference
+            yield OwnRun(surface.places[i], alone, others, as_read, quiet)

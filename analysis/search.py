@@ -227,11 +227,21 @@ def _look_at_all(
         missing = compare(fine, rng)
         if doubted or not is_doubtful(fine.best, rng):
             break
-    leader = fine.best.hypothesis.effects
+    leader = _plainest(fine)
     alone = missing and len(leader) == 1 and not (doubted or fine.purse.is_spent)
     if alone and not is_hardly_missing(fine, rng):
         look_for_second(rough, fine, atlas, leader, rng)
     return missing, doubted
+
+
+def _plainest(fine: Hunt) -> Effects:
+    """The leader, or who is close to it and says the same with fewer sizes: that is named.
+
+    What is looked for behind a heavier load has fewer sizes to be told from, and is no payload's.
+    """
+    close = fine.leading(len(fine.found), CLOSE)
+    alike = [key for key in close if is_felt_alike(fine.best, fine.found[key])]
+    return (alike or close)[0]
 
 
 def _search_late(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Generator) -> None:
@@ -255,11 +265,12 @@ def _look_behind_single(rough: Hunt, fine: Hunt, atlas: Atlas, rng: np.random.Ge
     close = [k for k in fine.leading(len(fine.found), CLOSE) if len(k) == 1 and k in rough.found]
     if not close:
         return
-    leader = fine.best.hypothesis.effects
+    leader, plainest = fine.best.hypothesis.effects, _plainest(fine)
+    first = plainest if plainest in close else close[0]
     refused = is_refused_now(fine, rng.spawn(1)[0])
-    alone = leader == close[0] and not fine.purse.has_spent(_ON_SECOND)
+    alone = first == plainest and not fine.purse.has_spent(_ON_SECOND)
     if refused or (alone and not is_hardly_missing(fine, rng)):
-        look_for_second(rough, fine, atlas, close[0], rng)
+        look_for_second(rough, fine, atlas, first, rng)
         if fine.best.hypothesis.effects != leader:
             compare(fine, rng)
             see_it_predict(fine)

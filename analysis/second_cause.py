@@ -20,7 +20,8 @@ from analysis.causes import Hypothesis
 from analysis.chart import Chart
 from analysis.contest import catch_up, has_fewer, settle
 from analysis.hunt import Hunt
-from analysis.lending import leads_with_lent, on_the_other_side
+from analysis.lending import gains_with_lent, leads_with_lent, on_the_other_side
+from analysis.likeness import is_felt_alike
 from analysis.pairs import BESIDE_REACH, at_few_frequencies, look_at_felt, look_beside
 from analysis.parts import earns
 from analysis.screening import Additions, add_causes, near, ranked, screen_felt, screen_singles
@@ -38,13 +39,14 @@ _CLOSER, _CLOSER_GROUPS, _BEHIND = 3, 3, 45.0
 with their own alone, in how many groups about what is learned of them; and the log-likelihood by
 their own runs behind the leader from which none is: few rank by chance."""
 
-_ON_ALL, _ALL_GROUPS, _LEAD = 4, 4, 3.0
-"""How many are simulated on all rows, in how many groups, and the log-likelihood on few rows by
-which they must lead. True ones led by 4 to 57 and false ones by 28 at most."""
+_ON_ALL, _ALL_GROUPS = 4, 4
+"""How many at most are simulated on all rows, and in how many groups."""
 
-_BEST, _BEHIND_LEADER = 2, 3.0
-"""The best of them are if they are so little behind: few rows tell little. Less play behind a light
-load led by 4 and lay 1 behind by two draws of runs, and led by 94 and 96 on all."""
+_LIKELY, _BEHIND_LEADER = 2.0, 3.0
+"""How much more of what was observed than of the leader's own runs these must explain on few rows
+(`analysis.lending`), and the log-likelihood that they may be behind it. In nine draws of runs true
+ones, or what passes for them, explained 2.7 to 6.6 more; in nine draws behind a cause that is alone
+the likeliest false one explained -0.3 to 1.9 more, which led by up to 12."""
 
 _NEARLY, _BEHIND_BEST, _SURE = 10.0, 30.0, 20.0
 """What they must lead by on all rows, and how far behind the best of them they may be, to get as
@@ -96,7 +98,7 @@ def look_for_second(
         If a motion grew without bound.
     """
     additions = add_causes(rough.unit, rough.observation, atlas)
-    beside = _worth(rough, additions, fine.found[leader])
+    beside = _worth(rough, additions, fine.found[leader], rng.spawn(1)[0])
     others = _stood_for(rough, additions, atlas, leader)
     if not beside and not others or fine.purse.is_spent:
         return
@@ -132,6 +134,12 @@ class _Standing:
             self.leads.update(leads_with_lent(self.fine, self.additions, self.leader, keys))
 
     @property
+    def first(self) -> Effects:
+        """Who leads the hunt; the leader, too, where that says the same with fewer sizes."""
+        best, leader = self.fine.best, self.fine.found[self.leader]
+        return self.leader if is_felt_alike(best, leader) else best.hypothesis.effects
+
+    @property
     def near(self) -> list[Effects]:
         """Those that lead by as much as is called for and are close to the best, first of all."""
         least = max(_CALLED_FOR, max(self.leads.values(), default=0.0) - _BEHIND_BEST)
@@ -148,7 +156,7 @@ def _contest(standing: _Standing, rng: np.random.Generator) -> None:
     """Keep sets with a second cause if one brings more than chance does, with runs enough."""
     fine, leader = standing.fine, standing.leader
     for _ in range(_ROUNDS):
-        best = next(iter(standing.near), fine.best.hypothesis.effects)
+        best = next(iter(standing.near), standing.first)
         few = [key for key in (leader, best) if len(fine.found[key].population) < _ASKED]
         if best == leader or fine.purse.is_spent or not few:
             break
@@ -173,7 +181,7 @@ def _contest(standing: _Standing, rng: np.random.Generator) -> None:
         else:
             refused.append(standing.leads[best])
             standing.leave_out([best])
-    if fine.best.hypothesis.effects in (leader, *standing.leads):
+    if standing.first in (leader, *standing.leads):
         standing.leave_out(list(standing.leads))
 
 
@@ -210,7 +218,9 @@ def _leads(fine: Hunt, keys: Sequence[Effects], leader: Effects) -> dict[Effects
     return {key: fine.found[key].best.log_likelihood - alone for key in keys}
 
 
-def _worth(rough: Hunt, additions: Additions, leader: Candidate) -> dict[Effects, float]:
+def _worth(
+    rough: Hunt, additions: Additions, leader: Candidate, rng: np.random.Generator
+) -> dict[Effects, float]:
     """Pairs with the leader that are worth simulating on all rows, and how far they lead."""
     alone, place = leader.hypothesis, leader.best.place
     placed = place_beside(at_few_frequencies(rough), additions, alone, place)
@@ -223,10 +233,9 @@ def _worth(rough: Hunt, additions: Additions, leader: Candidate) -> dict[Effects
     hopeful = list(dict.fromkeys(hopeful))
     rough.settle(hopeful, _CLOSER_GROUPS)
     leads = leads_with_lent(rough, additions, alone.effects, hopeful)
-    best = _best(leads, _ON_ALL)
-    ahead = [key for key in best if leads[key] > _LEAD]
-    nearly = [key for key in best[:_BEST] if leads[key] > -_BEHIND_LEADER]
-    return {key: leads[key] for key in dict.fromkeys([*ahead, *nearly])}
+    gains = gains_with_lent(rough, additions, alone.effects, hopeful, rng)
+    likely = [key for key in _best(gains, _ON_ALL) if gains[key] > _LIKELY]
+    return {key: leads[key] for key in likely if leads[key] > -_BEHIND_LEADER}
 
 
 def _best(leads: Mapping[Effects, float], most: int) -> list[Effects]:

@@ -11,7 +11,7 @@ unwrapped: near the right place the difference is small.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -168,6 +168,26 @@ class Surface:
                 if found.log_likelihood > best.log_likelihood:
                     best = found
         return fits
+
+    def of(self, runs: NDArray[np.bool_]) -> Surface:
+        """The surface over some of the runs (n,)."""
+        return replace(
+            self,
+            places=self.places[runs],
+            difference=self.difference[runs],
+            motions=self.motions.of(runs),
+            coordinates=self._charted[:, runs],
+        )
+
+    def against(self, as_read: NDArray[np.float64], quiet: NDArray[np.bool_]) -> Surface:
+        """The same surface relative to something else that was read.
+
+        `as_read` (3, rows): that minus the observation; `quiet` (rows,): its state of motion.
+        """
+        difference = self.difference - as_read
+        difference[:, 1] = np.angle(np.exp(1j * difference[:, 1]))
+        motions = self.motions.against(quiet)
+        return replace(self, difference=difference, motions=motions, coordinates=self._charted)
 
     def shares(self, fits: Sequence[Fit]) -> NDArray[np.float64]:
         """How much each place (count,) of a walk is believed, by the rows it was fitted to.

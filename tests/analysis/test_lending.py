@@ -10,7 +10,7 @@ import synthetic_search
 from analysis import lending
 from analysis.causes import Hypothesis
 from analysis.hunt import Hunt
-from analysis.lending import leads_with_lent
+from analysis.lending import gains_with_lent, leads_with_lent
 
 ADSS = synthetic.ADSS
 LEADER, TRUE = ("load-inertia",), ("amplifier-lag", "load-inertia")
@@ -61,6 +61,32 @@ def test_lent_runs_tell_a_true_pair_that_few_of_its_own_leave_behind(runs, seed)
 def test_nobody_leads_by_lent_runs_where_nothing_hides(runs, seed):
     leads = leads_with_lent(hunted(0.0, seed), ADDITIONS, LEADER, [TRUE, *FALSE])
     assert max(leads.values()) < 5.0
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_true_pair_explains_more_of_what_is_observed_than_of_the_leaders_own_runs(runs, seed):
+    looking = hunted(0.1, seed)
+    before = dict(looking.found)
+    rng = np.random.default_rng(seed)
+    gains = gains_with_lent(looking, ADDITIONS, LEADER, [TRUE, *FALSE], rng)
+    # Of six draws: 85 to 213, and others that do a little of the same 11 at most.
+    assert max(gains[key] for key in FALSE) < 20.0 < 50.0 < gains[TRUE]
+    assert list(gains) == [TRUE, *FALSE]
+    assert looking.found == before
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_where_nothing_hides_what_is_observed_is_explained_as_own_runs_are(runs, seed):
+    looking, rng = hunted(0.0, seed), np.random.default_rng(seed)
+    gains = gains_with_lent(looking, ADDITIONS, LEADER, [TRUE, *FALSE], rng)
+    # Of six draws: -0.5 to 0.9.
+    assert max(map(abs, gains.values())) < 2.0
+
+
+def test_nothing_is_told_of_a_gain_where_no_own_runs_can_be_compared(runs, monkeypatch):
+    monkeypatch.setattr(lending, "own_runs", lambda *_: iter(()))
+    looking, rng = hunted(0.0, 1), np.random.default_rng(1)
+    assert gains_with_lent(looking, ADDITIONS, LEADER, [TRUE], rng) == {TRUE: np.inf}
 
 
 @pytest.mark.parametrize(

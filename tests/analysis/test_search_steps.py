@@ -251,32 +251,40 @@ def test_a_cause_of_one_size_that_few_rows_leave_far_behind_gets_fewer_runs(plai
 
 
 PAIR, SINGLE = ("load-inertia", "shaft-damping"), ("load-inertia",)
+PAYLOAD = ("payload-flexibility",)
 
 
 @pytest.mark.parametrize(
-    ("doubted", "spent", "hardly", "leader", "looked_behind"),
+    ("doubted", "spent", "hardly", "leader", "alike", "behind"),
     [
-        (False, False, False, SINGLE, True),
-        (True, False, False, SINGLE, False),
-        (False, True, False, SINGLE, False),
-        (False, False, True, SINGLE, False),
-        (False, False, False, PAIR, False),
-        (False, False, False, (), False),
+        (False, False, False, SINGLE, None, SINGLE),
+        (True, False, False, SINGLE, None, None),
+        (False, True, False, SINGLE, None, None),
+        (False, False, True, SINGLE, None, None),
+        (False, False, False, PAIR, None, None),
+        (False, False, False, (), None, None),
+        # Where one that is close says the same with fewer sizes it is that one that is named.
+        (False, False, False, PAYLOAD, SINGLE, SINGLE),
+        (False, False, False, PAYLOAD, None, PAYLOAD),
     ],
 )
 def test_whether_pairs_were_searched_is_told(
-    monkeypatch, doubted, spent, hardly, leader, looked_behind
+    monkeypatch, doubted, spent, hardly, leader, alike, behind
 ):
     """A second cause is looked for behind one that nobody doubts, where it may be paid for.
 
     But for one that leads a plain model that will do by too little to be named.
     """
-    best = SimpleNamespace(hypothesis=Hypothesis(ADSS, leader))
+    close = [leader, ("motor-constant",), SINGLE]
+    found = {key: SimpleNamespace(hypothesis=Hypothesis(ADSS, key)) for key in close}
     fine = SimpleNamespace(
-        found={}, best=best, take_over=lambda *_: None, hear=lambda: None,
-        purse=SimpleNamespace(is_spent=spent),
+        found=found, best=found[leader], take_over=lambda *_: None, hear=lambda: None,
+        purse=SimpleNamespace(is_spent=spent), leading=lambda *_: close,
     )  # fmt: skip
     beside = []
+    monkeypatch.setattr(
+        search, "is_felt_alike", lambda one, other: other.hypothesis.effects == alike
+    )
     monkeypatch.setattr(search, "_third", lambda _: [])
     monkeypatch.setattr(search, "is_doubtful_still", lambda *_: False)
     monkeypatch.setattr(search, "is_doubtful", lambda *_: False)
@@ -285,12 +293,14 @@ def test_whether_pairs_were_searched_is_told(
     monkeypatch.setattr(search, "look_for_second", lambda *given: beside.append(given[3]))
     rough = SimpleNamespace(found={}, leading=lambda *_: [])
     assert search._look_at_all(rough, fine, {}, None, doubted) == (True, doubted)
-    assert beside == [leader] * looked_behind
+    assert beside == ([behind] if behind else [])
 
 
 @pytest.mark.parametrize(
     ("close", "refused", "spent", "hardly", "behind", "found", "steps"),
     [
+        # A payload that another cause at the load stands for is looked behind as that one.
+        ([PAYLOAD, SINGLE, PAIR], False, 0.7, False, SINGLE, True, ["compare", "predict"]),
         ([PAIR, SINGLE, ("x",)], True, 0.9, False, SINGLE, True, ["compare", "predict"]),
         ([SINGLE, PAIR], True, 0.9, False, SINGLE, False, []),
         ([SINGLE, PAIR], False, 0.7, False, SINGLE, True, ["compare", "predict"]),
@@ -316,11 +326,13 @@ def test_behind_the_best_single_cause_is_looked_once_more_after_pairs_were_searc
     def standing(effects):
         return SimpleNamespace(hypothesis=Hypothesis(ADSS, effects))
 
+    known = {key: SimpleNamespace() for key in close}
     fine = SimpleNamespace(
-        found=dict.fromkeys(close), best=standing(close[0]), leading=lambda most, far: close,
+        found=known, best=standing(close[0]), leading=lambda most, far: close,
         purse=Purse(effort, granted_s=1e6),
     )  # fmt: skip
-    rough = SimpleNamespace(found=[SINGLE, ("x",), PAIR])
+    rough = SimpleNamespace(found=[SINGLE, ("x",), PAIR, PAYLOAD])
+    payload = fine.best if close[0] == PAYLOAD else None
 
     def look(rough, fine, atlas, leader, rng):
         looked.append(leader)
@@ -328,6 +340,11 @@ def test_behind_the_best_single_cause_is_looked_once_more_after_pairs_were_searc
             fine.best = standing(("load-inertia", "shaft-stiffness"))
 
     monkeypatch.setattr(search, "look_for_second", look)
+    monkeypatch.setattr(
+        search,
+        "is_felt_alike",
+        lambda one, other: one is payload and other is fine.found.get(SINGLE),
+    )
     monkeypatch.setattr(search, "is_refused_now", lambda *_: refused)
     monkeypatch.setattr(search, "is_hardly_missing", lambda *_: hardly)
     monkeypatch.setattr(search, "compare", lambda *_: done.append("compare"))

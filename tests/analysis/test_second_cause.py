@@ -72,27 +72,25 @@ def lent(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("own", "lent", "closer", "gain", "kept"),
+    ("own", "lent", "gains", "closer", "kept"),
     [
-        # The best three by each measure are looked at closer, those that then lead go on.
-        ((-9.0, -5.0, -40.0, -46.0), (0.0, 5.0, 4.0, 7.0), [3, 1, 2, 0], 0.0, [3, 1, 2]),
+        # The best three by each measure are looked at closer.
+        ((-9.0, -5.0, -40.0, -46.0), (0.0, 5.0, 4.0, 7.0), (3.0,) * 4, [3, 1, 2, 0], [3, 1, 2, 0]),
         # None by its own runs that is far behind, and no more than three by lent ones.
-        ((-50.0,) * 5, (6.0, 5.0, 3.5, 3.4, 3.3), [0, 1, 2], 0.0, [0, 1, 2]),
-        # The best two even if they lead by nothing, others only if they lead.
-        ((-50.0,) * 3, (2.9, -2.9, -2.95), [0, 1, 2], 0.0, [0, 1]),
-        ((-50.0,) * 3, (2.9, -3.1, -3.2), [0, 1, 2], 0.0, [0]),
-        ((-50.0,) * 3, (3.1, 3.05, 2.9), [0, 1, 2], 0.0, [0, 1]),
-        # Few runs had it behind by either measure, and more of them show that it leads.
-        ((-31.0,), (-16.0,), [0], 20.0, [0]),
-        ((-4.0, -5.0, -6.0, -7.0), (9.0, 8.0, 7.0, 6.0), [0, 1, 2], 0.0, [0, 1, 2]),
+        ((-50.0,) * 5, (6.0, 5.0, 3.5, 3.4, 3.3), (3.0,) * 5, [0, 1, 2], [0, 1, 2]),
+        # Those that explain more of what was observed than of the leader's own runs go on, however
+        # little they lead by.
+        ((-50.0,) * 3, (12.0, 5.0, -2.9), (1.9, 2.1, 2.1), [0, 1, 2], [1, 2]),
+        ((-50.0,) * 3, (12.0, 5.0, -3.1), (1.9, -1.0, 2.1), [0, 1, 2], []),
+        # Four at most, who explain most of all.
         (
             (-30.0, -29.0, -28.0, -9.0, -8.0, -7.0), (9.0, 8.0, 7.0, 6.0, 5.0, 4.0),
-            [0, 1, 2, 5, 4, 3], 0.0, [0, 1, 2, 3],
+            (2.5, 2.4, 2.3, 2.6, 2.7, 2.8), [0, 1, 2, 5, 4, 3], [5, 4, 3, 0],
         ),
     ],
 )  # fmt: skip
 def test_those_placed_best_beside_a_leader_are_kept_where_runs_bear_them_out(
-    monkeypatch, own, lent, closer, gain, kept
+    monkeypatch, own, lent, gains, closer, kept
 ):
     """Sixteen are simulated about their places, and the leader as often about its own."""
     leader, place, started, settled, mirrored = ("load-inertia",), np.array([0.3, 0.6]), {}, [], []
@@ -136,19 +134,25 @@ def test_those_placed_best_beside_a_leader_are_kept_where_runs_bear_them_out(
 
     def leads(hunt, additions, of, keys):
         assert (additions, of) == ("sums", leader)
-        return {key: given.get(key, (0.0, -300.0))[1] + gain * (key in settled) for key in keys}
+        return {key: given.get(key, (0.0, -300.0))[1] for key in keys}
+
+    def explain(hunt, additions, of, keys, rng):
+        assert (additions, of, list(keys)) == ("sums", leader, settled)
+        known = dict(zip(given, gains, strict=True))
+        return {key: known.get(key, -1.0) for key in keys}
 
     monkeypatch.setattr(second_cause, "place_beside", beside)
     monkeypatch.setattr(second_cause, "on_the_other_side", lambda known, places: list(places)[1:3])
     monkeypatch.setattr(second_cause, "leads_with_lent", leads)
+    monkeypatch.setattr(second_cause, "gains_with_lent", explain)
     monkeypatch.setattr(pairs, "_is_at_an_end", lambda _: False)
     alone = SimpleNamespace(hypothesis=Hypothesis(ADSS, leader), best=SimpleNamespace(place=place))
-    found = second_cause._worth(Rough(), "sums", alone)
+    found = second_cause._worth(Rough(), "sums", alone, RNG)
     assert set(started) == {leader, *partner[:16]}
     assert all(started[key] is placed[key].place for key in partner[:16])
     assert mirrored == partner[1:3]
     assert [key for key in settled if key in given] == [list(given)[i] for i in closer]
-    assert found == {list(given)[i]: lent[i] + gain for i in kept}
+    assert list(found.items()) == [(list(given)[i], lent[i]) for i in kept]
 
 
 @pytest.mark.parametrize(
@@ -202,11 +206,13 @@ OTHER = ("load-inertia", "shaft-damping")
 
 def looked_behind(
     monkeypatch, ahead, looks=99, *, earning=(PAIR, OTHER), gains=None, few=5.0, runs=None,
-    asked_with=None,
+    asked_with=None, before=None, stands_for_it=None,
 ):  # fmt: skip
     """The hunt on all rows after pairs were worth it, so far ahead of their leader.
 
-    `runs`: of some of them, where it is not 40; `asked_with`: where runs of who is asked are kept.
+    `runs`: of some of them, where it is not 40; `asked_with`: where runs of who is asked are kept;
+    `before`: what else stands on all rows, and how far ahead; `stands_for_it`: what says the same
+    as the leader with more sizes.
     """
     runs = runs or {}
     found = {
@@ -218,17 +224,23 @@ def looked_behind(
         for key, likelihood in ((LEADER, 100.0), *((k, 100.0 + a) for k, a in ahead.items()))
     }
     fine = Beside(found[LEADER], looks, gains or {})
+    for key, likelihood in (before or {}).items():
+        best = SimpleNamespace(place=None, log_likelihood=100.0 + likelihood)
+        fine.found[key] = SimpleNamespace(hypothesis=Hypothesis(ADSS, key), best=best)
     rough = SimpleNamespace(unit=ADSS, observation=SimpleNamespace(frequency_hz=None), found=found)
     monkeypatch.setattr(second_cause, "add_causes", lambda *_: None)
     monkeypatch.setattr(second_cause, "_worth", lambda *_: dict.fromkeys(ahead, few))
     monkeypatch.setattr(second_cause, "_stood_for", lambda *_: [])
+    monkeypatch.setattr(
+        second_cause, "is_felt_alike", lambda one, _: one.hypothesis.effects == stands_for_it
+    )
 
-    before = []
+    refusals = []
 
     def asked(whole, part, _, refused):
         assert part.hypothesis.effects == LEADER
-        assert refused == len(before)
-        before.append(whole)
+        assert refused == len(refusals)
+        refusals.append(whole)
         enough = min(len(part.population), second_cause._ASKED)
         assert fine.purse.is_spent or len(whole.population) >= enough
         if asked_with is not None:
@@ -271,6 +283,17 @@ def test_who_brings_no_more_than_chance_behind_a_cause_is_left_out(monkeypatch):
     fine = looked_behind(monkeypatch, ahead, earning=others)
     assert fine.settled[1:] == [*both, [OTHER]]
     assert list(fine.found) == [LEADER]
+
+
+@pytest.mark.parametrize("alike", [False, True])
+def test_where_what_leads_says_the_same_as_the_leader_no_rival_is_kept_for_it(monkeypatch, alike):
+    """Behind a heavier load that a payload leads it is that load whose second cause was chance."""
+    payload = ("payload-flexibility",)
+    fine = looked_behind(
+        monkeypatch, {PAIR: 60.0, OTHER: 16.0}, earning=(),
+        before={payload: 20.0}, stands_for_it=payload if alike else None,
+    )  # fmt: skip
+    assert list(fine.found) == [LEADER, payload, *([] if alike else [OTHER])]
 
 
 @pytest.mark.parametrize("earning", [(), (PAIR,)])
