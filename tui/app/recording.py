@@ -16,6 +16,7 @@ from daq.analyser import SweepPoint
 from daq.errors import InputError
 from daq.frf import FrequencyResponse, PointFlag
 from daq.store_records import StoredPoint
+from tui.pasted import pasted
 
 if TYPE_CHECKING:
     from daq.plan import SweepPlan
@@ -91,7 +92,8 @@ def read_recording(path: Path, measurement: int | None = None) -> Recording:
         raise InputError(f"{path} is no history; leave --id out")
     if path.suffix == ".jsonl":
         raise InputError(
-            f"{path} is a transcript; run it with: lashbench measure --instrument replay:{path}"
+            f"{path} is a transcript; measure with it as the instrument: "
+            f"--instrument {pasted([f'replay:{path}'])}"
         )
     from daq.formats import read_response
 
