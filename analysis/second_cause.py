@@ -45,7 +45,7 @@ _ON_ALL, _ALL_GROUPS = 4, 4
 _LIKELY, _BEHIND_LEADER = 2.0, 3.0
 """How much more of what was observed than of the leader's own runs these must explain on few rows
 (`analysis.lending`), and the log-likelihood that they may be behind it. In eleven draws of runs
-true ones, or what passes for them, explained 2.7 to 6.4 more; in thirteen of fourteen draws behind
+true ones, or what passes for them, explained 2.7 to 6.4 more; in fifteen of sixteen draws behind
 a cause that is alone the best false one explained -0.9 to 1.9 more, and led by up to 12."""
 
 _NEARLY, _BEHIND_BEST, _SURE = 10.0, 30.0, 20.0
