@@ -282,9 +282,7 @@ def test_whether_pairs_were_searched_is_told(
         purse=SimpleNamespace(is_spent=spent), leading=lambda *_: close,
     )  # fmt: skip
     beside = []
-    monkeypatch.setattr(
-        search, "is_felt_alike", lambda one, other: other.hypothesis.effects == alike
-    )
+    monkeypatch.setattr(search, "is_felt_alike", lambda _, one: one.hypothesis.effects == alike)
     monkeypatch.setattr(search, "_third", lambda _: [])
     monkeypatch.setattr(search, "is_doubtful_still", lambda *_: False)
     monkeypatch.setattr(search, "is_doubtful", lambda *_: False)
@@ -332,7 +330,7 @@ def test_behind_the_best_single_cause_is_looked_once_more_after_pairs_were_searc
         purse=Purse(effort, granted_s=1e6),
     )  # fmt: skip
     rough = SimpleNamespace(found=[SINGLE, ("x",), PAIR, PAYLOAD])
-    payload = fine.best if close[0] == PAYLOAD else None
+    payload = close[0] == PAYLOAD
 
     def look(rough, fine, atlas, leader, rng):
         looked.append(leader)
@@ -340,11 +338,7 @@ def test_behind_the_best_single_cause_is_looked_once_more_after_pairs_were_searc
             fine.best = standing(("load-inertia", "shaft-stiffness"))
 
     monkeypatch.setattr(search, "look_for_second", look)
-    monkeypatch.setattr(
-        search,
-        "is_felt_alike",
-        lambda one, other: one is payload and other is fine.found.get(SINGLE),
-    )
+    monkeypatch.setattr(search, "is_felt_alike", lambda _, one: payload and one is known[SINGLE])
     monkeypatch.setattr(search, "is_refused_now", lambda *_: refused)
     monkeypatch.setattr(search, "is_hardly_missing", lambda *_: hardly)
     monkeypatch.setattr(search, "compare", lambda *_: done.append("compare"))
