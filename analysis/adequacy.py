@@ -17,15 +17,12 @@ import numpy as np
 from analysis.candidate import Candidate
 from analysis.executor import side_by_side
 from analysis.holdout import HeldOut, hold_out_surface
-from analysis.own_runs import MOST_RUNS, OwnRun, own_runs
+from analysis.own_runs import FEWEST_RUNS, MOST_RUNS, OwnRun, own_runs
 from analysis.structure import credited, judge_structure
 
 __all__ = ["Adequacy", "judge_adequacy", "judge_chance", "judge_gain", "misses_alike"]
 
 _TRIES = 2
-
-_FEW = 2
-"""Own runs below which nothing is known of how they scatter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +46,7 @@ def judge_adequacy(candidate: Candidate, rng: np.random.Generator) -> Adequacy:
     `analysis.structure.credited`).
     """
     fits = side_by_side(lambda run: run.alone.climb(run.place, tries=1), own_runs(candidate, rng))
-    if len(fits) < _FEW:
+    if len(fits) < FEWEST_RUNS:
         # Nearly every run did alone what it did: nothing speaks against the observation.
         return Adequacy(0.0, 0.0)
     surface, best = candidate.surface, candidate.best
@@ -100,7 +97,7 @@ def judge_gain(
         return there.log_likelihood - run.alone.climb(run.place, tries=_TRIES).log_likelihood
 
     gains = side_by_side(gain, own_runs(simpler, rng))
-    if len(gains) < _FEW:
+    if len(gains) < FEWEST_RUNS:
         return 0.0, float("inf")
     scatter = max(float(np.std(gains)), 1e-9)
     beyond = (seen - max(float(np.mean(gains)), -scatter)) / scatter

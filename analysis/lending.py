@@ -19,15 +19,12 @@ from analysis.candidate import Candidate, Effects, form_candidates
 from analysis.causes import Hypothesis
 from analysis.executor import side_by_side
 from analysis.hunt import Hunt
-from analysis.own_runs import OwnRun, own_runs
+from analysis.own_runs import FEWEST_RUNS, OwnRun, own_runs
 from analysis.population import Population
 from analysis.screening import Additions
 from analysis.surface import Surface
 
 __all__ = ["gains_with_lent", "leads_with_lent", "on_the_other_side"]
-
-_FEW = 2
-"""Own runs below which nothing is known of how they scatter."""
 
 _TO_STD = 1.4826
 """Of normal values the standard deviation, in medians of how far they are from their median."""
@@ -71,7 +68,7 @@ def gains_with_lent(
     """
     alone, with_lent = _lend(hunt, additions, leader, keys)
     runs = list(own_runs(alone, rng))
-    if len(runs) < _FEW:
+    if len(runs) < FEWEST_RUNS:
         return dict.fromkeys(with_lent, math.inf)
     by_itself = side_by_side(lambda run: _fitted(run.alone, run.place), runs)
     first = alone.population.deviations[:, 0]

@@ -16,10 +16,13 @@ from numpy.typing import NDArray
 from analysis.candidate import Candidate
 from analysis.surface import Surface
 
-__all__ = ["MOST_RUNS", "OwnRun", "own_runs"]
+__all__ = ["FEWEST_RUNS", "MOST_RUNS", "OwnRun", "own_runs"]
 
 MOST_RUNS = 48
 """Runs that are taken in turn: the nearest to the best place."""
+
+FEWEST_RUNS = 2
+"""Own runs below which nothing is known of how they scatter."""
 
 _LOST = 0.02
 """Share of rows at which a run may do what no other does, if the observation has no more."""
