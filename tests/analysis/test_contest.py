@@ -17,35 +17,41 @@ ADSS = synthetic.ADSS
 @pytest.mark.parametrize(
     ("causes", "missed", "second", "rounds"),
     [
-        (1, [1.0], 10.0, 0),
-        (1, [1.29], 10.0, 0),
-        (1, [1.6, 1.1], 10.0, 1),
-        (1, [1.6, 1.5, 1.2], 10.0, 2),
-        (1, [1.6] * 4, 10.0, 3),
-        (1, [1.6] * 4, 199.0, 3),
-        (1, [1.6] * 5 + [1.2], 201.0, 5),
-        (1, [1.6] * 9, 201.0, 7),
-        (1, [2.6], 10.0, 0),
-        (2, [0.99], 201.0, 0),
-        (2, [1.1, 1.1, 0.9], 201.0, 2),
+        # What is missed is that with every reading, too, if it is not said apart.
+        (1, [1.0], 10.0, 0), (1, [1.29], 10.0, 0), (1, [2.6], 10.0, 0), (0, [1.6], 10.0, 0),
+        (1, [1.6, 1.1], 10.0, 1), (1, [1.6, 1.5, 1.2], 10.0, 2), (1, [1.6] * 4, 10.0, 3),
+        (1, [1.6] * 4, 199.0, 3), (1, [1.6] * 5 + [1.2], 201.0, 5), (1, [1.6] * 9, 201.0, 7),
+        (2, [0.99], 201.0, 0), (2, [1.1, 1.1, 0.9], 201.0, 2), (2, [2.6], 10.0, 0),
         (3, [1.6, 1.2, 0.9], 10.0, 2),
-        (2, [2.6], 10.0, 0),
-        (0, [1.6], 10.0, 0),
+        # Few readings far off are worth runs until there are 160.
+        (1, [(0.8, 1.31)] * 9, 201.0, 3), (1, [(0.8, 1.31), (0.8, 1.29)], 201.0, 1),
+        (2, [(0.8, 1.31)] * 9, 10.0, 3), (0, [(0.8, 1.31)], 201.0, 0),
+        (1, [(2.6, 3.0)], 201.0, 0),
     ],
-)
+)  # fmt: skip
 def test_a_leader_that_predicts_badly_gets_more_runs(monkeypatch, causes, missed, second, rounds):
-    settled, left = [], iter(missed)
+    settled = []
+    left = iter(one if isinstance(one, tuple) else (one, one) for one in missed)
     leader = ("amplifier-lag", "load-inertia", "motor-constant")[:causes]
-    best = SimpleNamespace(hypothesis=Hypothesis(ADSS, leader))
+    best = SimpleNamespace(hypothesis=Hypothesis(ADSS, leader), population=range(40))
+
+    def settle(chosen, groups):
+        settled.append(chosen)
+        best.population = range(len(best.population) + 10 * groups)
+
+    def hold_out(*_):
+        few, every = next(left)
+        return SimpleNamespace(missed=few, rms_sigma=every)
+
     fine = SimpleNamespace(
         best=best,
         found={leader: SimpleNamespace(population=range(40))},
         observation=None,
         leading=lambda most, behind: [leader, ()] if second < behind else [leader],
-        settle=lambda chosen, groups: settled.append(chosen),
+        settle=settle,
         hear=lambda: None,
     )
-    monkeypatch.setattr(contest, "hold_out", lambda *_: SimpleNamespace(missed=next(left)))
+    monkeypatch.setattr(contest, "hold_out", hold_out)
     contest.see_it_predict(fine)
     assert settled == [[leader]] * rounds
 
