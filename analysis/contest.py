@@ -43,7 +43,7 @@ __all__ = [
 ]
 
 _NEAR, CLOSE = 120.0, 30.0
-_LAST_ROUNDS, LAST_GROUPS = ((4, _NEAR), (3, 60.0), (3, CLOSE), (3, CLOSE)), 4
+_LAST_ROUNDS, LAST_GROUPS = ((4, _NEAR), (3, 60.0), (3, CLOSE), (3, CLOSE)), 6
 """Rounds in which the leader and those as close behind it as that log-likelihood are looked at
 once more: at most so many, the parts of a leading pair and the baseline, in so many groups each.
 Where none is close all but the first are spared.
@@ -83,12 +83,12 @@ _BETTER, _BACKED, _ROUNDS_BACKED = 0.8, 2, 3
 beside it; how many, how often. A payload with friction lay 213 behind a light load with friction
 and missed 0.78 for 1.37: the load got 700 runs, it 80, and was the truth."""
 
-_ROUND, _ROUND_GROUPS, _MOVED = (1.0, 0.06), 2, 0.1
+_ROUND, _ROUND_GROUPS, _MOVED = (1.0, 0.06), 3, 0.1
 """How far in ratio and sizes a leader that predicts worse than true causes do is looked at from
 where it is, in how many groups, and by how much it is then elsewhere, and gets runs there: a brake
 of four times a motor's friction was found at a ratio of 0.61, and hidden at 0.43."""
 
-_THERE, _THERE_GROUPS = (0.1, 0.03), 8
+_THERE, _THERE_GROUPS = (0.1, 0.03), 12
 """How far about its place in a leading pair a part is looked at that is better at another ratio
 alone, and in how many groups if it has many sizes, unless it is hopeless: there it has more runs.
 Friction of a motor was hidden at 0.45, where pairs with it lay, and led itself by 40 runs there

@@ -38,7 +38,7 @@ a true cause about once in ten times, and the question is asked again on all row
 _CLOSER_LOOKS = 2
 """How often a doubtful leader that is far ahead gets more runs before pairs are looked at."""
 
-_TOO_FAR, _GROUPS = 200.0, 4
+_TOO_FAR, _GROUPS = 200.0, 6
 """Log-likelihood by which it is far ahead, and in how many groups of runs each of these is."""
 
 _REFUSED, _MISSED = 4.0, 2.0

@@ -33,7 +33,7 @@ _POINTS = 31
 _COARSE = 16
 """Frequencies of a proposed sweep, and how many of them are simulated to judge it."""
 
-_GROUPS = 2
+_GROUPS = 4
 _ENOUGH = 0.9
 """A plan that parts the rivals this share as well as the best but takes less time is taken."""
 

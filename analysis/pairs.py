@@ -35,18 +35,18 @@ __all__ = [
     "search_pairs",
 ]
 
-_PAIRS, _PARTNERS, _GLANCE_FREQUENCIES, _GLANCE_GROUPS = 10, 5, 10, 2
-_CLOSER, _AFTER, _GROUPS = 10, 5, (2, 3)
+_PAIRS, _PARTNERS, _GLANCE_FREQUENCIES, _GLANCE_GROUPS = 10, 5, 10, 3
+_CLOSER, _AFTER, _GROUPS = 10, 5, (3, 5)
 """Pairs that the atlas favours, and more of those with the leader in them; at how many frequencies
 they are simulated at first, and in how many groups; how many are looked at closer, twice. What
 two causes do together is seldom the sum of what each does, and few runs rank them by chance. Of
 21 true pairs seventeen stood among the first eight by that sum."""
 
-_FELT_GROUPS = (2, 2, 2)
+_FELT_GROUPS = (3, 3, 3)
 """Groups of each look at a pair that is placed by what the load is felt as: ever closer ones told a
 true one from a cable alone, as many runs about the first place did not."""
 
-_HOPELESS, _BESIDE_GROUPS, BESIDE_REACH = 100.0, 2, (0.12, 0.03)
+_HOPELESS, _BESIDE_GROUPS, BESIDE_REACH = 100.0, 4, (0.12, 0.03)
 """Log-likelihood at few frequencies behind the likeliest, from which on nobody looks at another
 beside a cause of the leading pair; true ones lay up to 75 behind. In how many groups the rest are
 looked at, and how far about their places, which are known well: what sizes further off do would

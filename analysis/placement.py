@@ -21,8 +21,9 @@ from analysis.population import Group
 
 __all__ = ["Reach", "groups_about", "groups_along", "groups_around", "groups_beside"]
 
-_RATIOS = 10
-"""Machines in a group; a second five cost a fifth more time than the first."""
+_RATIOS = 5
+"""Machines in a group. At three levels they fill two narrow vectors or a wide one, so that groups
+of ten take as long as twice as many of five, which have twice as many sizes."""
 
 Reach = tuple[float, float | NDArray[np.float64]]
 """How far groups about a place lie in ratio and in sizes, to either side."""

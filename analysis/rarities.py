@@ -15,7 +15,7 @@ from analysis.screening import ranked, screen_singles
 
 __all__ = ["look_at_rare"]
 
-_MOST, _GROUPS = 2, (4, 4)
+_MOST, _GROUPS = 2, (6, 6)
 """How many rare causes are simulated, and in how many groups at first and when looked at closer."""
 
 _NEAR, _CLOSE = 150.0, 60.0

@@ -29,17 +29,17 @@ from analysis.verdict import LEAST_GAIN, earns_its_name
 
 __all__ = ["look_for_second"]
 
-_TRIED, _OTHER_GROUPS = 16, 1
+_TRIED, _OTHER_GROUPS = 16, 2
 """How many of them are simulated on few rows, and in how many groups on the other side of the
 datasheet's value: by where they were placed true ones stood fourteenth at worst, more play beside a
 light load, where they were to be seen at all."""
 
-_CLOSER, _CLOSER_GROUPS, _BEHIND = 3, 3, 45.0
+_CLOSER, _CLOSER_GROUPS, _BEHIND = 3, 6, 45.0
 """How many of these are looked at closer by each measure, with runs of the leader lent to them and
 with their own alone, in how many groups about what is learned of them; and the log-likelihood by
 their own runs behind the leader from which none is: few rank by chance."""
 
-_ON_ALL, _ALL_GROUPS = 4, 4
+_ON_ALL, _ALL_GROUPS = 4, 8
 """How many at most are simulated on all rows, and in how many groups."""
 
 _LIKELY, _BEHIND_LEADER = 2.0, 3.0

@@ -25,7 +25,7 @@ from sim.unit import Unit
 
 __all__ = ["sharpen_candidate"]
 
-_ROUNDS, _GROUPS = 12, 4
+_ROUNDS, _GROUPS = 12, 8
 _SHARP = 0.035
 """Standard deviation of every coordinate from which on nothing more is simulated."""
 _WORTHWHILE, _BACK = 0.9, 2

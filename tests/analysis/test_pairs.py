@@ -251,7 +251,7 @@ def test_a_closer_look_is_about_the_best_place_so_far_and_as_far_as_usual():
     rough = Standings({("a", "b"): 2.0, ("a", "c"): 1.0})
     rough.start = lambda *given, **more: looks.append((given, more))
     pairs.look_closer_beside(rough, [("a", "c")])
-    assert looks == [(({("a", "c"): "where ('a', 'c') is"}, 3), {})]
+    assert looks == [(({("a", "c"): "where ('a', 'c') is"}, 5), {})]
 
 
 @pytest.mark.parametrize(("pairs_placed", "looked_at"), [(18, 18), (19, 18), (40, 18)])
@@ -301,7 +301,7 @@ def test_who_agrees_best_at_the_end_of_its_ratios_is_followed_and_nobody_else(hi
         found = {}
 
         def start(self, places, groups, reach):
-            assert (groups, reach) == (2, (0.12, 0.03))
+            assert (groups, reach) == (4, (0.12, 0.03))
             looked.append({key: round(float(place[0]), 2) for key, place in places.items()})
             for key, place in places.items():
                 ratios[key] += list(place[0] + np.linspace(-0.12, 0.12, 9))
@@ -369,10 +369,10 @@ def test_a_pair_is_glanced_at_at_both_of_its_ratios(monkeypatch):
     rough = SimpleNamespace(observation=None, thinned=lambda stride: few)
     monkeypatch.setattr(pairs, "coarse_stride", lambda *_: 2)
     assert pairs._glance(rough, places, 10) == ["found other", "found one"]
-    assert started == [({one: "low", other: "middle"}, 2), ({one: "high"}, 2)]
+    assert started == [({one: "low", other: "middle"}, 3), ({one: "high"}, 3)]
 
 
 def test_nothing_to_glance_at_is_no_trouble(runs):
     rough = synthetic_search.hunted([0.8], 1)
-    rough.take_over(pairs._glance(rough, {}, 10), 2)
+    rough.take_over(pairs._glance(rough, {}, 10), 3)
     assert rough.found == {}

@@ -30,7 +30,7 @@ def test_every_size_and_the_ratio_are_spread_evenly_over_the_reach(
         assert sorted(quarters) == [0, 1, 2, 3]
     for group in groups:
         offset = group.ratios - 0.5 + ratio_reach
-        assert list(np.floor(offset / (ratio_reach / 5.0))) == list(range(10))
+        assert list(np.floor(offset / (ratio_reach / 2.5))) == list(range(5))
 
 
 def test_groups_stay_inside_the_plausible_range():

@@ -121,7 +121,7 @@ def test_a_part_with_no_more_runs_than_a_pair_or_at_another_ratio_is_weighed_whe
         hear=lambda: None,
     )
     contest.weigh_parts(fine)
-    wide, close = (part, own.tolist(), 4, None), (part, own.tolist(), 8, (0.1, 0.03))
+    wide, close = (part, own.tolist(), 6, None), (part, own.tolist(), 12, (0.1, 0.03))
     more = [[part] if hopeful else []] if weighed or closer else []
     assert started == [wide] * weighed + [close] * closer + more
 
@@ -246,7 +246,7 @@ def test_a_cause_of_one_size_that_few_rows_leave_far_behind_gets_fewer_runs(plai
     )
     search._look_on_all(rough, fine, list(behind))
     few = [("total-backlash",), *([()] if fewer else [])]
-    assert groups == {key: 2 if key in few else 4 for key in behind}
+    assert groups == {key: 3 if key in few else 6 for key in behind}
     assert heard == [len(behind)]
 
 
@@ -350,9 +350,9 @@ def test_behind_the_best_single_cause_is_looked_once_more_after_pairs_were_searc
 @pytest.mark.parametrize(
     ("lead", "leader_runs", "chance_until", "runs"),
     [
-        (178.0, 160, 80, 80),
+        (178.0, 160, 70, 70),
         (178.0, 160, 400, 160),
-        (178.0, 80, 400, 80),
+        (178.0, 70, 400, 70),
         (178.0, 160, 0, 40),
         (37.0, 160, 400, 40),
     ],
@@ -377,8 +377,8 @@ def test_the_plain_model_gets_more_runs_where_few_say_that_the_leader_leads_by_c
         heard = 0
 
         def settle(self, keys, groups):
-            assert (keys, groups) == ([()], 4)
-            self.found[()].population = range(len(self.found[()].population) + 40)
+            assert (keys, groups) == ([()], 6)
+            self.found[()].population = range(len(self.found[()].population) + 5 * groups)
 
         def hear(self):
             self.heard += 1
@@ -393,4 +393,4 @@ def test_the_plain_model_gets_more_runs_where_few_say_that_the_leader_leads_by_c
     fine = Fine()
     contest.weigh_baseline(fine, np.random.default_rng(0))
     assert len(fine.found[()].population) == runs
-    assert fine.heard == (runs - 40) // 40
+    assert fine.heard == (runs - 40) // 30

@@ -41,7 +41,7 @@ class Beside:
     def settle(self, chosen, groups):
         self.settled.append(chosen)
         for key in chosen:
-            self.found[key].population = range(len(self.found[key].population) + 10 * groups)
+            self.found[key].population = range(len(self.found[key].population) + 5 * groups)
             self.found[key].best.log_likelihood += self.gains.get(key, 0.0)
 
     def hear(self):
@@ -111,18 +111,18 @@ def test_those_placed_best_beside_a_leader_are_kept_where_runs_bear_them_out(
 
         def start(self, places, groups, reach=None):
             assert reach == (0.12, 0.03)
-            if groups == 1:
+            if groups == 2:
                 mirrored.extend(places)
                 return
             started.update(places)
-            assert groups == 2
+            assert groups == 4
             for key in places:
                 off = 0.0 if key == leader else given.get(key, (-300.0, -300.0))[0]
                 best = SimpleNamespace(log_likelihood=100.0 + off, place=None)
                 self.found[key] = SimpleNamespace(best=best)
 
         def settle(self, keys, groups):
-            assert groups == 3
+            assert groups == 6
             settled.extend(keys)
 
         def among(self, keys):
@@ -303,11 +303,11 @@ def test_behind_a_cause_of_many_runs_who_earns_its_name_gets_as_many_afterwards(
     """More of them hardly change what is chance, and are for a comparison."""
     with_runs = []
     fine = looked_behind(
-        monkeypatch, {PAIR: 60.0}, earning=earning, runs={LEADER: 200}, asked_with=with_runs
+        monkeypatch, {PAIR: 60.0}, earning=earning, runs={LEADER: 220}, asked_with=with_runs
     )
     assert with_runs == [160]
     assert {key: len(one.population) for key, one in fine.found.items()} == dict.fromkeys(
-        [LEADER, *earning], 200
+        [LEADER, *earning], 220
     )
 
 
@@ -325,7 +325,7 @@ def test_who_leads_by_far_less_than_what_was_chance_is_not_asked(monkeypatch, le
     assert fine.settled[3:] == [[OTHER]] * asked
 
 
-@pytest.mark.parametrize(("looks", "runs"), [(99, 120), (5, 80)])
+@pytest.mark.parametrize(("looks", "runs"), [(99, 100), (5, 70)])
 def test_who_is_left_is_asked_with_the_runs_it_has_where_all_is_spent(monkeypatch, looks, runs):
     """By few runs a cause leads by less: what then brings more than chance does is no chance."""
     ahead = {PAIR: 60.0, OTHER: 55.0}
@@ -338,7 +338,7 @@ def test_who_brings_more_is_compared_with_others_that_have_as_many_runs(monkeypa
     """Those far behind the best get no more than the first."""
     fine = looked_behind(monkeypatch, {PAIR: 60.0, OTHER: 35.0, ("load-inertia", "x"): 29.0})
     assert fine.settled == [[PAIR, OTHER], [LEADER, PAIR], [LEADER, PAIR], [OTHER], [OTHER]]
-    assert [len(one.population) for one in fine.found.values()] == [120, 160, 160, 40]
+    assert [len(one.population) for one in fine.found.values()] == [100, 130, 130, 40]
 
 
 def test_who_leads_with_lent_runs_gets_as_many_of_its_own_before_it_is_asked(monkeypatch, lent):
@@ -347,7 +347,7 @@ def test_who_leads_with_lent_runs_gets_as_many_of_its_own_before_it_is_asked(mon
     lent |= {PAIR: 80.0, OTHER: 90.0, third: 90.0}
     fine = looked_behind(monkeypatch, {PAIR: -20.0, OTHER: -50.0, third: -65.0})
     assert fine.settled == [[PAIR, OTHER], [LEADER, PAIR], [LEADER, PAIR], [OTHER], [OTHER]]
-    assert [len(one.population) for one in fine.found.values()] == [120, 160, 160, 40]
+    assert [len(one.population) for one in fine.found.values()] == [100, 130, 130, 40]
 
 
 @pytest.mark.parametrize(("few", "once_more"), [(19.0, False), (21.0, True)])

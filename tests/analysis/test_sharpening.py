@@ -19,7 +19,8 @@ TRUE = ("load-inertia",)
 def population_of(groups, rng):
     """Runs of synthetic machines at the places that were asked for."""
     places = np.concatenate([group.places for group in groups])
-    off = np.repeat([rng.normal(0.0, synthetic.SIGMAS) for _ in groups], 10, axis=0)
+    each = [len(group.places) for group in groups]
+    off = np.repeat([rng.normal(0.0, synthetic.SIGMAS) for _ in groups], each, axis=0)
     runs = np.array([synthetic.read(TRUE, p, rng, d) for p, d in zip(places, off, strict=True)])
     mean = np.exp(runs[:, 0] + 1j * runs[:, 1])
     return Population(places, off, mean, np.full(mean.shape, 1e-4))
@@ -114,7 +115,7 @@ def test_a_ratio_that_is_hardly_known_gets_all_rounds(monkeypatch, asked, stds, 
     monkeypatch.setattr(sharpening, "size_candidate", sized(stds))
     monkeypatch.setattr(sharpening, "_ENOUGH", 10_000)
     sharpened(observed)
-    assert asked == [4] * rounds
+    assert asked == [8] * rounds
 
 
 def test_it_gets_no_more_runs_than_are_enough(monkeypatch, asked):

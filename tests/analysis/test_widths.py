@@ -73,8 +73,8 @@ def test_a_coordinate_that_turns_from_row_to_row_is_seen_as_what_it_does_at_each
 def gain_of_more_runs(rng):
     """Log density per run that more runs in a regression bring to runs of groups left out."""
     d, slopes = 5, np.array([1.0, 0.7, 0.5, 0.3, 0.2])
-    sizes = 0.5 + 0.1 * rng.standard_normal((14, d - 1))
-    places = np.repeat(np.column_stack([np.zeros(14), sizes]), 10, axis=0)
+    sizes = 0.5 + 0.1 * rng.standard_normal((28, d - 1))
+    places = np.repeat(np.column_stack([np.zeros(28), sizes]), 5, axis=0)
     places[:, 0] = 0.5 + 0.1 * rng.uniform(-1.0, 1.0, 140)
     shape = 1.0 + np.sin(np.arange(3.0 * ROWS).reshape(3, ROWS))
     moved = places @ slopes + 0.3 * (places - 0.5) ** 2 @ slopes
