@@ -67,7 +67,7 @@ TOO_FAR, HOPELESS = 200.0, 300.0
 """Log-likelihood behind the leader from which the second and the third round leave one out, and the
 last ones its parts, and from which there is no second chance."""
 
-_PREDICTED, _NOT_PREDICTED, _MORE_ROUNDS, _ROUNDS_ALONE = (1.3, 1.0), 2.5, 3, 7
+_PREDICTED, _NOT_PREDICTED, _MORE_ROUNDS, _ROUNDS_ALONE = (1.3, 1.0), 2.5, 4, 9
 """What a leader of one cause, or of several, misses of levels not fitted, in standard deviations,
 from which it gets more runs (several are refused for less, `analysis.verdict`) and up to which
 that may help; how many times, and how many where it leaves all others far behind: a pair with four
@@ -78,12 +78,12 @@ _JUMPED = 1.3
 gone over to the branch of a motion that was observed. Of 80 runs of a damped shaft none was quiet
 there at two tenths below where 70 others were, and it missed three readings by 6 to 18."""
 
-_BETTER, _BACKED, _ROUNDS_BACKED = 0.8, 2, 3
+_BETTER, _BACKED, _ROUNDS_BACKED = 0.8, 2, 4
 """By what factor less one must miss of levels not fitted than a leader that is doubted, to get runs
 beside it; how many, how often. A payload with friction lay 213 behind a light load with friction
 and missed 0.78 for 1.37: the load got 700 runs, it 80, and was the truth."""
 
-_ROUND, _ROUND_GROUPS, _MOVED = (1.0, 0.06), 3, 0.1
+_ROUND, _ROUND_GROUPS, _MOVED = (1.0, 0.06), 4, 0.1
 """How far in ratio and sizes a leader that predicts worse than true causes do is looked at from
 where it is, in how many groups, and by how much it is then elsewhere, and gets runs there: a brake
 of four times a motor's friction was found at a ratio of 0.61, and hidden at 0.43."""
@@ -98,11 +98,13 @@ _PLAINER_BEHIND = 60.0
 """Log-likelihood behind a leader up to which a set that says the same with fewer sizes gets as many
 runs: it was looked at where the leader is, which is not quite where it is best itself."""
 
-_OPEN, _ROUNDS_OPEN = (1.0, 8.0), 4
-"""Structure between which a leader gets more runs, and how many times. What the runs of a true
-cause leave beside a sharp resonance goes with more of them, what a false one leaves stays or grows:
-an amplifier's gain that was withheld left 1.9 as a motor's constant in 80 runs, in 240 2.0 to 4.1.
-Of 28 true ones two left more than the first; what leaves more than the second is settled."""
+_OPEN, _ROUNDS_OPEN, _OPEN_GROUPS = (1.0, 8.0), 4, (4, 4)
+"""Structure between which a leader gets more runs, how many times, and in how many groups along
+what agrees and about what is learned: either alone stays where its runs are. What the runs of a
+true cause leave beside a sharp resonance goes with more of them, what a false one leaves stays or
+grows: an amplifier's gain that was withheld left 1.9 as a motor's constant in 80 runs, in 240 2.0
+to 4.1. Of 28 true ones two left more than the first; what leaves more than the second is settled.
+"""
 
 
 def compare(fine: Hunt, rng: np.random.Generator) -> bool:
@@ -247,9 +249,9 @@ def settle_doubt(fine: Hunt, rng: np.random.Generator) -> None:
         few = [k for k in (leader, *near) if len(fine.found[k].population) < _ENOUGH]
         if leader not in few or not least < judge_adequacy(fine.best, rng).structure < most:
             break
-        # Half where they agree, half about what is learned: either alone stays where its runs are.
-        fine.look_closer(few, LAST_GROUPS // 2)
-        fine.settle(few, LAST_GROUPS // 2)
+        along, around = _OPEN_GROUPS
+        fine.look_closer(few, along)
+        fine.settle(few, around)
         fine.hear()
 
 

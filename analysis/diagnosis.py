@@ -28,8 +28,9 @@ from analysis.progress import Progress, part_of
 from analysis.search import search_causes
 from analysis.sharpening import sharpen_candidate
 from analysis.sizing import size_candidate, widen_if_open
+from analysis.surely_off import hold_against_datasheet
 from analysis.swept import check_together, unit_doubts
-from analysis.verdict import Verdict, judge_candidates
+from analysis.verdict import Judged, Verdict, judge_candidates
 from daq.errors import AnalysisError
 from daq.frf import FrequencyResponse
 from sim.effort import counting
@@ -117,12 +118,20 @@ def _diagnose(
     observation = candidates[0].surface.observation
     rng = np.random.default_rng(seed)
     verdict = judge_candidates(candidates, observation, rng)
-    named = verdict.word in ("explained", "ambiguous")
     base = size_candidate(verdict.baseline.candidate, observation, rng)
+
+    def sharpened(one: Judged) -> Calibrated:
+        late = part_of(progress, 0.8, 0.9, "sizing it")
+        return sharpen_candidate(unit, one.candidate, observation, rng, executor, late)
+
     sharp = None
     if verdict.word != "unexplained":
-        late = part_of(progress, 0.8, 0.9, "sizing it")
-        sharp = sharpen_candidate(unit, verdict.best.candidate, observation, rng, executor, late)
+        sharp = sharpened(verdict.best)
+        held = hold_against_datasheet(verdict, sharp)
+        if held.best is not verdict.best:
+            sharp = sharpened(held.best) if held.word == "consistent" else None
+        verdict = held
+    named = verdict.word in ("explained", "ambiguous")
     base = widen_if_open(base, verdict.baseline.candidate, observation, rng)
     best = base if sharp is None else sharp
     departures = find_departures(verdict.baseline.candidate, observation)

@@ -35,7 +35,7 @@ _DOUBT_OF_FEW = 3.5
 """The first two of these on few rows: pairs cost more than all before, chance alone doubts
 a true cause about once in ten times, and the question is asked again on all rows."""
 
-_CLOSER_LOOKS = 2
+_CLOSER_LOOKS = 3
 """How often a doubtful leader that is far ahead gets more runs before pairs are looked at."""
 
 _TOO_FAR, _GROUPS = 200.0, 6

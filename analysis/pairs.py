@@ -30,19 +30,21 @@ __all__ = [
     "BESIDE_REACH",
     "at_few_frequencies",
     "look_at_felt",
+    "look_at_parts",
     "look_beside",
+    "look_beside_all",
     "look_closer_beside",
     "search_pairs",
 ]
 
-_PAIRS, _PARTNERS, _GLANCE_FREQUENCIES, _GLANCE_GROUPS = 10, 5, 10, 3
-_CLOSER, _AFTER, _GROUPS = 10, 5, (3, 5)
+_PAIRS, _PARTNERS, _GLANCE_FREQUENCIES, _GLANCE_GROUPS = 10, 5, 10, 4
+_GLANCED, _AFTER, _GROUPS = 10, 5, (4, 6)
 """Pairs that the atlas favours, and more of those with the leader in them; at how many frequencies
 they are simulated at first, and in how many groups; how many are looked at closer, twice. What
 two causes do together is seldom the sum of what each does, and few runs rank them by chance. Of
 21 true pairs seventeen stood among the first eight by that sum."""
 
-_FELT_GROUPS = (3, 3, 3)
+_FELT_GROUPS = (4, 4, 4)
 """Groups of each look at a pair that is placed by what the load is felt as: ever closer ones told a
 true one from a cable alone, as many runs about the first place did not."""
 
@@ -68,7 +70,8 @@ and led by 39 with forty runs more."""
 
 _STRANGER = 60.0
 """Log-likelihood behind a leading pair in doubt within which others are also looked at beside the
-causes of one that shares none with it."""
+causes of one that shares none with it, or behind a single cause, beside another. A motor's constant
+led an amplifier's gain by 50; with a tachometer's gain beside it the amplifier led by 80."""
 
 _PREDICTED = 1.3
 """What a leading pair misses of levels not fitted, in standard deviations, from which on it is in
@@ -100,7 +103,7 @@ def search_pairs(rough: Hunt, atlas: Atlas, rng: np.random.Generator) -> None:
     chosen = dict.fromkeys([*favoured[:_PAIRS], *partners[:_PARTNERS]])
     felt = {key: places[key] for key in additions.felt}
     glanced_at = {key: places[key] for key in chosen if key not in felt}
-    rough.take_over(_glance(rough, glanced_at, _CLOSER), _GROUPS[0])
+    rough.take_over(_glance(rough, glanced_at, _GLANCED), _GROUPS[0])
     # What adds up exactly is placed too well for a glance, and is likely by another measure.
     felt = near(felt, max((one.log_likelihood for one in felt.values()), default=0.0))
     look_at_felt(rough, felt)
@@ -167,14 +170,14 @@ def _hold_against_neighbours(
     ):
         held += stranger
     for pair in held:
-        _look_at_parts(rough, pair)
+        look_at_parts(rough, pair)
     if additions.coarse is not rough.observation:
         # Another reading noise was heard since.
         additions = add_causes(rough.unit, rough.observation, atlas)
     kept = {part: place for pair in held for part, place in _kept(rough, pair).items()}
-    now = rough.among(looked_at | _look_beside_all(rough, additions, kept))[0]
+    now = rough.among(looked_at | look_beside_all(rough, additions, kept))[0]
     if now not in held:
-        _look_at_parts(rough, now)
+        look_at_parts(rough, now)
 
 
 def _close_stranger(rough: Hunt, leader: Effects, looked_at: set[Effects]) -> list[Effects]:
@@ -185,12 +188,19 @@ def _close_stranger(rough: Hunt, leader: Effects, looked_at: set[Effects]) -> li
 
 
 def _kept(rough: Hunt, leader: Effects) -> Starts:
-    """The causes of a leading pair where it has them; the one that does as well alone, if any."""
+    """The causes of a leading pair where it has them.
+
+    If one does as well alone, that and the single cause next to it, if it is close: a weak motor
+    may stand for a weak amplifier with something else, which few runs of both do not show.
+    """
     if earns(leader, rough.found):
         places = places_of_parts(rough.found[leader])
         return {part: places[part] for part in _undisputed(rough) if part in places} or places
     alone = rough.among(parts_of(leader, rough.found))[0]
-    return {alone: rough.found[alone].best.place}
+    least = rough.found[alone].best.log_likelihood - _STRANGER
+    singles = [key for key in rough.leading(len(rough.found)) if len(key) == 1 and key != alone]
+    close = [key for key in singles[:1] if rough.found[key].best.log_likelihood > least]
+    return {key: rough.found[key].best.place for key in [alone, *close]}
 
 
 def _undisputed(rough: Hunt) -> list[Effects]:
@@ -202,13 +212,13 @@ def _undisputed(rough: Hunt) -> list[Effects]:
     return [best] if near == [best] else []
 
 
-def _look_at_parts(rough: Hunt, leader: Effects) -> None:
+def look_at_parts(rough: Hunt, leader: Effects) -> None:
     """Simulate the causes of a pair alone where it has them: either may do as well there."""
     rough.start(places_of_parts(rough.found[leader]), _GROUPS[1])
     rough.hear()
 
 
-def _look_beside_all(rough: Hunt, additions: Additions, kept: Starts) -> set[Effects]:
+def look_beside_all(rough: Hunt, additions: Additions, kept: Starts) -> set[Effects]:
     """Look at all others beside what is kept of leading pairs; those that are worth it closer.
 
     The likeliest first, a few whatever was spent, and others while enough is left of the purse.

@@ -10,7 +10,13 @@ from analysis.candidate import Candidate
 from analysis.likelihood import HEAT
 from sim.catalogue import CATALOGUE
 
-__all__ = ["EDGE", "is_out_of_sight", "is_pressed", "may_be_within_tolerance"]
+__all__ = [
+    "EDGE",
+    "is_out_of_band",
+    "is_out_of_sight",
+    "is_pressed",
+    "may_be_within_tolerance",
+]
 
 EDGE = 0.02
 """How near its end, as a share of its range, a size is at the end."""
@@ -47,8 +53,13 @@ def is_pressed(candidate: Candidate) -> bool:
 
 def is_out_of_sight(candidate: Candidate) -> bool:
     """Whether what it is told by is a resonance far outside all that was measured."""
+    return is_out_of_band(candidate, _IN_SIGHT)
+
+
+def is_out_of_band(candidate: Candidate, factor: float = 1.0) -> bool:
+    """Whether it is a resonance outside all that was measured, by more than a factor."""
     hypothesis, measured = candidate.hypothesis, candidate.surface.observation.frequency_hz
-    low, high = measured.min() / _IN_SIGHT, measured.max() * _IN_SIGHT
+    low, high = measured.min() / factor, measured.max() * factor
     values = zip(hypothesis.parameters, hypothesis.values(candidate.best.place), strict=True)
     return any(
         CATALOGUE[effect].resonance == parameter.name and not low < value < high

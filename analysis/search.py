@@ -63,13 +63,13 @@ from sim.unit import Unit
 
 __all__ = ["Searched", "search_causes"]
 
-_FIRST, _FIRST_GROUPS, _FIRST_OF_MANY = 9, 3, 6
+_FIRST, _FIRST_GROUPS, _FIRST_OF_MANY = 9, 4, 6
 _SECOND, _SECOND_GROUPS = 5, 6
 _THIRD, _THIRD_GROUPS, _SINGLES = 4, 6, 3
 """How many hypotheses are looked at in each round, and in how many groups of runs each; at first
 in more where one has many sizes. So many single causes that are close are always in the third."""
 
-_ONE_SIZE, _BEHIND, _BEHIND_GROUPS = 2, 60.0, 3
+_ONE_SIZE, _BEHIND, _BEHIND_GROUPS = 2, 60.0, 4
 """A cause of one size (coordinates, the ratio is the first) that is so far behind the leader on few
 rows is looked at in fewer groups in the third round, and the plain model if it is too far behind:
 they are there to be held against, and three times the rows put them three times as far behind."""
@@ -78,7 +78,7 @@ _ON_SECOND = 0.75
 """Share of what may be simulated from which on nobody looks behind a single cause that explains, if
 pairs were searched before."""
 
-_TRIPLES, _TRIPLES_CLOSER, _TRIPLE_GROUPS, _TRIPLES_AFTER = 8, 4, (3, 6), 2
+_TRIPLES, _TRIPLES_CLOSER, _TRIPLE_GROUPS, _TRIPLES_AFTER = 8, 4, (4, 6), 2
 """How many sets with a third cause beside a leading pair that is doubted are tried, and looked at
 closer, in how many groups each time; and how many of them on all rows."""
 

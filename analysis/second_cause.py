@@ -22,8 +22,16 @@ from analysis.contest import catch_up, has_fewer, settle
 from analysis.hunt import Hunt
 from analysis.lending import gains_with_lent, leads_with_lent, on_the_other_side
 from analysis.likeness import is_felt_alike
-from analysis.pairs import BESIDE_REACH, at_few_frequencies, look_at_felt, look_beside
+from analysis.pairs import (
+    BESIDE_REACH,
+    at_few_frequencies,
+    look_at_felt,
+    look_at_parts,
+    look_beside,
+    look_beside_all,
+)
 from analysis.parts import earns
+from analysis.plausibility import is_out_of_band
 from analysis.screening import Additions, add_causes, near, ranked, screen_felt, screen_singles
 from analysis.verdict import LEAST_GAIN, earns_its_name
 
@@ -34,10 +42,11 @@ _TRIED, _OTHER_GROUPS = 16, 2
 datasheet's value: by where they were placed true ones stood fourteenth at worst, more play beside a
 light load, where they were to be seen at all."""
 
-_CLOSER, _CLOSER_GROUPS, _BEHIND = 3, 6, 45.0
-"""How many of these are looked at closer by each measure, with runs of the leader lent to them and
-with their own alone, in how many groups about what is learned of them; and the log-likelihood by
-their own runs behind the leader from which none is: few rank by chance."""
+_CLOSER, _CLOSER_ALONE, _CLOSER_GROUPS, _BEHIND = 6, 3, 6, 45.0
+"""How many of these are looked at closer by what they do with runs of the leader lent to them, how
+many by their own alone, in how many groups about what is learned of them; and the log-likelihood by
+their own runs behind the leader from which none is: few rank by chance. Less play beside a light
+load stood fifth, behind by 4 of 14."""
 
 _ON_ALL, _ALL_GROUPS = 4, 8
 """How many at most are simulated on all rows, and in how many groups."""
@@ -46,7 +55,14 @@ _LIKELY, _BEHIND_LEADER = 2.0, 3.0
 """How much more of what was observed than of the leader's own runs these must explain on few rows
 (`analysis.lending`), and the log-likelihood that they may be behind it. In eleven draws of runs
 true ones, or what passes for them, explained 2.7 to 6.4 more; in fifteen of sixteen draws behind
-a cause that is alone the best false one explained -0.9 to 1.9 more, and led by up to 12."""
+a cause that is alone the best false one explained -0.9 to 1.9 more, and led by up to 12. So one
+that is sure by its lead, `_SURE`, need not: less play beside a light load once led by 22, for 1.8.
+"""
+
+_AS_WELL = 5.0
+"""Log-likelihood on few rows behind the best likely one within which another is simulated on all
+rows, too. Friction at rest lay 3.6 behind dry friction beside a brake there, and explained 1.8 more
+for 4.8; it was the truth, and the other was named alone."""
 
 _NEARLY, _BEHIND_BEST, _SURE = 10.0, 30.0, 20.0
 """What they must lead by on all rows, and how far behind the best of them they may be, to get as
@@ -57,7 +73,7 @@ _CALLED_FOR = 15.0
 """By so much must one then lead to be left in the contest: of false ones the best led by 15 to 24
 with 80 runs, true ones by 38 to 50."""
 
-_ROUNDS = 2
+_ROUNDS = 3
 """Rounds of runs of the best of them and of the leader after which it is asked whether it brings
 more than chance does. True ones were among the best two by then, and the others get as many runs
 only where one does: behind a cause that is alone all do about as well, and none does."""
@@ -114,6 +130,26 @@ def look_for_second(
     # They would only take the place of rivals among those that are judged.
     standing.leave_out([key for key in beside if standing.leads[key] < _CALLED_FOR])
     _contest(standing, rng)
+    _replace_first(rough, fine, additions, leader)
+
+
+def _replace_first(rough: Hunt, fine: Hunt, additions: Additions, leader: Effects) -> None:
+    """See whether others do as well beside the second cause as a first one that nobody has seen.
+
+    A resonance outside the band is told by a slope alone, and by three sizes that bend it.
+    """
+    pair, first = fine.best.hypothesis.effects, fine.found[leader]
+    if fine.purse.is_spent or not set(pair) > set(leader) or not is_out_of_band(first):
+        return
+    second = tuple(effect for effect in pair if effect not in leader)
+    rough.start({pair: fine.best.best.place}, _CLOSER_GROUPS)
+    look_at_parts(rough, pair)
+    others = look_beside_all(rough, additions, {second: rough.found[second].best.place})
+    least = rough.found[pair].best.log_likelihood - _BEHIND_BEST
+    as_good = [k for k in rough.among(others) if rough.found[k].best.log_likelihood > least]
+    newcomers = [key for key in as_good if earns(key, rough.found) and key not in fine.found]
+    fine.take_over([rough.found[key] for key in newcomers[:_ASKS]], _ALL_GROUPS)
+    catch_up(fine, newcomers[:_ASKS], pair)
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,7 +228,7 @@ def _is_short(fine: Hunt, key: Effects, leader: Effects) -> bool:
 
 def _settle_short(fine: Hunt, key: Effects, leader: Effects) -> None:
     """Give a set the runs with which it is asked: what the first of them tell places the rest."""
-    for _ in range(2):
+    for _ in range(3):
         if _is_short(fine, key, leader):
             settle(fine, [key])
 
@@ -229,13 +265,17 @@ def _worth(
     rough.start(on_the_other_side(alone, tried), _OTHER_GROUPS, reach=BESIDE_REACH)
     hopeful = _best(leads_with_lent(rough, additions, alone.effects, tried), _CLOSER)
     by_own = _leads(rough, rough.among(tried), alone.effects)
-    hopeful += [key for key in _best(by_own, _CLOSER) if by_own[key] > -_BEHIND]
+    hopeful += [key for key in _best(by_own, _CLOSER_ALONE) if by_own[key] > -_BEHIND]
     hopeful = list(dict.fromkeys(hopeful))
     rough.settle(hopeful, _CLOSER_GROUPS)
     leads = leads_with_lent(rough, additions, alone.effects, hopeful)
     gains = gains_with_lent(rough, additions, alone.effects, hopeful, rng)
-    likely = [key for key in _best(gains, _ON_ALL) if gains[key] > _LIKELY]
-    return {key: leads[key] for key in likely if leads[key] > -_BEHIND_LEADER}
+    near = [key for key in _best(gains, len(gains)) if leads[key] > -_BEHIND_LEADER]
+    likely = [leads[key] for key in near if gains[key] > _LIKELY or leads[key] > _SURE]
+    # Who leads by about as much as a likely one is its rival.
+    least = max(likely, default=np.inf) - _AS_WELL
+    chosen = [key for key in near if gains[key] > _LIKELY or leads[key] > min(least, _SURE)]
+    return {key: leads[key] for key in chosen[:_ON_ALL]}
 
 
 def _best(leads: Mapping[Effects, float], most: int) -> list[Effects]:

@@ -28,9 +28,11 @@ __all__ = [
     "LEAST_LEAD",
     "Judged",
     "Verdict",
+    "Word",
     "earns_its_name",
     "judge_candidates",
     "may_be_chance",
+    "put_behind",
 ]
 
 Word = Literal["consistent", "explained", "ambiguous", "unexplained"]
@@ -144,12 +146,16 @@ class Judged:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Verdict:
-    """The word, the best set, every set judged (best first), and the baseline among them."""
+    """The word, the best set, every set judged (best first), and the baseline among them.
+
+    `parts`: those of the best set that may do as well, as a further cause may be none.
+    """
 
     word: Word
     best: Judged
     judged: tuple[Judged, ...]
     baseline: Judged
+    parts: tuple[Judged, ...] = ()
 
     @property
     def rivals(self) -> tuple[Judged, ...]:
@@ -164,7 +170,9 @@ class Verdict:
         """
         said = [self.best.score, *(one.score for one in self.judged if self._says_the_same(one))]
         believed = HEAT * float(np.logaddexp.reduce(np.array(said) / HEAT))
-        return tuple(one for one in self.judged if self._is_rival(one, believed))
+        return tuple(
+            one for one in self.judged if one in self.parts or self._is_rival(one, believed)
+        )
 
     @property
     def probability(self) -> float:
@@ -234,7 +242,7 @@ def judge_candidates(
         part = _part_that_will_do(judged, best, rng)
         if part is None:
             break
-        judged = _put_behind(judged, best, part)
+        judged = put_behind(judged, best, part, _UNEARNED)
     (baseline,) = (one for one in judged if not one.effects)
     if (
         not best.effects
@@ -343,10 +351,12 @@ def _part_that_will_do(
     return None
 
 
-def _put_behind(judged: Sequence[Judged], one: Judged, part: Judged) -> tuple[Judged, ...]:
+def put_behind(
+    judged: Sequence[Judged], one: Judged, part: Judged, objection: str
+) -> tuple[Judged, ...]:
     """A set that has not earned its name is as far behind its part as what nobody would name."""
     score = min(one.score, part.score - _FALSE_ALARM)
-    behind = replace(one, score=score, objection=_UNEARNED)
+    behind = replace(one, score=score, objection=objection)
     return _ranked([behind if other is one else other for other in judged])
 
 

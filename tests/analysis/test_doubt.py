@@ -42,7 +42,8 @@ def test_few_rows_call_for_pairs_where_the_doubt_is_plain(
     [
         (("load-inertia",), True, [False], False, 0),
         (("load-inertia",), True, [True, False], False, 1),
-        (("load-inertia",), True, [True, True, True], True, 2),
+        (("load-inertia",), True, [True, True, True, False], False, 3),
+        (("load-inertia",), True, [True, True, True, True], True, 3),
         (("load-inertia",), False, [True], True, 0),
         ((), True, [True], True, 0),
     ],

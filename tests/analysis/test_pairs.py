@@ -67,6 +67,9 @@ class Standings:
         ranked = sorted(self.found, key=lambda key: -self.found[key].best.log_likelihood)
         return [key for key in ranked if key in keys]
 
+    def leading(self, most):
+        return self.among(self.found)[:most]
+
 
 @pytest.mark.parametrize(
     ("part", "brought_in", "swapped", "weighed"),
@@ -85,15 +88,17 @@ def test_others_are_tried_beside_the_causes_of_a_leading_pair(
     likelihood = {("a", "b"): 100.0, ("a", "c"): 90.0, ("a", "e"): 200.0, ("b", "d"): 80.0}
     likelihood |= {(): 0.0}
     likelihood |= {(cause,): part for cause in "abcdef"}
+    # Of a leader with one cause that does as well alone, nothing else is close to that.
+    likelihood |= {(cause,): part - 61.0 for cause in "bcdef" if part == 95.0}
     beside, alone = [], []
 
     def look(rough, additions, kept):
         beside.extend(kept)
         return set(brought_in)
 
-    monkeypatch.setattr(pairs, "_look_beside_all", look)
+    monkeypatch.setattr(pairs, "look_beside_all", look)
     monkeypatch.setattr(pairs, "places_of_parts", lambda leader: {(e,): None for e in leader.of})
-    monkeypatch.setattr(pairs, "_look_at_parts", lambda rough, leader: alone.append(leader))
+    monkeypatch.setattr(pairs, "look_at_parts", lambda rough, leader: alone.append(leader))
     additions = SimpleNamespace(coarse=Standings.observation)
     looked_at = {("a", "b"), ("a", "c")}
     pairs._hold_against_neighbours(Standings(likelihood), {}, additions, looked_at, RNG)
@@ -112,10 +117,10 @@ def test_others_are_tried_beside_a_close_pair_that_shares_no_cause_with_a_leader
     rough = Standings(likelihood | {(cause,): 0.0 for cause in "abcdef"})
     beside, alone = [], []
     monkeypatch.setattr(
-        pairs, "_look_beside_all", lambda r, a, kept: beside.extend(kept) or {leader}
+        pairs, "look_beside_all", lambda r, a, kept: beside.extend(kept) or {leader}
     )
     monkeypatch.setattr(pairs, "places_of_parts", lambda leader: {(e,): None for e in leader.of})
-    monkeypatch.setattr(pairs, "_look_at_parts", lambda rough, leader: alone.append(leader))
+    monkeypatch.setattr(pairs, "look_at_parts", lambda rough, leader: alone.append(leader))
     additions = SimpleNamespace(coarse=Standings.observation)
     monkeypatch.setattr(pairs, "is_doubtful", lambda one, rng, missed: doubted and missed == 1.3)
     looked_at = {leader, ("a", "c"), stranger, far}
@@ -139,6 +144,16 @@ def test_nothing_is_tried_beside_what_a_single_cause_leads_by_far(monkeypatch, a
     assert list(pairs._kept(Standings({pair: 900.0} | singles), pair)) == kept
 
 
+@pytest.mark.parametrize(("behind", "kept"), [(59.0, [("a",), ("c",)]), (61.0, [("a",)])])
+def test_beside_a_single_cause_that_does_as_well_the_next_is_kept_if_it_is_close(behind, kept):
+    """A weak motor may stand for a weak amplifier with something else."""
+    singles = {("a",): 100.0, ("b",): 0.0, ("c",): 100.0 - behind, ("d",): 39.0}
+    rough = Standings({("a", "b"): 101.0, ("a", "c"): 99.0} | singles)
+    places = pairs._kept(rough, ("a", "b"))
+    assert list(places) == kept
+    assert all(places[key] == rough.found[key].best.place for key in kept)
+
+
 @pytest.mark.parametrize(("heard_anew", "added_up"), [([False, False], 0), ([True, False], 1)])
 def test_what_causes_add_is_looked_at_again_where_another_noise_was_heard(
     monkeypatch, heard_anew, added_up
@@ -158,9 +173,9 @@ def test_what_causes_add_is_looked_at_again_where_another_noise_was_heard(
         used.append(additions)
         return {("a", "e")}
 
-    monkeypatch.setattr(pairs, "_look_at_parts", look)
+    monkeypatch.setattr(pairs, "look_at_parts", look)
     monkeypatch.setattr(pairs, "add_causes", add)
-    monkeypatch.setattr(pairs, "_look_beside_all", beside)
+    monkeypatch.setattr(pairs, "look_beside_all", beside)
     monkeypatch.setattr(pairs, "places_of_parts", lambda leader: {(e,): None for e in leader.of})
     pairs._hold_against_neighbours(rough, {}, first, {("a", "b")}, RNG)
     assert len(anew) == added_up
@@ -214,7 +229,7 @@ class Rough:
         self.looks.append(("hear", None))
 
     def look_beside_all(self):
-        return pairs._look_beside_all(self, None, {part: f"where {part} is" for part in self.found})
+        return pairs.look_beside_all(self, None, {part: f"where {part} is" for part in self.found})
 
 
 def test_all_that_is_not_hopeless_is_looked_at_where_it_was_placed_the_likeliest_first(monkeypatch):
@@ -251,7 +266,7 @@ def test_a_closer_look_is_about_the_best_place_so_far_and_as_far_as_usual():
     rough = Standings({("a", "b"): 2.0, ("a", "c"): 1.0})
     rough.start = lambda *given, **more: looks.append((given, more))
     pairs.look_closer_beside(rough, [("a", "c")])
-    assert looks == [(({("a", "c"): "where ('a', 'c') is"}, 5), {})]
+    assert looks == [(({("a", "c"): "where ('a', 'c') is"}, 6), {})]
 
 
 @pytest.mark.parametrize(("pairs_placed", "looked_at"), [(18, 18), (19, 18), (40, 18)])
@@ -369,7 +384,7 @@ def test_a_pair_is_glanced_at_at_both_of_its_ratios(monkeypatch):
     rough = SimpleNamespace(observation=None, thinned=lambda stride: few)
     monkeypatch.setattr(pairs, "coarse_stride", lambda *_: 2)
     assert pairs._glance(rough, places, 10) == ["found other", "found one"]
-    assert started == [({one: "low", other: "middle"}, 3), ({one: "high"}, 3)]
+    assert started == [({one: "low", other: "middle"}, 4), ({one: "high"}, 4)]
 
 
 def test_nothing_to_glance_at_is_no_trouble(runs):

@@ -8,7 +8,12 @@ from synthetic import ADSS
 
 from analysis import verdict as rules
 from analysis.causes import Hypothesis
-from analysis.plausibility import is_out_of_sight, is_pressed, may_be_within_tolerance
+from analysis.plausibility import (
+    is_out_of_band,
+    is_out_of_sight,
+    is_pressed,
+    may_be_within_tolerance,
+)
 
 TRUE = ("load-inertia",)
 PAIR = ("amplifier-gain", "cable-stiffness")
@@ -78,7 +83,18 @@ def test_a_corner_is_as_good_as_its_capacitors(effect, off, within):
 
 @pytest.mark.parametrize(
     ("resonance_hz", "beyond"),
-    [(22.0, True), (49.0, True), (51.0, False), (130.0, False), (359.0, False), (361.0, True)],
+    [
+        (22.0, True),
+        (49.0, True),
+        (51.0, False),
+        (99.0, False),
+        (101.0, False),
+        (130.0, False),
+        (179.0, False),
+        (181.0, False),
+        (359.0, False),
+        (361.0, True),
+    ],
 )
 @pytest.mark.parametrize("beside", [(), ("amplifier-lag",), ("load-inertia",)])
 def test_a_resonance_far_outside_what_was_measured_is_out_of_sight(beside, resonance_hz, beyond):
@@ -90,12 +106,14 @@ def test_a_resonance_far_outside_what_was_measured_is_out_of_sight(beside, reson
     surface = SimpleNamespace(observation=measured)
     one = SimpleNamespace(hypothesis=hypothesis, best=best, surface=surface)
     assert is_out_of_sight(one) is beyond
+    assert is_out_of_band(one) is not (100.0 < resonance_hz < 180.0)
 
 
 def test_what_has_no_resonance_is_never_out_of_sight():
     one = off_by(PAIR, 0.2, 0.0)
     one.surface.observation = SimpleNamespace(frequency_hz=np.array([1e4, 2e4]))
     assert not is_out_of_sight(one)
+    assert not is_out_of_band(one)
 
 
 def test_what_no_datasheet_knows_has_no_tolerance():

@@ -157,9 +157,10 @@ def test_where_nothing_is_missing_the_search_ends_early(runs):
         _, verdict = synthetic_search.diagnosed((), [], seed)
         assert verdict.word == "consistent"
         spent.append(sum(runs.values()))
-    # 135 runs of nine causes and the baseline, 150 of five, 150 of four, and no more; by chance a
-    # plain machine is doubted about once in ten times, and then everything is tried.
-    assert min(spent) <= 450
+    # 180 runs of nine, of which the baseline is one, 180 of five and it, 150 of four and it, and no
+    # more; by chance a plain machine is doubted about once in ten times, and then everything is
+    # tried.
+    assert min(spent) <= 510
 
 
 def test_what_is_left_out_of_the_catalogue_is_not_looked_at(runs, monkeypatch):

@@ -246,7 +246,7 @@ def test_a_cause_of_one_size_that_few_rows_leave_far_behind_gets_fewer_runs(plai
     )
     search._look_on_all(rough, fine, list(behind))
     few = [("total-backlash",), *([()] if fewer else [])]
-    assert groups == {key: 3 if key in few else 6 for key in behind}
+    assert groups == {key: 4 if key in few else 6 for key in behind}
     assert heard == [len(behind)]
 
 

@@ -1,0 +1,113 @@
+"""A value that may as well be the datasheet's explains nothing, however well its runs fit."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from synthetic import ADSS
+
+from analysis.calibration import Calibrated
+from analysis.causes import Hypothesis
+from analysis.surely_off import AS_THE_DATASHEET, hold_against_datasheet
+from analysis.verdict import Judged, Verdict
+
+SHAFT, BRAKE, LOAD = "shaft-stiffness", "load-viscous-damping", "load-inertia"
+
+
+def standing(effects, score, objection=""):
+    candidate = SimpleNamespace(hypothesis=Hypothesis(ADSS, effects))
+    return Judged(candidate, None, score, 0.0, 0.0, 0.5, objection)
+
+
+def told(effects, sigmas, word="explained", objections=(), others=()):
+    """A verdict that names effects, whose values are off their datasheet by so many sigmas."""
+    best, baseline = standing(effects, 100.0), standing((), 0.0, *objections)
+    parts = [standing((effect,), 50.0) for effect in effects if len(effects) > 1]
+    judged = (best, *parts, *others, baseline)
+    hypothesis, std = best.candidate.hypothesis, 0.02
+    nominal = [parameter.nominal(ADSS) for _, parameter in hypothesis.parameters]
+    place = hypothesis.place(0.5, [0.05 if one is None else one for one in nominal])
+    place[1:] += std * np.array(sigmas)
+    return Verdict(word, best, judged, baseline), Calibrated(place, std**2 * np.eye(len(place)))
+
+
+@pytest.fixture(autouse=True)
+def rivals(monkeypatch):
+    """Rivals are the parts, and what is near; likeness is not asked of what has no surface."""
+    near = []
+
+    def found(verdict):
+        return tuple(one for one in verdict.judged if one in verdict.parts or one in near)
+
+    monkeypatch.setattr(Verdict, "rivals", property(found))
+    return near
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("sigmas", "sure"), [(1.9, False), (2.1, True), (0.0, False)])
+def test_a_single_value_must_be_off_its_datasheet(sigmas, sign, sure):
+    verdict, found = told((SHAFT,), [sign * sigmas])
+    held = hold_against_datasheet(verdict, found)
+    if sure:
+        assert held is verdict
+        return
+    assert (held.word, held.best.effects) == ("consistent", ())
+    (shaft,) = (one for one in held.judged if one.effects)
+    assert shaft.objection == AS_THE_DATASHEET
+    # Nor is more believed of it than of nothing.
+    assert held.baseline is held.best
+    assert held.baseline.probability > 0.5 > shaft.probability
+
+
+def test_where_the_plain_model_will_not_do_either_nothing_explains_it():
+    verdict, found = told((SHAFT,), [1.0], objections=("leaves structure",))
+    held = hold_against_datasheet(verdict, found)
+    assert (held.word, held.best.effects) == ("unexplained", ())
+
+
+def test_what_the_datasheet_does_not_know_is_off_it():
+    verdict, found = told((BRAKE,), [0.0])
+    assert hold_against_datasheet(verdict, found) is verdict
+
+
+def test_a_verdict_that_names_nothing_stays():
+    verdict, found = told((SHAFT,), [0.0], word="unexplained")
+    assert hold_against_datasheet(verdict, found) is verdict
+
+
+def test_where_rivals_are_left_one_of_them_may_be_missing(rivals):
+    load = standing((LOAD,), 95.0)
+    verdict, found = told((SHAFT,), [0.0], word="ambiguous", others=(load,))
+    rivals.append(load)
+    assert hold_against_datasheet(verdict, found) is verdict
+
+
+@pytest.mark.parametrize("word", ["explained", "ambiguous"])
+@pytest.mark.parametrize(
+    ("effects", "sigmas", "left"),
+    [
+        ((BRAKE, SHAFT), [0.0, 1.9], (BRAKE,)),
+        ((BRAKE, SHAFT), [0.0, 2.1], None),
+        ((LOAD, SHAFT), [5.0, -1.0], (LOAD,)),
+        ((LOAD, SHAFT), [5.0, -5.0], None),
+    ],
+)
+def test_the_rest_of_several_is_a_rival_where_one_may_be_as_the_datasheet_says(
+    word, effects, sigmas, left
+):
+    verdict, found = told(effects, sigmas, word=word)
+    held = hold_against_datasheet(verdict, found)
+    assert held.best is verdict.best
+    if left is None:
+        assert held is verdict
+    else:
+        assert held.word == "ambiguous"
+        assert [one.effects for one in held.rivals] == [left]
+
+
+def test_the_rest_of_several_is_none_that_will_not_do():
+    verdict, found = told((LOAD, SHAFT), [5.0, 0.0])
+    refused = standing((LOAD,), 50.0, "leaves structure")
+    judged = tuple(refused if one.effects == (LOAD,) else one for one in verdict.judged)
+    verdict = Verdict("explained", verdict.best, judged, verdict.baseline)
+    assert hold_against_datasheet(verdict, found) is verdict
