@@ -211,6 +211,11 @@ def _warnings(diagnosis: Diagnosis) -> tuple[str, ...]:
         found.append(
             "not every set of causes was tried, as a search may simulate only so much motion"
         )
+    if diagnosis.verdict.word == "unexplained":
+        found.append(
+            "the contribution ratio is that of the plain model, which does not explain what was "
+            "measured: it may be off by far more than its error"
+        )
     if len(observation.blocks) == 1:
         found.append(
             "the response holds one source level: what was held out are halves of its band; "

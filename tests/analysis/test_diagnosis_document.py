@@ -67,6 +67,9 @@ def test_a_diagnosis_says_that_not_all_was_tried(monkeypatch, judged, given_up, 
     assert (found.verdict.word == "unexplained") == (judged == STIFF)
     said = [t for t in found.to_json()["warnings"] if "not every set of causes was tried" in t]
     assert len(said) == warned
+    of_ratio = [t for t in found.to_json()["warnings"] if "contribution ratio is that of" in t]
+    assert len(of_ratio) == (found.verdict.word == "unexplained")
+    said += of_ratio
     assert all(any(text in line for line in found.summary()) for text in said)
 
 
