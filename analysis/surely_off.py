@@ -21,7 +21,7 @@ __all__ = ["AS_THE_DATASHEET", "hold_against_datasheet"]
 AS_THE_DATASHEET = "may as well be what the datasheet says"
 
 _SURELY = 2.0
-"""Standard deviations by which a value must be off its datasheet. Of 26 that were rightly named
+"""Standard deviations by which a value must be off its datasheet. Of 23 that were rightly named
 the least was off by 3.1, with as many runs as it gets; those of causes that were not there by 0.8,
 1.0 and 1.6: a shaft of a servo that hides nothing led the plain model by 72."""
 

@@ -5,8 +5,8 @@ import pytest
 import synthetic
 
 import analysis.diagnosis as diagnosis_module
+from analysis.calibration import Calibrated
 from analysis.search import Searched
-from analysis.sizing import size_candidate
 from daq.frf import FrequencyResponse
 from sim.unit import load_unit
 
@@ -63,6 +63,12 @@ def response(**words: object) -> FrequencyResponse:
     )
 
 
+def sharpened(unit, candidate, *_):
+    """What all its runs would tell of a candidate: where it is, sharply."""
+    d = len(candidate.best.place)
+    return Calibrated(candidate.best.place, 0.02**2 * np.eye(d))
+
+
 def diagnosis(
     monkeypatch: pytest.MonkeyPatch,
     hidden: tuple[str, ...],
@@ -82,9 +88,5 @@ def diagnosis(
     monkeypatch.setattr(diagnosis_module, "observe", lambda response: seen)
     monkeypatch.setattr(diagnosis_module, "search_causes", lambda *_, **__: searched)
     monkeypatch.setattr(diagnosis_module, "propose_measurement", lambda *_, **__: None)
-    monkeypatch.setattr(
-        diagnosis_module,
-        "sharpen_candidate",
-        lambda _, candidate, observation, rng, *__: size_candidate(candidate, observation, rng),
-    )
+    monkeypatch.setattr(diagnosis_module, "sharpen_candidate", sharpened)
     return diagnosis_module.diagnose_response(response(), load_unit("adss"))

@@ -100,3 +100,22 @@ def test_the_cause_that_costs_most_to_leave_out_comes_first(alone, first):
     assert [cause.effect for cause in causes] == [first, *(e for e in PAIR if e != first)]
     values = dict(zip(PAIR, pair.hypothesis.values(found.mean), strict=True))
     assert {cause.effect: cause.sizes[0].value for cause in causes} == pytest.approx(values)
+
+
+def test_a_value_that_may_be_the_datasheets_is_not_named(monkeypatch, explained):
+    """Its plain model fits no better for it: nothing explains that measurement."""
+
+    sharpened = makings.sharpened
+
+    def as_the_datasheet(unit, candidate, *_):
+        found = sharpened(unit, candidate)
+        # A load's inertia lies amid its range: half to twice of what the datasheet says.
+        return replace(found, mean=np.append(found.mean[:1], [0.53] * (len(found.mean) - 1)))
+
+    assert [cause.effect for cause in explained.causes] == ["load-inertia"]
+    monkeypatch.setattr(makings, "sharpened", as_the_datasheet)
+    found = makings.diagnosis(monkeypatch, ("load-inertia",), [("load-inertia",)])
+    document = found.to_json()
+    assert (document["verdict"], document["causes"]) == ("unexplained", [])
+    (line,) = (text for text in found.summary() if text.strip().endswith("datasheet says)"))
+    assert "load-inertia" in line
