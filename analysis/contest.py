@@ -283,13 +283,14 @@ def weigh_parts(fine: Hunt) -> None:
         fine.hear()
 
 
-def weigh_plainer(fine: Hunt) -> None:
+def weigh_plainer(fine: Hunt, without: Collection[str] = ()) -> None:
     """See whether a set of fewer sizes that says the same as the leader does as well, if any does.
 
     What few rows had left out is looked at, and others get runs, as nobody compared them: a heavier
     load beside a damped shaft was named as a payload that is stiffer than all that was measured.
+    `without`: effects that are not to be known.
     """
-    leader, places = fine.best.hypothesis.effects, plainer_places(fine.best)
+    leader, places = fine.best.hypothesis.effects, plainer_places(fine.best, without)
     elsewhere = {
         key: place
         for key, place in places.items()

@@ -7,6 +7,8 @@ each is told from nothing. It simulates nothing and names no cause.
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
@@ -48,13 +50,16 @@ def is_felt_alike(one: Candidate, simpler: Candidate) -> bool:
     return _nearest(one, simpler.hypothesis, simpler.best.place)[1] < _ALIKE
 
 
-def plainer_places(one: Candidate) -> dict[Effects, NDArray[np.float64]]:
+def plainer_places(
+    one: Candidate, without: Collection[str] = ()
+) -> dict[Effects, NDArray[np.float64]]:
     """Sets that say nearly the same with another cause of fewer sizes at the load; their places.
 
-    None where what is left without any says it, too: that is a part of the set.
+    None where what is left without any says it, too: that is a part of the set. `without`: effects
+    that none of them may have.
     """
     whole, place, found = one.hypothesis, one.best.place, {}
-    others = [e for e in CATALOGUE if is_at_load(e) and e not in whole.effects]
+    others = [e for e in CATALOGUE if is_at_load(e) and e not in (*whole.effects, *without)]
     for replaced in filter(is_at_load, whole.effects):
         kept = Hypothesis(whole.unit, tuple(e for e in whole.effects if e != replaced))
         there = whole.part(kept.effects, place)

@@ -173,7 +173,7 @@ def search_causes(
                 lambda: look_at_every_ratio(fine),
                 lambda: see_it_predict(fine),
                 lambda: weigh_parts(fine),
-                lambda: weigh_plainer(fine),
+                lambda: weigh_plainer(fine, without),
                 lambda: _look_for_third(rough, fine, atlas, rng),
                 lambda: settle_doubt(fine, rng),
                 search_late,

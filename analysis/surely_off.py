@@ -40,7 +40,8 @@ def hold_against_datasheet(verdict: Verdict, found: Calibrated) -> Verdict:
     -------
     Verdict
         If the best set is of one cause, that nothing is missing, or that nothing explains it where
-        the plain model does not. Among several, that the rest may do alone, if it may.
+        the plain model does not. Among several, that the rest may do alone, also where its own runs
+        are too few or too far to say so: all of them as the datasheet has that value are the rest.
     """
     best = verdict.best
     unsure = _unsure(best.candidate.hypothesis, found)
@@ -48,7 +49,7 @@ def hold_against_datasheet(verdict: Verdict, found: Calibrated) -> Verdict:
     if verdict.word not in ("explained", "ambiguous") or not unsure:
         return verdict
     if rest:
-        parts = [one for one in verdict.judged if one.effects == rest and one.adequate]
+        parts = [one for one in verdict.judged if one.effects == rest]
         return replace(verdict, word="ambiguous", parts=tuple(parts)) if parts else verdict
     if any(one.effects for one in verdict.rivals):
         # One of these may be what is missing.

@@ -338,13 +338,13 @@ def test_what_says_the_same_with_fewer_sizes_is_compared_with_a_leader(
         def hear(self):
             pass
 
-    monkeypatch.setattr(contest, "plainer_places", lambda _: there)
+    monkeypatch.setattr(contest, "plainer_places", lambda _, without: without == "x" and there)
     fine = Fine()
-    contest.weigh_plainer(fine)
+    contest.weigh_plainer(fine, "x")
     assert looked == [there] * started
     assert len(fine.found[plainer].population) == runs
     # Where nothing says the same nothing is done.
-    monkeypatch.setattr(contest, "plainer_places", lambda _: {})
+    monkeypatch.setattr(contest, "plainer_places", lambda *_: {})
     contest.weigh_plainer(fine)
     assert looked == [there] * started
 

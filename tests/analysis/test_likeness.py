@@ -86,6 +86,8 @@ def test_sets_that_say_the_same_as_a_payload_are_known_with_their_place(payload,
     one = believed(whole.effects, [sizes[p.name] for _, p in whole.parameters])
     found = plainer_places(one)
     assert sorted(found) == sorted(tuple(sorted(key + extra)) for key in plainer)
+    # Who must not know a cause does not bring it in again.
+    assert plainer_places(one, {effect for key in plainer for effect in key}) == {}
     for key, place in found.items():
         there = Hypothesis(ADSS, key)
         assert place[0] == pytest.approx(0.4)

@@ -1,5 +1,6 @@
 """A value that may as well be the datasheet's explains nothing, however well its runs fit."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -105,9 +106,17 @@ def test_the_rest_of_several_is_a_rival_where_one_may_be_as_the_datasheet_says(
         assert [one.effects for one in held.rivals] == [left]
 
 
-def test_the_rest_of_several_is_none_that_will_not_do():
+def test_the_rest_of_several_is_a_rival_though_its_own_runs_refuse_it():
+    """Its value being the datasheet's, the whole that is believed is that rest."""
     verdict, found = told((LOAD, SHAFT), [5.0, 0.0])
     refused = standing((LOAD,), 50.0, "leaves structure")
     judged = tuple(refused if one.effects == (LOAD,) else one for one in verdict.judged)
-    verdict = Verdict("explained", verdict.best, judged, verdict.baseline)
+    held = hold_against_datasheet(replace(verdict, judged=judged), found)
+    assert (held.word, held.rivals) == ("ambiguous", (refused,))
+
+
+def test_a_rest_that_nobody_looked_at_is_no_rival():
+    verdict, found = told((LOAD, SHAFT), [5.0, 0.0])
+    judged = tuple(one for one in verdict.judged if one.effects != (LOAD,))
+    verdict = replace(verdict, judged=judged)
     assert hold_against_datasheet(verdict, found) is verdict
