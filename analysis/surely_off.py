@@ -14,7 +14,7 @@ import numpy as np
 
 from analysis.calibration import Calibrated
 from analysis.causes import Hypothesis
-from analysis.verdict import Verdict, Word, put_behind
+from analysis.verdict import FALSE_ALARM, Verdict, Word, put_behind
 
 __all__ = ["AS_THE_DATASHEET", "hold_against_datasheet"]
 
@@ -51,10 +51,11 @@ def hold_against_datasheet(verdict: Verdict, found: Calibrated) -> Verdict:
     if rest:
         parts = [one for one in verdict.judged if one.effects == rest]
         return replace(verdict, word="ambiguous", parts=tuple(parts)) if parts else verdict
-    if any(one.effects for one in verdict.rivals):
-        # One of these may be what is missing.
-        return verdict
     baseline = verdict.baseline
+    least = baseline.score + FALSE_ALARM
+    if any(one.effects and one.score > least for one in verdict.rivals):
+        # It may be what is missing.
+        return verdict
     judged = put_behind(verdict.judged, best, baseline, AS_THE_DATASHEET)
     (baseline,) = (one for one in judged if not one.effects)
     word: Word = "consistent" if baseline.adequate else "unexplained"

@@ -24,6 +24,7 @@ from analysis.observation import Observation
 from analysis.plausibility import EDGE, may_be_within_tolerance
 
 __all__ = [
+    "FALSE_ALARM",
     "LEAST_GAIN",
     "LEAST_LEAD",
     "Judged",
@@ -57,10 +58,10 @@ _RARE = HEAT * float(np.log(10.0))
 which of two that do alike is named first; no belief about benches rules the other out as a rival.
 """
 
-_FALSE_ALARM = 20.0
+FALSE_ALARM = 20.0
 """By so much must a cause beat the baseline beyond its costs."""
 
-LEAST_LEAD = _PER_CAUSE + _PER_PARAMETER + _FALSE_ALARM
+LEAST_LEAD = _PER_CAUSE + _PER_PARAMETER + FALSE_ALARM
 """So much must one of one size lead by, in all, to be named."""
 
 _FURTHER = 5.0
@@ -216,7 +217,7 @@ class Verdict:
         if not one.effects and best:
             lead = self.best.score - one.score
             # Refused it is no explanation, and what leads it by little has hardly earned its name.
-            return lead < _SURE if one.adequate else one.refused and 0.0 < lead < _FALSE_ALARM
+            return lead < _SURE if one.adequate else one.refused and 0.0 < lead < FALSE_ALARM
         other = not set(one.effects) <= best and not set(one.effects) >= best
         if self._is_led_by(one) or one.refused and behind < _RIVAL and not self._is_likely():
             return other and not is_felt_alike(one.candidate, self.best.candidate)
@@ -246,7 +247,7 @@ def judge_candidates(
     (baseline,) = (one for one in judged if not one.effects)
     if (
         not best.effects
-        or best.score < baseline.score + _FALSE_ALARM
+        or best.score < baseline.score + FALSE_ALARM
         or may_be_chance(baseline.candidate, best.candidate, baseline.misfit, rng)
     ):
         if baseline.adequate:
@@ -355,7 +356,7 @@ def put_behind(
     judged: Sequence[Judged], one: Judged, part: Judged, objection: str
 ) -> tuple[Judged, ...]:
     """A set that has not earned its name is as far behind its part as what nobody would name."""
-    score = min(one.score, part.score - _FALSE_ALARM)
+    score = min(one.score, part.score - FALSE_ALARM)
     behind = replace(one, score=score, objection=objection)
     return _ranked([behind if other is one else other for other in judged])
 

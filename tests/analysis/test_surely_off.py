@@ -76,11 +76,15 @@ def test_a_verdict_that_names_nothing_stays():
     assert hold_against_datasheet(verdict, found) is verdict
 
 
-def test_where_rivals_are_left_one_of_them_may_be_missing(rivals):
-    load = standing((LOAD,), 95.0)
+@pytest.mark.parametrize(("ahead", "may_be"), [(20.1, True), (19.9, False), (-5.0, False)])
+def test_a_rival_that_leads_the_plain_model_may_be_what_is_missing(rivals, ahead, may_be):
+    """Not one that would not be named for so little: a shaft was left standing by soft teeth."""
+    load = standing((LOAD,), ahead)
     verdict, found = told((SHAFT,), [0.0], word="ambiguous", others=(load,))
-    rivals.append(load)
-    assert hold_against_datasheet(verdict, found) is verdict
+    rivals += [load, verdict.baseline]
+    held = hold_against_datasheet(verdict, found)
+    assert held.word == ("ambiguous" if may_be else "consistent")
+    assert (held is verdict) == may_be
 
 
 @pytest.mark.parametrize("word", ["explained", "ambiguous"])
