@@ -116,7 +116,11 @@ def test_the_rest_of_several_is_a_rival_though_its_own_runs_refuse_it():
     refused = standing((LOAD,), 50.0, "leaves structure")
     judged = tuple(refused if one.effects == (LOAD,) else one for one in verdict.judged)
     held = hold_against_datasheet(replace(verdict, judged=judged), found)
-    assert (held.word, held.rivals) == ("ambiguous", (refused,))
+    assert held.word == "ambiguous"
+    (rival,) = held.rivals
+    assert rival.effects == (LOAD,)
+    # It may be the explanation, and is told so.
+    assert held.remark(rival) == ""
 
 
 def test_a_rest_that_nobody_looked_at_is_no_rival():
