@@ -112,6 +112,12 @@ class Hypothesis:
         """Whether there is one parameter, and that is a datasheet value amid its range."""
         return self.amid == [True]
 
+    @property
+    def datasheet(self) -> NDArray[np.float64]:
+        """Sizes (d - 1,) as the datasheet has them, NaN where it says nothing of one."""
+        values = [parameter.nominal(self.unit) or np.nan for _, parameter in self.parameters]
+        return self.place(0.0, values)[1:]
+
     def within_tolerance(self, place: NDArray[np.float64]) -> list[bool]:
         """Whether each parameter is a datasheet value (or a factor on some) hardly off it."""
         nominal = [parameter.nominal(self.unit) for _, parameter in self.parameters]

@@ -180,6 +180,5 @@ def _least_of(further: Hypothesis, additions: Additions) -> NDArray[np.float64]:
 
 def _known_sizes(further: Hypothesis) -> NDArray[np.float64] | None:
     """Sizes (k,) of a cause as the datasheet has them, if it does."""
-    known = [parameter.nominal(further.unit) for _, parameter in further.parameters]
-    values = [value for value in known if value]
-    return further.place(0.0, values)[1:] if len(values) == len(known) else None
+    known = further.datasheet
+    return None if np.isnan(known).any() else known

@@ -7,7 +7,6 @@ the plain model's were not. It simulates nothing; how well the size is known is 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -73,22 +72,8 @@ def _with_part(verdict: Verdict, rest: Effects) -> Verdict:
 
 def _unsure(hypothesis: Hypothesis, found: Calibrated) -> set[str]:
     """Effects of which every size is a datasheet value, and is not surely off it."""
-    std = np.sqrt(np.diag(found.covariance))
-    known = _datasheet(hypothesis)
-    sure = {
-        effect
-        for (effect, _), size, off, value in zip(
-            hypothesis.parameters, found.mean[1:], std[1:], known, strict=True
-        )
-        if value is None or abs(size - value) > _SURELY * off
-    }
+    std = np.sqrt(np.diag(found.covariance))[1:]
+    # What the datasheet says nothing of is no number, and not near to it.
+    near = np.abs(found.mean[1:] - hypothesis.datasheet) <= _SURELY * std
+    sure = {effect for (effect, _), one in zip(hypothesis.parameters, near, strict=True) if not one}
     return set(hypothesis.effects) - sure
-
-
-def _datasheet(hypothesis: Hypothesis) -> Sequence[float | None]:
-    """The datasheet's value of each size as a coordinate, None where it says nothing of it."""
-    nominal = [parameter.nominal(hypothesis.unit) for _, parameter in hypothesis.parameters]
-    return [
-        None if not value else float((np.log(value) - low) / (high - low))
-        for value, (low, high) in zip(nominal, hypothesis.logs, strict=True)
-    ]

@@ -74,3 +74,16 @@ def test_a_set_says_where_its_causes_sit():
     plant = ("cable-stiffness", "shaft-damping")
     assert Hypothesis(UNITS["adss"], plant).sites == ("plant",)
     assert Hypothesis(UNITS["adss"], (*plant, "tachometer-gain")).sites == ("chain", "plant")
+
+
+@pytest.mark.parametrize(
+    ("effects", "known"),
+    [
+        ((), []),
+        # Half to twice of what it says; of what hangs on the load it says nothing.
+        (("shaft-stiffness",), [0.5]),
+        (("payload-flexibility", "shaft-stiffness"), [np.nan, np.nan, np.nan, 0.5]),
+    ],
+)
+def test_sizes_are_where_the_datasheet_has_them_if_it_does(effects, known):
+    np.testing.assert_allclose(Hypothesis(load_unit("adss"), effects).datasheet, known)
