@@ -26,6 +26,7 @@ from analysis.next_measurement import NextMeasurement, propose_measurement
 from analysis.observation import Observation, observe
 from analysis.progress import Progress, part_of
 from analysis.search import search_causes
+from analysis.second_thoughts import UNDOING, think_again
 from analysis.sharpening import sharpen_candidate
 from analysis.sizing import size_candidate, widen_if_open
 from analysis.surely_off import hold_against_datasheet
@@ -130,6 +131,10 @@ def _diagnose(
         held = hold_against_datasheet(verdict, sharp)
         if held.best is not verdict.best:
             sharp = sharpened(held.best) if held.word == "consistent" else None
+        else:
+            # Chance of its own: where nothing is refused all comes out as if it were not asked.
+            held = think_again(held, sharp.mean, observation, rng.spawn(1)[0], executor)
+            sharp = None if held.word == "unexplained" else sharp
         verdict = held
     named = verdict.word in ("explained", "ambiguous")
     base = widen_if_open(base, verdict.baseline.candidate, observation, rng)
@@ -215,6 +220,12 @@ def _warnings(diagnosis: Diagnosis) -> tuple[str, ...]:
         found.append(
             "the contribution ratio is that of the plain model, which does not explain what was "
             "measured: it may be off by far more than its error"
+        )
+    if diagnosis.verdict.best.objection == UNDOING:
+        found.append(
+            f"{' and '.join(diagnosis.verdict.best.effects)} would explain it together, though "
+            "each alone takes the model further off: measure them by themselves, or look for "
+            "something else that does what they leave"
         )
     if len(observation.blocks) == 1:
         found.append(

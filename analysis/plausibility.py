@@ -6,6 +6,9 @@ the cause is another then. It simulates nothing and passes no verdict.
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from analysis.candidate import Candidate
 from analysis.likelihood import HEAT
 from sim.catalogue import CATALOGUE
@@ -51,16 +54,22 @@ def is_pressed(candidate: Candidate) -> bool:
     return False
 
 
-def is_out_of_sight(candidate: Candidate) -> bool:
-    """Whether what it is told by is a resonance far outside all that was measured."""
-    return is_out_of_band(candidate, _IN_SIGHT)
+def is_out_of_sight(candidate: Candidate, place: NDArray[np.float64] | None = None) -> bool:
+    """Whether what it is told by is a resonance far outside all that was measured.
+
+    At a place (d,), that of its best fit if not given.
+    """
+    return is_out_of_band(candidate, _IN_SIGHT, place)
 
 
-def is_out_of_band(candidate: Candidate, factor: float = 1.0) -> bool:
+def is_out_of_band(
+    candidate: Candidate, factor: float = 1.0, place: NDArray[np.float64] | None = None
+) -> bool:
     """Whether it is a resonance outside all that was measured, by more than a factor."""
     hypothesis, measured = candidate.hypothesis, candidate.surface.observation.frequency_hz
     low, high = measured.min() / factor, measured.max() * factor
-    values = zip(hypothesis.parameters, hypothesis.values(candidate.best.place), strict=True)
+    there = candidate.best.place if place is None else place
+    values = zip(hypothesis.parameters, hypothesis.values(there), strict=True)
     return any(
         CATALOGUE[effect].resonance == parameter.name and not low < value < high
         for (effect, parameter), value in values

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import report_makings as makings
 
+from analysis import second_thoughts
 from analysis.calibration import Calibrated
 from analysis.causes import Hypothesis
 from analysis.diagnosis import _causes
@@ -119,3 +120,23 @@ def test_a_value_that_may_be_the_datasheets_is_not_named(monkeypatch, explained)
     assert (document["verdict"], document["causes"]) == ("unexplained", [])
     (line,) = (text for text in found.summary() if text.strip().endswith("datasheet says)"))
     assert "load-inertia" in line
+
+
+@pytest.mark.parametrize(("left", "named"), [(0.5, False), (0.9, True)])
+def test_causes_that_undo_one_another_are_not_named(monkeypatch, left, named):
+    """An operator is told which, and what to do; the ratio is not that of such a tale."""
+    monkeypatch.setattr(second_thoughts, "how_much_is_left", lambda *_: left)
+    braked = ("load-inertia", "load-viscous-damping")
+    found = makings.diagnosis(monkeypatch, braked, [braked])
+    document = found.to_json()
+    told = [text for text in document["warnings"] if "each alone takes the model" in text]
+    assert bool(document["causes"]) == named
+    assert (found.ratio_extended == found.ratio_baseline) != named
+    if named:
+        assert (document["verdict"], told) == ("explained", [])
+        return
+    assert document["verdict"] == "unexplained"
+    (warning,) = told
+    assert "load-inertia and load-viscous-damping would" in warning
+    assert any(warning in line for line in found.summary())
+    assert any("undo one another" in line for line in found.summary())
