@@ -283,7 +283,7 @@ def weigh_parts(fine: Hunt) -> None:
         fine.hear()
 
 
-def weigh_plainer(fine: Hunt, without: Collection[str] = ()) -> None:
+def weigh_plainer(fine: Hunt, without: Collection[str]) -> None:
     """See whether a set of fewer sizes that says the same as the leader does as well, if any does.
 
     What few rows had left out is looked at, and others get runs, as nobody compared them: a heavier

@@ -98,7 +98,7 @@ def searched(effects, sizes, seed):
     return search.search_causes(ADSS, seen, without=FELT, seed=seed)
 
 
-def hunted(sizes, seed):
-    """A hunt for one cause of a known size, with nothing simulated yet."""
+def hunted(sizes, seed, effects=("load-inertia",)):
+    """A hunt for causes of known sizes, with nothing simulated yet."""
     rng = np.random.default_rng(seed)
-    return hunt.Hunt(ADSS, observed(("load-inertia",), sizes, rng), rng, None, None)
+    return hunt.Hunt(ADSS, observed(effects, sizes, rng), rng, None, None)

@@ -345,7 +345,7 @@ def test_what_says_the_same_with_fewer_sizes_is_compared_with_a_leader(
     assert len(fine.found[plainer].population) == runs
     # Where nothing says the same nothing is done.
     monkeypatch.setattr(contest, "plainer_places", lambda *_: {})
-    contest.weigh_plainer(fine)
+    contest.weigh_plainer(fine, ())
     assert looked == [there] * started
 
 

@@ -130,17 +130,24 @@ def test_a_part_that_was_looked_at_elsewhere_is_weighed_where_the_pair_has_it(ru
     assert left < min(20.0, behind - 100.0)
 
 
-def test_nothing_more_is_simulated_where_no_pair_leads_or_its_parts_have_runs_enough(runs):
-    pair, parts = ("amplifier-lag", "load-inertia"), (("amplifier-lag",), ("load-inertia",))
+def test_nothing_more_is_simulated_where_no_pair_leads(runs):
     looking = synthetic_search.hunted([0.8], 1)
-    looking.start({part: np.array([0.4, 0.8]) for part in parts}, 16)
+    looking.start({("load-inertia",): np.array([0.4, 0.8]), (): np.array([0.4])}, 16)
     runs.clear()
     contest.weigh_parts(looking)
     assert not runs
-    looking.start({pair: np.array([0.4, 0.0, 0.8])}, 4)
+
+
+@pytest.mark.parametrize(("groups", "more"), [(2, True), (16, False)])
+def test_parts_of_a_pair_that_have_runs_enough_get_no_more(runs, groups, more):
+    pair = {"amplifier-lag": 0.8, "load-inertia": 0.3}
+    looking = synthetic_search.hunted(list(pair.values()), 1, tuple(pair))
+    looking.start({tuple(pair): np.array([0.4, *pair.values()])}, 4)
+    looking.start({(part,): np.array([0.4, size]) for part, size in pair.items()}, groups)
+    assert looking.best.hypothesis.effects == tuple(pair)
     runs.clear()
     contest.weigh_parts(looking)
-    assert not runs
+    assert bool(runs) == more
 
 
 def test_every_run_is_made_where_the_caller_says(runs):
