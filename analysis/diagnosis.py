@@ -19,6 +19,7 @@ import numpy as np
 from analysis.arithmetic import on_one_core
 from analysis.calibration import Calibrated
 from analysis.candidate import Candidate
+from analysis.certainty import hold_against_doubt
 from analysis.diagnosis_document import Cause, Diagnosis, Size
 from analysis.executor import Executor
 from analysis.misfit import describe_departures, find_departures
@@ -118,7 +119,7 @@ def _diagnose(
     candidates = searched.candidates
     observation = candidates[0].surface.observation
     rng = np.random.default_rng(seed)
-    verdict = judge_candidates(candidates, observation, rng)
+    verdict = hold_against_doubt(judge_candidates(candidates, observation, rng))
     base = size_candidate(verdict.baseline.candidate, observation, rng)
 
     def sharpened(one: Judged) -> Calibrated:

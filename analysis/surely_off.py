@@ -67,7 +67,7 @@ def _with_part(verdict: Verdict, rest: Effects) -> Verdict:
     if not parts:
         return verdict
     judged = tuple(parts[0] if one.effects == rest else one for one in verdict.judged)
-    return replace(verdict, word="ambiguous", judged=judged, parts=parts)
+    return replace(verdict, word="ambiguous", judged=judged, also=(*verdict.also, *parts))
 
 
 def _unsure(hypothesis: Hypothesis, found: Calibrated) -> set[str]:

@@ -27,6 +27,7 @@ __all__ = [
     "FALSE_ALARM",
     "LEAST_GAIN",
     "LEAST_LEAD",
+    "UNEARNED",
     "Judged",
     "Verdict",
     "Word",
@@ -108,7 +109,7 @@ are believed in its place, are rivals: of 142 sets drawn and named so two had le
 _JUDGED = 6
 
 _NOT_ASKED = "too far behind to be asked"
-_UNEARNED = "a part of it does as well, or would by chance"
+UNEARNED = "a part of it does as well, or would by chance"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,14 +150,15 @@ class Judged:
 class Verdict:
     """The word, the best set, every set judged (best first), and the baseline among them.
 
-    `parts`: those of the best set that may do as well, as a further cause may be none.
+    `also`: rivals whatever their scores, as a further cause of the best set may be none, or too
+    little is believed of it.
     """
 
     word: Word
     best: Judged
     judged: tuple[Judged, ...]
     baseline: Judged
-    parts: tuple[Judged, ...] = ()
+    also: tuple[Judged, ...] = ()
 
     @property
     def rivals(self) -> tuple[Judged, ...]:
@@ -169,29 +171,30 @@ class Verdict:
         best is then likeliest only among what is left. So is any near the best where more is
         believed of others than of that.
         """
-        said = [self.best.score, *(one.score for one in self.judged if self._says_the_same(one))]
+        said = [self.best.score, *(one.score for one in self.judged if self.says_the_same(one))]
         believed = HEAT * float(np.logaddexp.reduce(np.array(said) / HEAT))
         return tuple(
-            one for one in self.judged if one in self.parts or self._is_rival(one, believed)
+            one for one in self.judged if one in self.also or self._is_rival(one, believed)
         )
 
     @property
     def probability(self) -> float:
         """Of the best set, with what is believed of sets that say the same with more sizes."""
         return self.best.probability + sum(
-            one.probability for one in self.judged if self._says_the_same(one)
+            one.probability for one in self.judged if self.says_the_same(one)
         )
 
     def remark(self, one: Judged) -> str:
         """What speaks against a set, or makes it no rival; empty where nothing does."""
-        if self._says_the_same(one):
+        if self.says_the_same(one):
             return "says the same with more sizes"
         return one.objection if one.refused else ""
 
-    def _says_the_same(self, one: Judged) -> bool:
+    def says_the_same(self, one: Judged) -> bool:
+        """Whether a set says with more sizes what the best does."""
         # What swings out of sight is felt as a load or a brake and as nothing else: what is
         # believed of it is believed of that.
-        may = one.adequate or one.objection in (OUT_OF_SIGHT, _UNEARNED)
+        may = one.adequate or one.objection in (OUT_OF_SIGHT, UNEARNED)
         return may and is_felt_alike(one.candidate, self.best.candidate)
 
     def _is_led_by(self, one: Judged) -> bool:
@@ -212,7 +215,7 @@ class Verdict:
 
     def _is_rival(self, one: Judged, believed: float) -> bool:
         behind, best = believed - one.score, set(self.best.effects)
-        if one.objection == _UNEARNED:
+        if one.objection == UNEARNED:
             return False
         if not one.effects and best:
             lead = self.best.score - one.score
@@ -224,7 +227,7 @@ class Verdict:
         rarer = one.candidate.hypothesis.rare > self.best.candidate.hypothesis.rare
         if not other or not one.adequate or behind >= (_RARE + _RARE_RIVAL if rarer else _RIVAL):
             return False
-        return not self._says_the_same(one)
+        return not self.says_the_same(one)
 
 
 def judge_candidates(
@@ -243,7 +246,7 @@ def judge_candidates(
         part = _part_that_will_do(judged, best, rng)
         if part is None:
             break
-        judged = put_behind(judged, best, part, _UNEARNED)
+        judged = put_behind(judged, best, part, UNEARNED)
     (baseline,) = (one for one in judged if not one.effects)
     if (
         not best.effects
@@ -303,7 +306,7 @@ def _worth_judging(candidates: Sequence[Candidate]) -> list[Candidate]:
 
 def _ask(judged: Sequence[Judged], rng: np.random.Generator) -> tuple[Judged, ...]:
     """Ask what speaks against the leading ones and the parts of the first; the baseline is one."""
-    first = next(one for one in judged if one.objection != _UNEARNED)
+    first = next(one for one in judged if one.objection != UNEARNED)
     asked = []
     for one in judged:
         part = set(one.effects) < set(first.effects) or not one.effects
@@ -325,7 +328,7 @@ def _leader(judged: Sequence[Judged]) -> Judged:
     Where it does not look like its own runs and another that ties with it does, it
     is the other that is believed; and so is one that says the same with fewer sizes.
     """
-    left = [one for one in judged if one.objection != _UNEARNED]
+    left = [one for one in judged if one.objection != UNEARNED]
     tied = [one for one in left if one.score > left[0].score - _TIE and one.adequate]
     best = tied[0] if tied else left[0]
     for one in tied:

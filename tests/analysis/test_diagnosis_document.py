@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import report_makings as makings
 
-from analysis import second_thoughts
+from analysis import certainty, second_thoughts
 from analysis.calibration import Calibrated
 from analysis.causes import Hypothesis
 from analysis.diagnosis import _causes
@@ -140,3 +140,13 @@ def test_causes_that_undo_one_another_are_not_named(monkeypatch, left, named):
     assert "load-inertia and load-viscous-damping would" in warning
     assert any(warning in line for line in found.summary())
     assert any("undo one another" in line for line in found.summary())
+
+
+@pytest.mark.parametrize(("asked", "word"), [(0.0, "explained"), (2.0, "ambiguous")])
+def test_what_shares_the_probability_is_told_as_a_rival(monkeypatch, asked, word):
+    monkeypatch.setattr(certainty, "_SURE", asked)
+    found = makings.diagnosis(monkeypatch, ("load-inertia",), [("load-inertia",), STIFF])
+    document = found.to_json()
+    assert document["verdict"] == word
+    assert [cause["effect"] for cause in document["causes"]] == ["load-inertia"]
+    assert bool(found.verdict.rivals) == (word == "ambiguous")

@@ -96,7 +96,7 @@ def test_what_undoes_itself_is_no_explanation(monkeypatch, share, word):
         # It is said of it wherever it is listed.
         assert found.best is found.judged[0]
         assert found.best.objection == UNDOING
-        monkeypatch.setattr(Verdict, "_says_the_same", lambda *_: False)
+        monkeypatch.setattr(Verdict, "says_the_same", lambda *_: False)
         assert found.remark(found.best) == UNDOING
 
 

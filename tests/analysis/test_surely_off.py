@@ -38,7 +38,7 @@ def rivals(monkeypatch):
     near = []
 
     def found(verdict):
-        return tuple(one for one in verdict.judged if one in verdict.parts or one in near)
+        return tuple(one for one in verdict.judged if one in verdict.also or one in near)
 
     monkeypatch.setattr(Verdict, "rivals", property(found))
     return near

@@ -148,7 +148,7 @@ def test_a_pair_that_leads_by_little_or_by_chance_is_not_believed(
     unlike = replace(part, misfit=4.1, objection="no")
     assert rules._part_that_will_do([pair, unlike], pair, rng) is None
     if named == TRUE:
-        first, second = rules.put_behind([pair, part], pair, part, rules._UNEARNED)
+        first, second = rules.put_behind([pair, part], pair, part, rules.UNEARNED)
         assert (first.effects, second.effects) == (TRUE, TRUE + WRONG)
         assert first.score - second.score == pytest.approx(20.0)
         assert first.probability == pytest.approx(1.0 / (1.0 + np.exp(-20.0 / HEAT)))
