@@ -119,7 +119,7 @@ def _diagnose(
     candidates = searched.candidates
     observation = candidates[0].surface.observation
     rng = np.random.default_rng(seed)
-    verdict = hold_against_doubt(judge_candidates(candidates, observation, rng))
+    verdict = judge_candidates(candidates, observation, rng)
     base = size_candidate(verdict.baseline.candidate, observation, rng)
 
     def sharpened(one: Judged) -> Calibrated:
@@ -133,6 +133,8 @@ def _diagnose(
         if held.best is not verdict.best:
             sharp = sharpened(held.best) if held.word == "consistent" else None
         else:
+            # Last, as what shares its probability is no reason to name what is the datasheet's.
+            held = hold_against_doubt(held)
             # Chance of its own: where nothing is refused all comes out as if it were not asked.
             held = think_again(held, sharp.mean, observation, rng.spawn(1)[0], executor)
             sharp = None if held.word == "unexplained" else sharp

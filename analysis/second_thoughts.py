@@ -38,6 +38,9 @@ _FAR = 1.0
 """Log gain, or phase in rad, beyond which a row is as far off as it can be: where a resonance moves
 to says more than how deep it is."""
 
+_NOTHING = 1e-6
+"""The same, below which two responses are one."""
+
 
 def think_again(
     verdict: Verdict,
@@ -104,7 +107,9 @@ def how_much_is_left(
         groups += [group] * _GROUPS
     made = simulate_groups(hypothesis.unit, groups, observation, rng, executor)
     plain, *parts, whole = (_shown(made[effects], observation) for effects in asked)
-    return _distance(whole, plain) / min(_distance(part, plain) for part in parts)
+    least = min(_distance(part, plain) for part in parts)
+    # What does nothing alone is undone by nothing.
+    return _distance(whole, plain) / max(least, _NOTHING)
 
 
 def _shown(population: Population, observation: Observation) -> NDArray[np.float64]:

@@ -103,18 +103,19 @@ def test_the_cause_that_costs_most_to_leave_out_comes_first(alone, first):
     assert {cause.effect: cause.sizes[0].value for cause in causes} == pytest.approx(values)
 
 
-def test_a_value_that_may_be_the_datasheets_is_not_named(monkeypatch, explained):
-    """Its plain model fits no better for it: nothing explains that measurement."""
-
-    sharpened = makings.sharpened
-
-    def as_the_datasheet(unit, candidate, *_):
+def as_the_datasheet(sharpened):
+    def close(unit, candidate, *_):
         found = sharpened(unit, candidate)
         # A load's inertia lies amid its range: half to twice of what the datasheet says.
         return replace(found, mean=np.append(found.mean[:1], [0.53] * (len(found.mean) - 1)))
 
+    return close
+
+
+def test_a_value_that_may_be_the_datasheets_is_not_named(monkeypatch, explained):
+    """Its plain model fits no better for it: nothing explains that measurement."""
     assert [cause.effect for cause in explained.causes] == ["load-inertia"]
-    monkeypatch.setattr(makings, "sharpened", as_the_datasheet)
+    monkeypatch.setattr(makings, "sharpened", as_the_datasheet(makings.sharpened))
     found = makings.diagnosis(monkeypatch, ("load-inertia",), [("load-inertia",)])
     document = found.to_json()
     assert (document["verdict"], document["causes"]) == ("unexplained", [])
@@ -150,3 +151,13 @@ def test_what_shares_the_probability_is_told_as_a_rival(monkeypatch, asked, word
     assert document["verdict"] == word
     assert [cause["effect"] for cause in document["causes"]] == ["load-inertia"]
     assert bool(found.verdict.rivals) == (word == "ambiguous")
+
+
+@pytest.mark.parametrize("asked", [0.0, 2.0])
+def test_what_shares_the_probability_does_not_keep_a_value_that_may_be_the_datasheets(
+    monkeypatch, asked
+):
+    monkeypatch.setattr(certainty, "_SURE", asked)
+    monkeypatch.setattr(makings, "sharpened", as_the_datasheet(makings.sharpened))
+    found = makings.diagnosis(monkeypatch, ("load-inertia",), [("load-inertia",), PAIR])
+    assert found.to_json()["causes"] == []
