@@ -17,7 +17,7 @@ __all__ = ["hold_against_doubt"]
 
 _SURE = 0.95
 """So much must be believed of the best to be named without a rival. Of 22 sets that were named
-rightly in a study all had 0.99 or more. A load was named for play with 0.32, behind itself with a
+rightly in a study all had 0.99 or more. A load was named for play with 0.38, behind itself with a
 brake, which was refused; an amplifier for a resistance with 0.70, a friction for another with 0.91
 and a cable for a load with 0.92."""
 
