@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from analysis.adequacy import judge_adequacy
 from analysis.candidate import Candidate, Effects
-from analysis.doubt import is_doubtful, is_given_up, is_nothing_missing
+from analysis.doubt import is_doubtful, is_given_up, is_nothing_missing, is_refused_now
 from analysis.holdout import AT_NOISE, HeldOut, hold_out
 from analysis.hunt import Hunt
 from analysis.likeness import is_felt_alike, plainer_places
@@ -29,6 +29,7 @@ __all__ = [
     "LAST_GROUPS",
     "TOO_FAR",
     "back_who_predicts",
+    "call_back",
     "catch_up",
     "compare",
     "give_chances",
@@ -204,6 +205,27 @@ def back_who_predicts(fine: Hunt, rng: np.random.Generator) -> None:
             break
         settle(fine, backed[:_BACKED])
         fine.hear()
+
+
+def call_back(rough: Hunt, fine: Hunt, rng: np.random.Generator) -> None:
+    """Where the leader would be refused, give who led on few rows the runs to be compared by.
+
+    Three times the rows leave what has many sizes far behind, as few of its runs fit all of them.
+    """
+    leader = fine.best.hypothesis.effects
+    first = next((key for key in rough.leading(len(rough.found)) if key in fine.found), leader)
+    if not first or not has_fewer(fine, first, leader) or fine.purse.is_spent:
+        return
+    # Chance of its own: where nobody is called back all comes out as if it had not been asked.
+    if not is_refused_now(fine, rng.spawn(1)[0]):
+        return
+    for _ in range(_ROUNDS_ALONE):
+        if has_fewer(fine, first, leader) and not fine.purse.is_spent:
+            settle(fine, [first])
+    if fine.best.hypothesis.effects != leader:
+        fine.hear()
+        compare(fine, rng)
+        see_it_predict(fine)
 
 
 def see_it_predict(fine: Hunt) -> None:
