@@ -131,7 +131,7 @@ def _diagnose(
         sharp = sharpened(verdict.best)
         held = hold_against_datasheet(verdict, sharp)
         if held.best is not verdict.best:
-            sharp = sharpened(held.best) if held.word == "consistent" else None
+            sharp = sharpened(held.best) if held.word != "unexplained" else None
         else:
             # Last, as what shares its probability is no reason to name what is the datasheet's.
             held = hold_against_doubt(held)

@@ -7,6 +7,7 @@ the plain model's were not. It simulates nothing; how well the size is known is 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy as np
 from analysis.calibration import Calibrated
 from analysis.candidate import Effects
 from analysis.causes import Hypothesis
-from analysis.verdict import FALSE_ALARM, Verdict, Word, put_behind
+from analysis.verdict import FALSE_ALARM, Judged, Verdict, Word, put_behind
 
 __all__ = ["AS_THE_DATASHEET", "hold_against_datasheet"]
 
@@ -40,8 +41,9 @@ def hold_against_datasheet(verdict: Verdict, found: Calibrated) -> Verdict:
     -------
     Verdict
         If the best set is of one cause, that nothing is missing, or that nothing explains it where
-        the plain model does not. Among several, that the rest may do alone, also where its own runs
-        are too few or too far to say so: all of them as the datasheet has that value are the rest.
+        the plain model does not. If it is of several, that the rest is named, and the whole its
+        rival; or the rest is a rival, where its own runs are too few or too far to say that it will
+        do: all of them as the datasheet has that value are the rest.
     """
     best = verdict.best
     unsure = _unsure(best.candidate.hypothesis, found)
@@ -56,18 +58,31 @@ def hold_against_datasheet(verdict: Verdict, found: Calibrated) -> Verdict:
         # It may be what is missing.
         return verdict
     judged = put_behind(verdict.judged, best, baseline, AS_THE_DATASHEET)
-    (baseline,) = (one for one in judged if not one.effects)
+    baseline = _among(judged, ())
     word: Word = "consistent" if baseline.adequate else "unexplained"
     return Verdict(word, baseline, judged, baseline)
 
 
 def _with_part(verdict: Verdict, rest: Effects) -> Verdict:
-    """The same with a part of the best set as its rival, whatever speaks against its own runs."""
-    parts = tuple(replace(one, objection="") for one in verdict.judged if one.effects == rest)
-    if not parts:
+    """The rest of the best set named before the whole if it leads all others, or its rival."""
+    best, judged = verdict.best, verdict.judged
+    part = next((one for one in judged if one.effects == rest), None)
+    if part is None:
         return verdict
-    judged = tuple(parts[0] if one.effects == rest else one for one in verdict.judged)
-    return replace(verdict, word="ambiguous", judged=judged, also=(*verdict.also, *parts))
+    others = (one for one in judged if one.adequate and one is not best)
+    if part.adequate and part.score >= max(one.score for one in others):
+        judged = put_behind(judged, best, part, AS_THE_DATASHEET)
+        first, rival = _among(judged, rest), _among(judged, best.effects)
+    else:
+        first, rival = best, replace(part, objection="")
+        judged = tuple(rival if one is part else one for one in judged)
+    return replace(
+        verdict, word="ambiguous", best=first, judged=judged, also=(*verdict.also, rival)
+    )
+
+
+def _among(judged: Sequence[Judged], effects: Effects) -> Judged:
+    return next(one for one in judged if one.effects == effects)
 
 
 def _unsure(hypothesis: Hypothesis, found: Calibrated) -> set[str]:

@@ -97,17 +97,30 @@ def test_a_rival_that_leads_the_plain_model_may_be_what_is_missing(rivals, ahead
         ((LOAD, SHAFT), [5.0, -5.0], None),
     ],
 )
-def test_the_rest_of_several_is_a_rival_where_one_may_be_as_the_datasheet_says(
+def test_the_rest_of_several_is_named_where_one_may_be_as_the_datasheet_says(
     word, effects, sigmas, left
 ):
+    """The whole is its rival then: where that value is the datasheet's it is the rest."""
     verdict, found = told(effects, sigmas, word=word)
     held = hold_against_datasheet(verdict, found)
-    assert held.best is verdict.best
     if left is None:
         assert held is verdict
-    else:
-        assert held.word == "ambiguous"
-        assert [one.effects for one in held.rivals] == [left]
+        return
+    assert (held.word, held.best.effects) == ("ambiguous", left)
+    assert [one.effects for one in held.rivals] == [effects]
+    # The whole is believed less than what is named, and the reason is told.
+    (whole,) = held.rivals
+    assert held.best.probability > whole.probability
+    assert held.remark(whole) == AS_THE_DATASHEET
+
+
+@pytest.mark.parametrize(("score", "first"), [(49.0, (LOAD,)), (51.0, (LOAD, SHAFT))])
+def test_the_rest_of_several_is_a_rival_where_another_stands_before_it(score, first):
+    """It is not likelier than another by what speaks against the whole."""
+    verdict, found = told((LOAD, SHAFT), [5.0, 0.0], others=(standing((BRAKE,), score),))
+    held = hold_against_datasheet(verdict, found)
+    assert (held.word, held.best.effects) == ("ambiguous", first)
+    assert {one.effects for one in held.rivals} == {(LOAD,), (LOAD, SHAFT)} - {first}
 
 
 def test_the_rest_of_several_is_a_rival_though_its_own_runs_refuse_it():
