@@ -320,6 +320,8 @@ def weigh_plainer(fine: Hunt, without: Collection[str]) -> None:
     }
     if elsewhere:
         fine.start(elsewhere, LAST_GROUPS)
+        # Where the leader is is not quite where it is best itself, and few runs tell neither.
+        settle(fine, [key for key in fine.leading(len(fine.found), HOPELESS) if key in elsewhere])
         fine.hear()
     catch_up(fine, places, leader, _PLAINER_BEHIND)
 

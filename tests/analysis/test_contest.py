@@ -301,8 +301,10 @@ def test_a_newcomer_that_is_close_gets_as_many_runs_as_the_leader(of_leader, beh
 @pytest.mark.parametrize(
     ("known", "behind", "started", "runs"),
     [
-        # It was not looked at, or elsewhere, and is then compared as long as it is not far behind.
-        (None, 59.0, True, 150), (None, 61.0, True, 30), (0.29, 59.0, True, 150),
+        # It was not looked at, or elsewhere, gets a second look unless that is hopeless, and is
+        # then compared as long as it is not far behind.
+        (None, 59.0, True, 150), (None, 61.0, True, 60), (None, 299.0, True, 60),
+        (None, 301.0, True, 30), (0.29, 59.0, True, 150), (0.29, 61.0, True, 60),
         (0.31, 59.0, False, 150), (0.31, 61.0, False, 30),
     ],
 )  # fmt: skip
