@@ -130,15 +130,15 @@ def _diagnose(
     if verdict.word != "unexplained":
         sharp = sharpened(verdict.best)
         held = hold_against_datasheet(verdict, sharp)
-        if held.best is not verdict.best:
-            sharp = sharpened(held.best) if held.word != "unexplained" else None
-        else:
-            # Last, as what shares its probability is no reason to name what is the datasheet's.
-            held = hold_against_doubt(held)
-            # Chance of its own: where nothing is refused all comes out as if it were not asked.
-            held = think_again(held, sharp.mean, observation, rng.spawn(1)[0], executor)
-            sharp = None if held.word == "unexplained" else sharp
-        verdict = held
+        while held.best is not verdict.best and held.word != "unexplained":
+            # What is left of several causes, or none, is sized and asked the same.
+            verdict, sharp = held, sharpened(held.best)
+            held = hold_against_datasheet(verdict, sharp)
+        # Last, as what shares its probability is no reason to name what is the datasheet's.
+        held = hold_against_doubt(held)
+        # Chance of its own: where nothing is refused all comes out as if it were not asked.
+        verdict = think_again(held, sharp.mean, observation, rng.spawn(1)[0], executor)
+        sharp = None if verdict.word == "unexplained" else sharp
     named = verdict.word in ("explained", "ambiguous")
     base = widen_if_open(base, verdict.baseline.candidate, observation, rng)
     best = base if sharp is None else sharp

@@ -76,9 +76,8 @@ def _with_part(verdict: Verdict, rest: Effects) -> Verdict:
     else:
         first, rival = best, replace(part, objection="")
         judged = tuple(rival if one is part else one for one in judged)
-    return replace(
-        verdict, word="ambiguous", best=first, judged=judged, also=(*verdict.also, rival)
-    )
+    also = tuple(_among(judged, one.effects) for one in (*verdict.also, rival))
+    return Verdict("ambiguous", first, judged, _among(judged, ()), also)
 
 
 def _among(judged: Sequence[Judged], effects: Effects) -> Judged:

@@ -123,6 +123,25 @@ def test_a_value_that_may_be_the_datasheets_is_not_named(monkeypatch, explained)
     assert "load-inertia" in line
 
 
+def test_what_is_left_of_several_is_sized_and_asked_the_same(monkeypatch):
+    """A part that is named in place of the whole is told by runs of its own."""
+    braked, load, asked = ("load-inertia", "load-viscous-damping"), ("load-inertia",), []
+
+    def held(verdict, found):
+        asked.append((verdict.best.effects, len(found.mean)))
+        if verdict.best.effects == load:
+            return verdict
+        part = next(one for one in verdict.judged if one.effects == load)
+        return replace(verdict, word="ambiguous", best=part, also=(verdict.best,))
+
+    monkeypatch.setattr(makings.diagnosis_module, "hold_against_datasheet", held)
+    found = makings.diagnosis(monkeypatch, braked, [braked, load])
+    assert asked == [(braked, 3), (load, 2)]
+    document = found.to_json()
+    assert [cause["effect"] for cause in document["causes"]] == [*load]
+    assert [*braked] in [rival["causes"] for rival in document["rivals"]]
+
+
 @pytest.mark.parametrize(("left", "named"), [(0.5, False), (0.9, True)])
 def test_causes_that_undo_one_another_are_not_named(monkeypatch, left, named):
     """An operator is told which, and what to do; the ratio is not that of such a tale."""

@@ -123,6 +123,19 @@ def test_the_rest_of_several_is_a_rival_where_another_stands_before_it(score, fi
     assert {one.effects for one in held.rivals} == {(LOAD,), (LOAD, SHAFT)} - {first}
 
 
+def test_what_stood_before_a_rest_stays_its_rival():
+    """Of three causes one may be the datasheet's, and of the rest, by runs of its own, another."""
+    both = standing((LOAD, BRAKE), 60.0)
+    verdict, found = told((LOAD, BRAKE, SHAFT), [5.0, 0.0, 0.0], others=(both,))
+    once = hold_against_datasheet(verdict, found)
+    assert once.best.effects == (LOAD, BRAKE)
+    _, found = told((LOAD, BRAKE), [0.0, 0.0])
+    twice = hold_against_datasheet(once, found)
+    assert (twice.word, twice.best.effects) == ("ambiguous", (BRAKE,))
+    assert {one.effects for one in twice.rivals} == {(LOAD, BRAKE), (LOAD, BRAKE, SHAFT)}
+    assert twice.baseline in twice.judged
+
+
 def test_the_rest_of_several_is_a_rival_though_its_own_runs_refuse_it():
     """Its value being the datasheet's, the whole that is believed is that rest."""
     verdict, found = told((LOAD, SHAFT), [5.0, 0.0])
