@@ -154,10 +154,12 @@ def catch_up(
 ) -> None:
     """Give those that come close to a leader as many runs as it has, while they stay close.
 
-    All others were compared with it before.
+    And while there is something left to spend. All others were compared with it before.
     """
     near = set(newcomers)
-    while near := near & set(fine.leading(len(fine.found), behind)):
+    while not fine.purse.is_overdrawn and (
+        near := near & set(fine.leading(len(fine.found), behind))
+    ):
         near = {key for key in near if has_fewer(fine, key, leader)}
         settle(fine, sorted(near))
 

@@ -179,13 +179,16 @@ def search_causes(
                 lambda: _look_for_third(rough, fine, atlas, rng),
                 lambda: settle_doubt(fine, rng),
                 search_late,
-                hold_rare,
-                lambda: weigh_baseline(fine, rng),
             ):
-                given_up = is_given_up(fine, rng)
-                if given_up:
+                if is_given_up(fine, rng):
                     break
                 step()
+            if not fine.purse.is_overdrawn:
+                # One that nobody suspects first may explain what all that was spent has not.
+                hold_rare()
+            given_up = is_given_up(fine, rng)
+            if not given_up:
+                weigh_baseline(fine, rng)
     likeliest = sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
     return Searched(likeliest, given_up, rough.spared)
 

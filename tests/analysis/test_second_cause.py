@@ -26,7 +26,9 @@ class Beside:
 
     @property
     def purse(self):
-        return SimpleNamespace(is_spent=len(self.settled) + self.taken >= self.looks)
+        return SimpleNamespace(
+            is_spent=len(self.settled) + self.taken >= self.looks, is_overdrawn=False
+        )
 
     @property
     def best(self):
