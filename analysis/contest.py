@@ -154,12 +154,10 @@ def catch_up(
 ) -> None:
     """Give those that come close to a leader as many runs as it has, while they stay close.
 
-    And while there is something left to spend. All others were compared with it before.
+    All others were compared with it before.
     """
     near = set(newcomers)
-    while not fine.purse.is_overdrawn and (
-        near := near & set(fine.leading(len(fine.found), behind))
-    ):
+    while near := near & set(fine.leading(len(fine.found), behind)):
         near = {key for key in near if has_fewer(fine, key, leader)}
         settle(fine, sorted(near))
 

@@ -180,10 +180,11 @@ def search_causes(
                 lambda: settle_doubt(fine, rng),
                 search_late,
             ):
-                if is_given_up(fine, rng):
+                given_up = is_given_up(fine, rng)
+                if given_up:
                     break
                 step()
-            if not fine.purse.is_overdrawn:
+            if not (given_up and fine.purse.is_overdrawn):
                 # One that nobody suspects first may explain what all that was spent has not.
                 hold_rare()
             given_up = is_given_up(fine, rng)

@@ -80,18 +80,24 @@ def test_a_search_that_has_spent_all_is_left_with_a_leader_that_explains_nothing
     assert max(map(len, runs)) == 2
 
 
+@pytest.mark.parametrize("given_up", [False, True])
 @pytest.mark.parametrize("overdrawn", [False, True])
-def test_a_search_that_is_given_up_holds_rare_causes_against_its_leader(monkeypatch, overdrawn):
-    """A dead zone was left out, as pairs that explained nothing had taken all; and is no pair."""
+def test_a_search_that_has_spent_all_holds_rare_causes_against_its_leader(
+    monkeypatch, overdrawn, given_up
+):
+    """A dead zone was left out, as pairs that explained nothing had taken all; and is no pair.
+
+    One that explains is held against them whatever was spent: it might be named.
+    """
     held, weighed = [], []
-    monkeypatch.setattr(search, "is_given_up", lambda *_: True)
+    monkeypatch.setattr(search, "is_given_up", lambda *_: given_up)
     monkeypatch.setattr(search, "_hold_rare", lambda *_: held.append(1))
     monkeypatch.setattr(search, "weigh_baseline", lambda *_: weighed.append(1))
     monkeypatch.setattr(Purse, "is_overdrawn", overdrawn)
     found = synthetic_search.searched(("load-inertia",), [0.8], 1)
-    assert found.given_up
-    assert len(held) == (not overdrawn)
-    assert not weighed
+    assert found.given_up == given_up
+    assert len(held) == (not (given_up and overdrawn))
+    assert len(weighed) == (not given_up)
 
 
 @pytest.mark.parametrize("seed", TWO_SEEDS)

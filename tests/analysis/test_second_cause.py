@@ -26,9 +26,7 @@ class Beside:
 
     @property
     def purse(self):
-        return SimpleNamespace(
-            is_spent=len(self.settled) + self.taken >= self.looks, is_overdrawn=False
-        )
+        return SimpleNamespace(is_spent=len(self.settled) + self.taken >= self.looks)
 
     @property
     def best(self):
