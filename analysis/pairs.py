@@ -16,6 +16,7 @@ from analysis.beside import place_beside
 from analysis.candidate import Candidate, Effects
 from analysis.doubt import is_doubtful
 from analysis.hunt import Hunt, Starts
+from analysis.lending import leads_with_lent
 from analysis.parts import earns, parts_of, places_of_parts
 from analysis.screening import (
     Additions,
@@ -67,6 +68,11 @@ _CLOSER, _MOST_CLOSER, _AS_GOOD = 6, 14, 40.0
 """How many of them are looked at closer at least, and at most of those that are no farther behind
 the best: twenty runs rank by chance. Damped teeth with a soft shaft stood thirteenth, 33 behind,
 and led by 39 with forty runs more."""
+
+_LENT_MOST, _LENT = 3, 5.0
+"""How many beside each known cause are looked at closer, too, by how they stand with its runs lent
+to them (`analysis.lending`), and what they lead it by then. A stiff shaft beside friction at rest
+stood twelfth by its own twenty runs, which no others fit, and third so, ahead by 9."""
 
 _STRANGER = 60.0
 """Log-likelihood behind a leading pair in doubt within which others are also looked at beside the
@@ -245,9 +251,27 @@ def look_beside_all(rough: Hunt, additions: Additions, kept: Starts) -> set[Effe
     least = rough.found[leading[0]].best.log_likelihood - _AS_GOOD
     as_good = [key for key in leading if rough.found[key].best.log_likelihood > least]
     closer = leading[: max(_CLOSER, len(as_good))]
+    closer += _hopeful(rough, additions, kept, looked_at, closer)
     look_closer_beside(rough, closer)
     rough.hear()
     return set(closer)
+
+
+def _hopeful(
+    rough: Hunt,
+    additions: Additions,
+    kept: Starts,
+    looked_at: Collection[Effects],
+    closer: Collection[Effects],
+) -> list[Effects]:
+    """Who leads one of its causes most with the runs of that lent to it, and has too few itself."""
+    found = list[Effects]()
+    for part in kept:
+        beside = [key for key in looked_at if set(key) > set(part)]
+        leads = leads_with_lent(rough, additions, part, beside)
+        likely = sorted((key for key in beside if leads[key] > _LENT), key=lambda key: -leads[key])
+        found += [key for key in likely[:_LENT_MOST] if key not in closer and key not in found]
+    return found
 
 
 def _likelihood(place: Place) -> float:

@@ -7,10 +7,12 @@ of it is spent is for those to say who ask.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from analysis.observation import Observation
-from sim.effort import Effort
+from sim.effort import Effort, counting
 
 __all__ = ["Purse"]
 
@@ -55,3 +57,13 @@ class Purse:
     def is_overdrawn(self) -> bool:
         """Whether the overdraft is spent, too."""
         return self.has_spent(_OVERDRAFT)
+
+    @contextmanager
+    def aside(self) -> Iterator[None]:
+        """Hold nothing that is simulated inside the block against the purse.
+
+        What is kept from one measurement to the next would else decide what a search finds.
+        """
+        with counting() as made:
+            yield
+        self.effort.add(-made.simulated_s, -made.worth_s)

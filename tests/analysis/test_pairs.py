@@ -192,7 +192,7 @@ class Rough:
     spared = False
     apart = 50.0
 
-    def __init__(self, monkeypatch, placed, purse=None, costs=lambda: None):
+    def __init__(self, monkeypatch, placed, purse=None, costs=lambda: None, lent=None):
         self.found = {part: SimpleNamespace(hypothesis=part) for part in placed}
         self.looks, self.purse = [], Purse() if purse is None else purse
 
@@ -210,8 +210,13 @@ class Rough:
 
             return record
 
+        def lead(rough, additions, part, keys):
+            assert all(set(key) > set(part) for key in keys)
+            return {key: (lent or {}).get((part, key), 5.0) for key in keys}
+
         monkeypatch.setattr(pairs, "coarse_stride", lambda *_: 2)
         monkeypatch.setattr(pairs, "place_beside", place)
+        monkeypatch.setattr(pairs, "leads_with_lent", lead)
         for name in ("look_beside", "look_closer_beside"):
             monkeypatch.setattr(pairs, name, look(name))
 
@@ -286,6 +291,28 @@ def test_all_that_do_about_as_well_are_looked_at_closer(monkeypatch, apart, clos
     rough = Rough(monkeypatch, {("a",): {("a", f"x{i}"): Place("", 0.0) for i in range(18)}})
     monkeypatch.setattr(Rough, "apart", apart)
     assert rough.look_beside_all() == set(sorted(rough.found, reverse=True)[:closer])
+
+
+def test_who_leads_with_the_runs_of_one_of_its_causes_is_looked_at_closer_too(monkeypatch):
+    """Three beside each at most, and who needs no lent runs to be looked at is not one more."""
+    ten = [("a", f"x{i}") for i in range(10)]
+    placed = {("a",): dict.fromkeys(ten, Place("", 0.0)), ("b",): {("b", "a"): Place("", 0.0)}}
+    leads = {("a", "x9"): 80.0, ("a", "x1"): 30.0, ("a", "x2"): 20.0, ("a", "x0"): 9.0}
+    lent = {(("a",), key): lead for key, lead in leads.items()} | {(("b",), ("b", "a")): 5.1}
+    rough = Rough(monkeypatch, placed, lent=lent)
+    closer = rough.look_beside_all()
+    assert ("b", "a") in closer
+    assert closer - {("b", "a")} == {*ten[5:], ("a", "x1"), ("a", "x2")}
+    assert rough.looks[-2][1].count(("a", "x9")) == 1
+
+
+def test_nobody_is_looked_at_closer_twice_for_both_of_its_causes(monkeypatch):
+    placed = {("a",): {("a", "b"): Place("", 0.0)}, ("b",): {("a", "b"): Place("", 0.0)}}
+    placed[("b",)] |= {("b", f"x{i}"): Place("", 0.0) for i in range(8)}
+    lent = {(part, ("a", "b")): 40.0 for part in placed}
+    rough = Rough(monkeypatch, placed, lent=lent)
+    assert ("a", "b") in rough.look_beside_all()
+    assert rough.looks[-2][1].count(("a", "b")) == 1
 
 
 @pytest.mark.parametrize(("spent", "looked_at"), [(0.0, 13), (0.5, 12), (0.6, 6), (2.0, 6)])

@@ -193,7 +193,7 @@ def test_single_causes_are_started_at_both_ratios_that_their_atlas_favours(monke
 
 @pytest.mark.parametrize(
     ("refused", "steps"),
-    [(False, []), (True, ["pairs", "taken over", "chances", "compare", "predict"])],
+    [(False, []), (True, ["pairs", "taken over", "unearned", "chances", "compare", "predict"])],
 )
 def test_pairs_are_searched_late_where_a_single_cause_would_be_refused_after_all(
     monkeypatch, refused, steps
@@ -212,8 +212,8 @@ def test_pairs_are_searched_late_where_a_single_cause_would_be_refused_after_all
     monkeypatch.setattr(search, "_third", lambda _: [pair, single])
     monkeypatch.setattr(search, "is_refused_now", lambda *_: refused)
     for name, step in {
-        "search_pairs": "pairs", "give_chances": "chances", "compare": "compare",
-        "see_it_predict": "predict",
+        "search_pairs": "pairs", "_look_at_unearned": "unearned", "give_chances": "chances",
+        "compare": "compare", "see_it_predict": "predict",
     }.items():  # fmt: skip
         monkeypatch.setattr(search, name, lambda *_, step=step: done.append(step))
     search._search_late(rough, fine, {}, None)
