@@ -126,9 +126,9 @@ def describe_departures(departures: tuple[Departure, ...], observation: Observat
         else:
             level = ", at all source levels alike"
     unit = "dB" if worst.quantity == "gain" else "deg"
+    band = f"{worst.low_hz:.4g} to {worst.high_hz:.4g} Hz and {worst.source_vpk:.4g} V"
     where = "" if worst.sweep is None else f" of sweep {worst.sweep + 1}"
     return (
-        f"{what} depart in {len(departures)} bands{level}; most at {worst.low_hz:g} to "
-        f"{worst.high_hz:g} Hz and {worst.source_vpk:g} V{where}, where the {worst.quantity} is "
-        f"{worst.mean:+.2g} {unit} off ({abs(worst.sigma):.0f} sigma)"
+        f"{what} depart in {len(departures)} bands{level}; most at {band}{where}, where the "
+        f"{worst.quantity} is {worst.mean:+.2g} {unit} off ({abs(worst.sigma):.0f} sigma)"
     )

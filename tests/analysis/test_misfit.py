@@ -21,9 +21,13 @@ def test_departures_are_found_where_they_are_and_nowhere_else():
     assert (found[0].quantity, found[0].source_vpk) == ("gain", LEVELS[1])
     assert loud.frequency_hz[band][0] == found[0].low_hz
     assert found[0].mean == pytest.approx(0.2 * 8.686, rel=0.25)
-    assert f"{found[0].low_hz:g} to {found[0].high_hz:g} Hz" in describe_departures(found, loud)
+    at = f"{found[0].low_hz:.4g} to {found[0].high_hz:.4g} Hz"
+    assert at in describe_departures(found, loud)
     assert describe_departures((), loud) == "nothing departs by more than chance"
     assert "sweep" not in found[0].to_json()
+    # A grid of thirds is told as it is read off a screen.
+    thirds = replace(found[0], low_hz=34.0, high_hz=39.0 + 1.0 / 3.0, source_vpk=10.0 / 3.0)
+    assert "most at 34 to 39.33 Hz and 3.333 V, where" in describe_departures((thirds,), loud)
 
     # The same rows as two sweeps, of which the second departs.
     (plan, rows), half = loud.plans[0], ROWS // 2
