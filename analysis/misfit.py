@@ -106,29 +106,41 @@ def _scatter_of_runs(candidate: Candidate) -> NDArray[np.float64]:
 def describe_departures(departures: tuple[Departure, ...], observation: Observation) -> str:
     """One sentence on the shape of what is left, for a person who has to go on from there."""
     if not departures:
-        return "nothing departs by more than chance"
-    gain = [d for d in departures if d.quantity == "gain"]
-    what = "gain and phase"
-    if not gain:
-        what = "phase alone"
-    elif len(gain) == len(departures):
-        what = "gain alone"
+        return "no band departs by itself by more than chance"
     worst = departures[0]
-    count = np.array(
-        [sum(d.source_vpk == v for d in departures) for v in np.unique(observation.source_vpk)]
-    )
-    level = ""
-    if len(count) > 1:
-        if count[-1] > 2 * max(count[0], 1):
-            level = ", mostly at high source levels"
-        elif count[0] > 2 * max(count[-1], 1):
-            level = ", mostly at low source levels"
-        else:
-            level = ", at all source levels alike"
     unit = "dB" if worst.quantity == "gain" else "deg"
     band = f"{worst.low_hz:.4g} to {worst.high_hz:.4g} Hz and {worst.source_vpk:.4g} V"
     where = "" if worst.sweep is None else f" of sweep {worst.sweep + 1}"
+    bands = "1 band" if len(departures) == 1 else f"{len(departures)} bands"
     return (
-        f"{what} depart in {len(departures)} bands{level}; most at {band}{where}, where the "
-        f"{worst.quantity} is {worst.mean:+.2g} {unit} off ({abs(worst.sigma):.0f} sigma)"
+        f"{_what(departures, observation)} in {bands}{_at_levels(departures, observation)}; "
+        f"most at {band}{where}, where the {worst.quantity} is {worst.mean:+.2g} {unit} off "
+        f"({abs(worst.sigma):.0f} sigma)"
     )
+
+
+def _what(departures: tuple[Departure, ...], observation: Observation) -> str:
+    """Whether gain, phase or both depart; a phase that was not read agrees with nothing."""
+    quantities = {one.quantity for one in departures}
+    if len(quantities) == 2:
+        return "gain and phase depart"
+    (quantity,) = quantities
+    if not np.any(np.isfinite(observation.values[1])):
+        return f"the {quantity} departs"
+    return f"the {quantity} alone departs"
+
+
+def _at_levels(departures: tuple[Departure, ...], observation: Observation) -> str:
+    """How departures go with the level, where there are several."""
+    levels = np.unique(observation.source_vpk)
+    count = np.array([sum(one.source_vpk == level for one in departures) for level in levels])
+    if len(levels) == 1:
+        return ""
+    at = [f"{level:.4g} V" for level in levels[count > 0]]
+    if len(at) < len(levels):
+        return f", at {' and '.join(at)} alone"
+    if count[-1] >= 2 * count[0]:
+        return ", mostly at high source levels"
+    if count[0] >= 2 * count[-1]:
+        return ", mostly at low source levels"
+    return ", at all source levels alike"

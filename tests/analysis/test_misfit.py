@@ -1,12 +1,13 @@
 """Departures of a measurement from a model: where they are, of which sweep, and in words."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from synthetic import LEVELS, ROWS, candidate, observation, read
 
-from analysis.misfit import describe_departures, find_departures
+from analysis.misfit import Departure, describe_departures, find_departures
 
 
 def test_departures_are_found_where_they_are_and_nowhere_else():
@@ -23,7 +24,7 @@ def test_departures_are_found_where_they_are_and_nowhere_else():
     assert found[0].mean == pytest.approx(0.2 * 8.686, rel=0.25)
     at = f"{found[0].low_hz:.4g} to {found[0].high_hz:.4g} Hz"
     assert at in describe_departures(found, loud)
-    assert describe_departures((), loud) == "nothing departs by more than chance"
+    assert describe_departures((), loud) == "no band departs by itself by more than chance"
     assert "sweep" not in found[0].to_json()
     # A grid of thirds is told as it is read off a screen.
     thirds = replace(found[0], low_hz=34.0, high_hz=39.0 + 1.0 / 3.0, source_vpk=10.0 / 3.0)
@@ -42,3 +43,46 @@ def test_departures_are_found_where_they_are_and_nowhere_else():
     ]
     assert again[0].to_json()["sweep"] == 1
     assert f"{LEVELS[1]:g} V of sweep 2, where the gain" in describe_departures(again, apart)
+
+
+def departing(level_vpk, quantity="gain"):
+    return Departure(34.0, 39.0, level_vpk, quantity, 1.0, 5.0)
+
+
+@pytest.mark.parametrize(
+    ("counts", "told"),
+    [
+        ((1, 0, 0), "in 1 band, at 1 V alone;"),
+        ((0, 1, 0), "in 1 band, at 2 V alone;"),
+        ((0, 0, 2), "in 2 bands, at 3.5 V alone;"),
+        ((2, 0, 3), "in 5 bands, at 1 V and 3.5 V alone;"),
+        ((1, 0, 1), "in 2 bands, at 1 V and 3.5 V alone;"),
+        ((1, 1, 2), "in 4 bands, mostly at high source levels;"),
+        ((4, 1, 2), "in 7 bands, mostly at low source levels;"),
+        ((3, 1, 2), "in 6 bands, at all source levels alike;"),
+        ((2, 3, 3), "in 8 bands, at all source levels alike;"),
+    ],
+)
+def test_at_which_levels_it_departs_is_told_as_it_is(counts, told):
+    levels = (1.0, 2.0, 3.5)
+    seen = SimpleNamespace(source_vpk=np.repeat(levels, 4), values=np.zeros((3, 12)))
+    found = [departing(v) for v, count in zip(levels, counts, strict=True) for _ in range(count)]
+    assert describe_departures(tuple(found), seen).startswith(f"the gain alone departs {told}")
+
+
+@pytest.mark.parametrize(
+    ("quantities", "phase", "told"),
+    [
+        (("gain",), 0.0, "the gain alone departs in 1 band;"),
+        (("phase", "phase"), 0.0, "the phase alone departs in 2 bands;"),
+        (("gain", "phase"), 0.0, "gain and phase depart in 2 bands;"),
+        # Nobody knows whether a phase that was not read agrees.
+        (("gain",), np.nan, "the gain departs in 1 band;"),
+    ],
+)
+def test_what_departs_is_told_and_no_more_than_was_read(quantities, phase, told):
+    values = np.zeros((3, 4))
+    values[1] = phase
+    seen = SimpleNamespace(source_vpk=np.full(4, 2.0), values=values)
+    found = tuple(departing(2.0, quantity) for quantity in quantities)
+    assert describe_departures(found, seen).startswith(told)
