@@ -143,6 +143,7 @@ def _diagnose(
     base = widen_if_open(base, verdict.baseline.candidate, observation, rng)
     best = base if sharp is None else sharp
     departures = find_departures(verdict.baseline.candidate, observation)
+    left = find_departures(verdict.best.candidate, observation)
     proposal = _proposal(unit, verdict, observation, seed, executor, progress)
     if progress is not None:
         progress(1.0, "done")
@@ -153,8 +154,9 @@ def _diagnose(
         ratio_baseline=_ratio(base if named else best),
         ratio_extended=_ratio(best),
         departures=departures,
-        left=find_departures(verdict.best.candidate, observation),
+        left=left,
         shape=describe_departures(departures, observation),
+        left_shape=describe_departures(left, observation),
         next_measurement=proposal,
         observation=observation,
         cut_short=searched.given_up or (searched.spared and verdict.word == "unexplained"),

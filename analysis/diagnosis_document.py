@@ -9,11 +9,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from analysis.holdout import HeldOut
 from analysis.misfit import Departure
 from analysis.next_measurement import NextMeasurement
 from analysis.observation import Observation
 from analysis.swept import sweep_document, sweep_lines
 from analysis.verdict import Judged, Verdict
+from daq.frf import DB_PER_NEPER
 from sim.catalogue import CATALOGUE
 
 __all__ = ["Cause", "Diagnosis", "Size"]
@@ -48,7 +52,8 @@ class Diagnosis:
 
     `ratio_baseline`, `ratio_extended`: contribution ratio and its standard
     deviation under the plain and the extended model. `departures`: of the
-    measurement from the plain model; `left`: from the extended one.
+    measurement from the plain model; `left`: from the set that stands first, named or refused.
+    `shape`, `left_shape`: both in words.
     `cut_short`: whether a search that found no explanation did not try every set that was worth
     it, for what it may simulate. `simulated_s`: seconds of motion that were simulated for it.
     """
@@ -61,6 +66,7 @@ class Diagnosis:
     departures: tuple[Departure, ...]
     left: tuple[Departure, ...]
     shape: str
+    left_shape: str
     next_measurement: NextMeasurement | None
     observation: Observation
     cut_short: bool = False
@@ -74,15 +80,46 @@ class Diagnosis:
         return tuple(sorted({CATALOGUE[cause.effect].site for cause in self.causes}))
 
     @property
+    def site_probability(self) -> dict[str, float]:
+        """What is believed of a fault in the "plant", in the "chain", in "both" or in "none"."""
+        believed = dict.fromkeys(("plant", "chain", "both", "none"), 0.0)
+        for one in self.verdict.judged:
+            sites = _sites(one)
+            believed["none" if not sites else "both" if len(sites) > 1 else sites[0]] += (
+                one.probability
+            )
+        return believed
+
+    @property
+    def extended(self) -> Judged:
+        """The set that is named; the plain model, where none is."""
+        return self.verdict.best if self.causes else self.verdict.baseline
+
+    @property
     def held_out_sigma(self) -> tuple[float, float]:
         """Held-out rms of the plain and of the extended model in the extended one's sigma."""
-        best, base = self.verdict.best.held_out, self.verdict.baseline.held_out
-        return base.rms_against(best.std), best.rms_sigma
+        extended, base = self.extended.held_out, self.verdict.baseline.held_out
+        return base.rms_against(extended.std), extended.rms_sigma
 
     @property
     def held_out_db(self) -> tuple[float, float]:
         """Held-out rms of the gain, dB, of the plain and of the extended model."""
-        return self.verdict.baseline.held_out.rms_db, self.verdict.best.held_out.rms_db
+        return self.verdict.baseline.held_out.rms_db, self.extended.held_out.rms_db
+
+    @property
+    def by_level(self) -> list[tuple[float, tuple[float, float], tuple[float, float]]]:
+        """Each level, V, with what the plain and the extended model leave of it when not fitted.
+
+        Root mean square of the gain, dB, and of the phase, deg; NaN of a phase that was not read.
+        """
+        return [
+            (
+                float(self.observation.source_vpk[level.start]),
+                _left(self.verdict.baseline.held_out, level),
+                _left(self.extended.held_out, level),
+            )
+            for level in self.observation.levels
+        ]
 
     def to_json(self) -> dict[str, Any]:
         """The document of ``diagnose --json``."""
@@ -110,11 +147,20 @@ class Diagnosis:
                     "causes": list(one.effects),
                     "probability": one.probability,
                     "remark": self.verdict.remark(one),
+                    "site": _sites(one),
+                    "rival": one in self.verdict.rivals,
                 }
                 for one in self.verdict.judged
-                if sorted(one.effects) != sorted(cause.effect for cause in self.causes)
+                if not self._is_named(one)
             ],
             "site": list(self.sites),
+            "site_probability": self.site_probability,
+            "first": {
+                "causes": list(self.verdict.best.effects),
+                "objection": self.verdict.best.objection,
+                "misfit_sigma": self.verdict.best.misfit,
+                "structure_sigma": self.verdict.best.structure,
+            },
             "baseline": {"held_out_rms_sigma": sigma[0], "held_out_rms_db": db[0]},
             "extended": {"held_out_rms_sigma": sigma[1], "held_out_rms_db": db[1]},
             "gain": {"held_out_rms_ratio": sigma[1] / sigma[0]},
@@ -125,20 +171,29 @@ class Diagnosis:
             "residual": [one.to_json() for one in self.departures],
             "residual_after": [one.to_json() for one in self.left],
             "shape": self.shape,
+            "shape_after": self.left_shape,
+            "by_level": [
+                {"source_vpk": level, "baseline": _rms(plain), "extended": _rms(extended)}
+                for level, plain, extended in self.by_level
+            ],
             "sweeps": self._swept(),
             "misfit_sigma": {
                 "baseline": self.verdict.baseline.misfit,
-                "extended": self.verdict.best.misfit,
+                "extended": self.extended.misfit,
             },
             "structure_sigma": {
                 "baseline": self.verdict.baseline.structure,
-                "extended": self.verdict.best.structure,
+                "extended": self.extended.structure,
             },
             "next_measurement": None if proposal is None else proposal.to_json(),
             "warnings": list(self.warnings),
             "elapsed_s": self.elapsed_s,
             "simulated_s": self.simulated_s,
         }
+
+    def _is_named(self, one: Judged) -> bool:
+        """Whether a set is the one that is named, or says the same: it is counted with that."""
+        return bool(self.causes) and (one is self.verdict.best or self.verdict.says_the_same(one))
 
     def _swept(self) -> list[dict[str, Any]]:
         return [sweep_document(plan) for plan, _ in self.observation.plans]
@@ -167,7 +222,13 @@ class Diagnosis:
             lines.append(
                 f"  on levels not fitted, extended model {sigma[1]:.2f} sigma, {db[1]:.2f} dB rms"
             )
-        lines.append(f"  against the plain model: {self.shape}")
+        for level, plain, extended in self.by_level:
+            left = f"plain {_leaves(plain)}"
+            if self.causes:
+                left += f", extended {_leaves(extended)}"
+            lines.append(f"    at {level:g} V: {left}")
+        lines += self._departs()
+        lines += self._sided()
         lines.append("  sets judged, by probability:")
         for one in self.verdict.judged:
             name = " + ".join(one.effects) or "nothing hidden"
@@ -184,11 +245,72 @@ class Diagnosis:
         lines += [f"  warning: {text}" for text in self.warnings]
         return lines
 
+    def _departs(self) -> list[str]:
+        """How the measurement departs from the plain model, and from the set that stands first."""
+        baseline, best = self.verdict.baseline, self.verdict.best
+        shape = self.shape
+        if not self.departures and baseline.refused:
+            shape += f", yet it {baseline.objection}"
+        lines = [f"  against the plain model: {shape}"]
+        if best is not baseline:
+            name = "the extended model"
+            if not self.causes:
+                name = f"{' + '.join(best.effects)}, which stands first and explains nothing"
+            lines.append(f"  against {name}: {self.left_shape}")
+        return lines
+
+    def _sided(self) -> list[str]:
+        """What an operator asks first: whether it is the measuring chain or the mechanics."""
+        word = self.verdict.word
+        if word == "consistent":
+            return []
+        believed = sorted(self.site_probability.items(), key=lambda item: -item[1])
+        shares = ", ".join(f"{_SIDES[side]} {p:.2f}" for side, p in believed if p >= _LEAST_TOLD)
+        if word == "unexplained":
+            shares = f"open; of the sets that come nearest: {shares}"
+        return [f"  chain or mechanics: {shares}"]
+
 
 _CLEAR_SIGMA = 2.0
 """What a further sweep has to part two sets by, to be worth its while."""
 
 _WHERE = {"plant": "in the mechanics", "chain": "in the measuring chain"}
+_SIDES = {
+    "plant": "mechanics",
+    "chain": "measuring chain",
+    "both": "both",
+    "none": "nothing hidden",
+}
+
+_LEAST_TOLD = 0.005
+"""What must be believed of a side to be told in two digits."""
+
+
+def _sites(one: Judged) -> list[str]:
+    """Where the causes of a set sit."""
+    return sorted({CATALOGUE[effect].site for effect in one.effects})
+
+
+def _left(held_out: HeldOut, rows: slice) -> tuple[float, float]:
+    """Root mean square of the gain, dB, and of the phase, deg, that some rows are missed by."""
+    log_gain, phase = held_out.residual[:2, rows]
+    return float(DB_PER_NEPER * _root_mean_square(log_gain)), float(
+        np.degrees(_root_mean_square(phase))
+    )
+
+
+def _root_mean_square(values: np.ndarray) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
+
+
+def _rms(left: tuple[float, float]) -> dict[str, float]:
+    return {"gain_db": left[0], "phase_deg": left[1]}
+
+
+def _leaves(left: tuple[float, float]) -> str:
+    gain_db, phase_deg = left
+    return f"{gain_db:.2f} dB" + ("" if np.isnan(phase_deg) else f" and {phase_deg:.1f} deg")
 
 
 def _sentence(diagnosis: Diagnosis) -> str:
@@ -202,7 +324,7 @@ def _sentence(diagnosis: Diagnosis) -> str:
     rivals, best = diagnosis.verdict.rivals, diagnosis.verdict.best
     may = [one for one in rivals if not one.refused]
     if may:
-        explains += f", but so may {_either(may)}"
+        explains += f", but so may {_either(may, diagnosis.sites)}"
     # A rival that is refused explains nothing.
     for said, refused in (
         ("is likelier", [one for one in rivals if one.refused and one.score > best.score]),
@@ -213,8 +335,17 @@ def _sentence(diagnosis: Diagnosis) -> str:
     return f"{explains}."
 
 
-def _either(sets: Sequence[Judged]) -> str:
-    return " or ".join(" with ".join(one.effects) or "nothing beyond tolerance" for one in sets)
+def _either(sets: Sequence[Judged], sites: Sequence[str] | None = None) -> str:
+    """Some sets in words, and where they sit, where that is elsewhere than at some sites."""
+    return " or ".join(_set_in_words(one, sites) for one in sets)
+
+
+def _set_in_words(one: Judged, sites: Sequence[str] | None) -> str:
+    if not one.effects:
+        return "nothing beyond tolerance"
+    elsewhere = sites is not None and _sites(one) != list(sites)
+    where = f" ({' and '.join(_WHERE[site] for site in _sites(one))})" if elsewhere else ""
+    return " with ".join(one.effects) + where
 
 
 def _proposed(proposal: NextMeasurement) -> str:

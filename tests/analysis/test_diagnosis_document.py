@@ -45,7 +45,13 @@ def test_a_rival_may_explain_it_too_or_is_said_not_to(explained, effects, lead, 
     probability = found.verdict.probability
     assert found.summary()[0].endswith(f" explains it with probability {probability:.2f}{said}")
     assert found.to_json()["rivals"] == [
-        {"causes": list(effects), "probability": 0.48, "remark": objection}
+        {
+            "causes": list(effects),
+            "probability": 0.48,
+            "remark": objection,
+            "site": ["plant"] if effects else [],
+            "rival": True,
+        }
     ]
 
 

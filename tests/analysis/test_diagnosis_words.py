@@ -1,0 +1,147 @@
+"""What a person reads of a diagnosis: chain or mechanics, and what is left at each level."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import report_makings as makings
+
+LOAD, STIFF, GAIN = ("load-inertia",), ("shaft-stiffness",), ("amplifier-gain",)
+
+
+@pytest.fixture(scope="module")
+def explained():
+    with pytest.MonkeyPatch.context() as patch:
+        return makings.diagnosis(patch, LOAD, [LOAD, STIFF, GAIN])
+
+
+@pytest.fixture(scope="module")
+def unexplained():
+    with pytest.MonkeyPatch.context() as patch:
+        return makings.diagnosis(patch, LOAD, [STIFF])
+
+
+def believed(explained, word, **probability):
+    """The same, with so much believed of each set, by its first letters."""
+    names = {"load": LOAD, "stiff": STIFF, "gain": GAIN, "nothing": (), "both": (*GAIN, *LOAD)}
+    shares = {names[name]: p for name, p in probability.items()}
+    judged = tuple(
+        replace(one, probability=shares.get(one.effects, 0.0)) for one in explained.verdict.judged
+    )
+    (best,) = (one for one in judged if one.effects == LOAD)
+    verdict = replace(explained.verdict, word=word, judged=judged, best=best)
+    return replace(explained, verdict=verdict)
+
+
+def line(found, start):
+    (one,) = (text for text in found.summary() if text.startswith(f"  {start}: "))
+    return one.removeprefix(f"  {start}: ")
+
+
+def test_chain_or_mechanics_is_told_by_all_that_is_judged(explained):
+    found = believed(explained, "ambiguous", load=0.4, stiff=0.3, gain=0.28, nothing=0.02)
+    told = line(found, "chain or mechanics")
+    assert told == "mechanics 0.70, measuring chain 0.28, nothing hidden 0.02"
+    assert found.to_json()["site_probability"] == pytest.approx(
+        {"plant": 0.7, "chain": 0.28, "both": 0.0, "none": 0.02}
+    )
+
+
+def test_what_nobody_believes_is_not_told(explained):
+    found = believed(explained, "explained", load=0.997, gain=0.003)
+    assert line(found, "chain or mechanics") == "mechanics 1.00"
+
+
+def test_it_is_open_where_nothing_explains_and_no_question_where_nothing_is_missing(
+    explained, unexplained
+):
+    assert line(unexplained, "chain or mechanics").startswith(
+        "open; of the sets that come nearest:"
+    )
+    consistent = believed(explained, "consistent", nothing=1.0)
+    assert not any("chain or mechanics" in text for text in consistent.summary())
+
+
+def test_a_rival_that_sits_elsewhere_is_told_to(explained):
+    best = explained.verdict.best
+    judged = tuple(
+        one if one is best else replace(one, score=best.score - 5.0, objection="")
+        for one in explained.verdict.judged
+        if one.effects
+    )
+    verdict = replace(explained.verdict, word="ambiguous", judged=judged)
+    said = replace(explained, verdict=verdict).summary()[0]
+    assert "amplifier-gain (in the measuring chain)" in said
+    assert "shaft-stiffness or" in said or "or shaft-stiffness." in said
+
+
+def test_what_is_left_is_told_level_by_level_before_and_after(explained):
+    told = [text for text in explained.summary() if text.startswith("    at ")]
+    by_level = explained.to_json()["by_level"]
+    assert [one["source_vpk"] for one in by_level] == list(makings.LEVELS)
+    for text, one in zip(told, by_level, strict=True):
+        plain, extended = one["baseline"], one["extended"]
+        assert text == (
+            f"    at {one['source_vpk']:g} V: plain {plain['gain_db']:.2f} dB and "
+            f"{plain['phase_deg']:.1f} deg, extended {extended['gain_db']:.2f} dB and "
+            f"{extended['phase_deg']:.1f} deg"
+        )
+        # The hidden load is what the plain model misses.
+        assert extended["gain_db"] < plain["gain_db"]
+    # All levels together are what is told in one figure.
+    rows = [level.stop - level.start for level in explained.observation.levels]
+    whole = np.sqrt(np.average([one["extended"]["gain_db"] ** 2 for one in by_level], weights=rows))
+    assert whole == pytest.approx(explained.held_out_db[1])
+
+
+def test_no_phase_is_left_of_one_that_was_not_read(explained):
+    best, rows = explained.verdict.best, explained.verdict.best.held_out.residual.copy()
+    rows[1] = np.nan
+    best = replace(best, held_out=replace(best.held_out, residual=rows))
+    found = replace(explained, verdict=replace(explained.verdict, best=best))
+    assert np.isnan(found.to_json()["by_level"][0]["extended"]["phase_deg"])
+    told = next(text for text in found.summary() if text.startswith("    at "))
+    assert told.endswith(" dB")
+
+
+def test_what_the_named_set_leaves_is_told(explained):
+    assert line(explained, "against the extended model") == explained.left_shape
+    assert explained.to_json()["shape_after"] == explained.left_shape
+
+
+def test_where_nothing_explains_what_comes_nearest_is_told_with_what_it_leaves(unexplained):
+    document = unexplained.to_json()
+    assert document["verdict"] == "unexplained"
+    first = document["first"]
+    assert first["causes"] == [*STIFF]
+    assert first["objection"]
+    told = line(unexplained, "against shaft-stiffness, which stands first and explains nothing")
+    assert told == unexplained.left_shape
+
+
+def test_no_extended_model_is_told_of_where_nothing_is_named(unexplained):
+    """What was refused is no model: its figures would be taken for a gain."""
+    document = unexplained.to_json()
+    assert document["causes"] == []
+    assert document["extended"] == document["baseline"]
+    assert document["gain"] == {"held_out_rms_ratio": 1.0}
+    assert document["misfit_sigma"]["extended"] == document["misfit_sigma"]["baseline"]
+
+
+def test_what_departs_in_no_band_may_be_refused_all_the_same(unexplained):
+    found = replace(unexplained, departures=(), shape="no band departs")
+    objection = found.verdict.baseline.objection
+    assert line(found, "against the plain model") == f"no band departs, yet it {objection}"
+
+
+def test_what_says_the_same_is_counted_once(monkeypatch, explained):
+    """Probabilities of a document add up to one."""
+    verdict = explained.verdict
+    monkeypatch.setattr(
+        type(verdict), "says_the_same", lambda self, one: one.effects == STIFF, raising=True
+    )
+    document = explained.to_json()
+    assert [one["causes"] for one in document["rivals"]].count([*STIFF]) == 0
+    told = [one["probability"] for one in document["rivals"]]
+    assert document["causes"][0]["probability"] == pytest.approx(verdict.probability)
+    assert verdict.probability + sum(told) == pytest.approx(1.0)
