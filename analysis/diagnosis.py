@@ -40,6 +40,9 @@ from sim.unit import Unit
 
 __all__ = ["Cause", "Diagnosis", "Size", "diagnose_response"]
 
+_RIVALS = 3
+"""How many rivals the next measurement is to tell from what is named."""
+
 
 @on_one_core()
 def diagnose_response(
@@ -202,15 +205,17 @@ def _proposal(
 ) -> NextMeasurement | None:
     """A sweep that would decide, where something is left to decide."""
     if verdict.word == "ambiguous":
-        rival = verdict.rivals[0]
-    elif len(observation.blocks) == 1 and len(verdict.judged) > 1:
-        rival = next(one for one in verdict.judged if one is not verdict.best)
+        # What is no explanation need not be told from what may be one, if others may be, too.
+        may = [one for one in verdict.rivals if not one.refused]
+        rivals = may[:_RIVALS] or verdict.rivals[:1]
+    elif len(observation.levels) == 1 and len(verdict.judged) > 1:
+        rivals = [next(one for one in verdict.judged if one is not verdict.best)]
     else:
         return None
 
     late = part_of(progress, 0.9, 1.0, "choosing the next measurement")
     return propose_measurement(
-        unit, verdict.best.candidate, rival.candidate, observation,
+        unit, verdict.best.candidate, [one.candidate for one in rivals], observation,
         seed=seed, executor=executor, progress=late,
     )  # fmt: skip
 
@@ -232,9 +237,11 @@ def _warnings(diagnosis: Diagnosis) -> tuple[str, ...]:
             "each alone takes the model further off: measure them by themselves, or look for "
             "something else that does what they leave"
         )
-    if len(observation.blocks) == 1:
+    if len(observation.levels) == 1:
+        halves = len(observation.blocks) == 1
+        held_out = "halves of its band" if halves else "whole sweeps at that level"
         found.append(
-            "the response holds one source level: what was held out are halves of its band; "
+            f"the response holds one source level: what was held out are {held_out}; "
             "measure at further levels"
         )
     if not np.any(np.isfinite(observation.values[1])):

@@ -13,7 +13,7 @@ import numpy as np
 
 from analysis.holdout import HeldOut
 from analysis.misfit import Departure
-from analysis.next_measurement import NextMeasurement
+from analysis.next_measurement import CLEAR_SIGMA, NextMeasurement
 from analysis.observation import Observation
 from analysis.swept import sweep_document, sweep_lines
 from analysis.verdict import Judged, Verdict
@@ -271,9 +271,6 @@ class Diagnosis:
         return [f"  chain or mechanics: {shares}"]
 
 
-_CLEAR_SIGMA = 2.0
-"""What a further sweep has to part two sets by, to be worth its while."""
-
 _WHERE = {"plant": "in the mechanics", "chain": "in the measuring chain"}
 _SIDES = {
     "plant": "mechanics",
@@ -350,12 +347,18 @@ def _set_in_words(one: Judged, sites: Sequence[str] | None) -> str:
 
 def _proposed(proposal: NextMeasurement) -> str:
     one, other = proposal.separates
-    if proposal.expected_sigma < _CLEAR_SIGMA:
+    minutes = f"{max(proposal.plan.duration_s / 60.0, 0.1):.2g} min"
+    if proposal.expected_sigma < CLEAR_SIGMA:
+        others = "".join(f" or {name}" for name, _ in proposal.others)
         return (
-            f"no sweep within the limits is likely to tell {one} from {other}; the best of them "
-            f"({proposal.expected_sigma:.1f} sigma expected):"
+            f"no sweep within the limits is likely to tell {one} from {other}{others}; the best of "
+            f"them ({proposal.expected_sigma:.1f} sigma expected, {minutes}):"
         )
-    return f"to tell {one} from {other} ({proposal.expected_sigma:.1f} sigma expected):"
+    told = [f"{other} ({proposal.expected_sigma:.1f} sigma expected)"]
+    told += [f"{name} ({sigma:.1f})" for name, sigma in proposal.others if sigma >= CLEAR_SIGMA]
+    left = [f"{name} ({sigma:.1f})" for name, sigma in proposal.others if sigma < CLEAR_SIGMA]
+    untold = f", though hardly from {' or '.join(left)}" if left else ""
+    return f"to tell {one} from {' and '.join(told)}{untold}, in {minutes}:"
 
 
 def _uncertain(pair: tuple[float, float]) -> dict[str, float]:

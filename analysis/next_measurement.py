@@ -1,9 +1,10 @@
-"""Which measurement would tell two causes apart.
+"""Which measurement would tell a set of causes from its rivals.
 
 Owns a grid of sweeps that the unit's limits allow and the choice among them:
-for each the two candidates are simulated over all places at which they agree
-with what was measured, and the sweep that parts them furthest, in standard
-deviations of reading and motion together, is proposed. A cheaper one that
+for each all of them are simulated over all places at which they agree with
+what was measured, and the sweep that parts the first furthest from the rival it is
+hardest to tell from, in standard deviations of reading and motion together, is
+proposed; a rival that no sweep can tell it from counts for nothing. A cheaper one that
 does nearly as well is preferred.
 """
 
@@ -27,7 +28,10 @@ from daq.configs import config_names
 from daq.plan import SweepPlan, spaced_frequencies
 from sim.unit import Unit
 
-__all__ = ["NextMeasurement", "propose_measurement"]
+__all__ = ["CLEAR_SIGMA", "NextMeasurement", "propose_measurement"]
+
+CLEAR_SIGMA = 2.0
+"""What a further sweep has to part two sets by, to be worth its while."""
 
 _POINTS = 31
 _COARSE = 16
@@ -40,18 +44,22 @@ _ENOUGH = 0.9
 _FLOOR = 0.01
 """Difference in log gain or phase, rad, that deviations of a datasheet could make anyway."""
 
+_Moments = tuple[NDArray[np.float64], NDArray[np.float64]]
+
 
 @dataclass(frozen=True, slots=True)
 class NextMeasurement:
     """A sweep, the two sets of causes it parts, and by how many standard deviations.
 
-    `unit` is the unit's name, or the path of its file.
+    `unit` is the unit's name, or the path of its file. `others`: further rivals of the first set,
+    and by how many it is parted from each.
     """
 
     unit: str
     plan: SweepPlan
     separates: tuple[str, str]
     expected_sigma: float
+    others: tuple[tuple[str, float], ...] = ()
 
     @property
     def command(self) -> str:
@@ -89,37 +97,57 @@ class NextMeasurement:
             },
             "separates": list(self.separates),
             "expected_sigma": self.expected_sigma,
+            "others": [
+                {"separates": [self.separates[0], name], "expected_sigma": sigma}
+                for name, sigma in self.others
+            ],
         }
 
 
 def propose_measurement(
     unit: Unit,
     first: Candidate,
-    second: Candidate,
+    rivals: Sequence[Candidate],
     observation: Observation,
     *,
     seed: int = 0,
     executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> NextMeasurement | None:
-    """The plan that best separates two candidates, or None where the limits allow none."""
+    """The plan that best separates a candidate from its rivals, or None if the limits allow none.
+
+    Raises
+    ------
+    AnalysisError
+        If a motion grew without bound.
+    """
     rng = np.random.default_rng(seed)
     plans = list(_feasible_plans(unit, observation))
-    groups = [tuple(groups_along(c, _GROUPS, rng)) for c in (first, second)]
-    judged = []
+    groups = [tuple(groups_along(c, _GROUPS, rng)) for c in (first, *rivals)]
+    apart = np.empty((len(plans), len(rivals)))
     for number, plan in enumerate(plans):
         # The same machines in every plan, off their datasheets alike: plans differ by themselves.
         alike = np.random.default_rng(seed)
-        judged.append(_separation(unit, groups, plan, observation.noise_v, alike, executor))
+        apart[number] = _separations(unit, groups, plan, observation.noise_v, alike, executor)
         if progress is not None:
             progress((number + 1) / len(plans))
-    if not judged:
+    if not len(plans):
         return None
-    most = max(judged)
-    good = [p for p, sigma in zip(plans, judged, strict=True) if sigma >= _ENOUGH * most]
-    plan = min(good, key=lambda p: p.duration_s)
+    # What no sweep tells from the first must not decide which sweep tells the others from it.
+    told = np.flatnonzero(apart.max(axis=0) >= CLEAR_SIGMA)
+    judged = apart[:, told].min(axis=1) if len(told) else apart.max(axis=1)
+    good = np.flatnonzero(judged >= _ENOUGH * judged.max())
+    number = min(good, key=lambda one: plans[one].duration_s)
+    named = int(np.flatnonzero(apart[number] == judged[number])[0])
+    names = [_name(rival) for rival in rivals]
+    others = [(name, float(s)) for name, s in zip(names, apart[number], strict=True)]
+    del others[named]
     return NextMeasurement(
-        unit.name, plan, (_name(first), _name(second)), float(judged[plans.index(plan)])
+        unit.name,
+        plans[number],
+        (_name(first), names[named]),
+        float(judged[number]),
+        tuple(others),
     )
 
 
@@ -159,34 +187,37 @@ def _feasible_bands(unit: Unit, observation: Observation) -> Iterator[tuple[floa
             yield allowed
 
 
-def _separation(
+def _separations(
     unit: Unit,
     groups: Sequence[Sequence[Group]],
     plan: SweepPlan,
     noise_v: float,
     rng: np.random.Generator,
     executor: Executor | None = None,
-) -> float:
-    """How far two hypotheses' groups of runs are apart, in standard deviations of both."""
+) -> list[float]:
+    """How far groups of runs are from the first hypothesis', in standard deviations of both."""
     grid = plan.frequencies_hz
     thinned = replace(plan, frequencies_hz=grid[:: max(len(grid) // _COARSE, 1)])
     asked = [group for of_one in groups for group in of_one]
     made = simulate_groups(unit, asked, unread(thinned, noise_v), rng, executor)
-    (mean_1, var_1), (mean_2, var_2) = (
+    first, *rivals = (
         _moments(made[of_one[0].hypothesis.effects], plan.levels_vpk[0], noise_v)
         for of_one in groups
     )
-    apart = mean_1 - mean_2
+    share = len(grid) / len(thinned.frequencies_hz)
+    return [float(np.sqrt(share * _squares(first, rival) / HEAT)) for rival in rivals]
+
+
+def _squares(one: _Moments, other: _Moments) -> float:
+    """Sum of the squares by which two hypotheses are apart, in units of their variances."""
+    apart = one[0] - other[0]
     apart[1] = np.angle(np.exp(1j * apart[1]))
     floor = np.array([_FLOOR, _FLOOR, 0.3])[:, None]
-    squares = apart**2 / (var_1 + var_2 + floor**2)
-    share = len(grid) / len(thinned.frequencies_hz)
-    return float(np.sqrt(share * squares.sum() / HEAT))
+    return float(np.sum(apart**2 / (one[1] + other[1] + floor**2)))
 
 
-def _moments(
-    population: Population, level_vpk: float, noise_v: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _moments(population: Population, level_vpk: float, noise_v: float) -> _Moments:
+    """Mean and variance (3, rows) of what runs read."""
     gain = np.median(np.abs(population.mean), axis=0)
     noise, floor = noise_and_floor(gain, level_vpk, noise_v)
     channels = channels_of_readings(population.mean, population.variance, noise, floor)

@@ -165,7 +165,11 @@ def _diagnosed_actions(diagnosis: Mapping[str, Any]) -> list[str]:
     if ratio["value"] is not None:
         said += f"; with it r is {ratio['value']:.2f} ± {ratio['std'] or 0.0:.2f}"
     if any(cause.get("site") == "chain" for cause in causes):
-        right = "see whether the measuring chain is" if word == "ambiguous" else "put the chain"
+        right = (
+            "see whether the measuring chain is"
+            if word == "ambiguous"
+            else "put the measuring chain"
+        )
         said += f"; {right} right before touching a gear"
     return [f"{said}."]
 

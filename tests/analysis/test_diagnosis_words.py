@@ -6,6 +6,10 @@ import numpy as np
 import pytest
 import report_makings as makings
 
+from analysis import diagnosis as module
+from analysis.next_measurement import NextMeasurement
+from daq.plan import SweepPlan
+
 LOAD, STIFF, GAIN = ("load-inertia",), ("shaft-stiffness",), ("amplifier-gain",)
 
 
@@ -145,3 +149,90 @@ def test_what_says_the_same_is_counted_once(monkeypatch, explained):
     told = [one["probability"] for one in document["rivals"]]
     assert document["causes"][0]["probability"] == pytest.approx(verdict.probability)
     assert verdict.probability + sum(told) == pytest.approx(1.0)
+
+
+PLAN = SweepPlan(
+    tuple(np.linspace(80.0, 200.0, 31)), (0.75,), settle_cycles=20, integrate_cycles=30
+)
+
+
+@pytest.mark.parametrize(
+    ("sigma", "others", "told"),
+    [
+        (4.06, (), "to tell a from b (4.1 sigma expected), in "),
+        (
+            2.5,
+            (("c", 3.0), ("d", 0.4), ("none", 1.9)),
+            "to tell a from b (2.5 sigma expected) and c (3.0), though hardly from d (0.4) or "
+            "none (1.9), in ",
+        ),
+        (
+            1.9,
+            (("c", 0.5),),
+            "no sweep within the limits is likely to tell a from b or c; the best of them (1.9 "
+            "sigma expected, ",
+        ),
+    ],
+)
+def test_what_to_measure_next_says_whom_it_tells_apart_and_what_it_takes(
+    explained, sigma, others, told
+):
+    proposal = NextMeasurement("ADSS", PLAN, ("a", "b"), sigma, others)
+    lines = replace(explained, next_measurement=proposal).summary()
+    (said,) = (text for text in lines if text.startswith(f"  {told}"))
+    minutes = f"{PLAN.duration_s / 60.0:.2g} min"
+    assert said.endswith(f"{minutes}):" if sigma < 2.0 else f"in {minutes}:")
+    assert lines[lines.index(said) + 1] == f"    {proposal.command}"
+
+
+def judged(explained, *objections):
+    """Rivals of a load that fit as well, with what speaks against each."""
+    best = explained.verdict.best
+    others = [one for one in explained.verdict.judged if one.effects in (STIFF, GAIN)]
+    rivals = [
+        replace(one, score=best.score - 1.0 - i, objection=objection)
+        for i, (one, objection) in enumerate(zip(others, objections, strict=True))
+    ]
+    return replace(explained.verdict, word="ambiguous", judged=(best, *rivals), also=tuple(rivals))
+
+
+@pytest.mark.parametrize(
+    ("objections", "asked"),
+    [(("", ""), [0, 1]), (("unlike", ""), [1]), (("", "unlike"), [0]), (("unlike", "unlike"), [0])],
+)
+def test_a_sweep_is_asked_for_that_tells_all_that_may_be_the_explanation(
+    monkeypatch, explained, objections, asked
+):
+    verdict, given = judged(explained, *objections), []
+
+    def propose(unit, first, rivals, observation, **_):
+        given.append((first, list(rivals)))
+
+    monkeypatch.setattr(module, "propose_measurement", propose)
+    module._proposal(None, verdict, explained.observation, 0, None, None)
+    assert given == [(verdict.best.candidate, [verdict.judged[1 + i].candidate for i in asked])]
+
+
+@pytest.mark.parametrize(
+    ("levels_vpk", "sweeps", "told"),
+    [((2.0,), 1, "halves of its band"), ((2.0,), 2, "whole sweeps at that level"),
+     ((1.0, 2.0), 1, None), ((1.0, 2.0), 2, None)],
+)  # fmt: skip
+def test_one_level_is_one_level_in_however_many_sweeps(explained, levels_vpk, sweeps, told):
+    observation = explained.observation
+    half = len(observation) // 2
+    rows = [np.arange(half), np.arange(half, 2 * half)]
+    plan = replace(observation.plans[0][0], levels_vpk=levels_vpk)
+    plans = [(plan, np.arange(2 * half))]
+    if sweeps == 2:
+        plans = [(replace(plan, direction=way), part)
+                 for way, part in zip(("up", "down"), rows, strict=True)]  # fmt: skip
+    seen = replace(
+        observation,
+        source_vpk=np.repeat(levels_vpk, 2 * half // len(levels_vpk)),
+        plans=tuple(plans),
+    )
+    said = [text for text in module._warnings(replace(explained, observation=seen))
+            if "one source level" in text]  # fmt: skip
+    assert len(said) == (told is not None)
+    assert told is None or told in said[0]

@@ -14,15 +14,17 @@ SEEN = observation(read(("load-inertia",), np.array([0.5, 0.5]), np.random.defau
 FIRST, SECOND = (candidate(SEEN, (e,)) for e in ("load-inertia", "shaft-stiffness"))
 
 
-def proposed(monkeypatch, judge):
+def proposed(monkeypatch, judge, rivals=(SECOND,)):
     tried = []
 
-    def separation(unit, groups, plan, noise_v, rng, executor):
+    def separations(unit, groups, plan, noise_v, rng, executor):
         tried.append(plan)
-        return judge(plan)
+        assert len(groups) == 1 + len(rivals)
+        sigma = judge(plan)
+        return sigma if isinstance(sigma, list) else [sigma]
 
-    monkeypatch.setattr(module, "_separation", separation)
-    return propose_measurement(ADSS, FIRST, SECOND, SEEN), tried
+    monkeypatch.setattr(module, "_separations", separations)
+    return propose_measurement(ADSS, FIRST, rivals, SEEN), tried
 
 
 def test_every_plan_lies_within_the_limits_and_the_choice_is_wide(monkeypatch):
@@ -56,9 +58,9 @@ def test_what_was_measured_beyond_the_limits_is_answered_within_them(
     )  # fmt: skip
     tried = []
     monkeypatch.setattr(
-        module, "_separation", lambda unit, groups, plan, *_: tried.append(plan) or 1
+        module, "_separations", lambda unit, groups, plan, *_: tried.append(plan) or [1.0]
     )
-    found = propose_measurement(ADSS, FIRST, SECOND, beyond)
+    found = propose_measurement(ADSS, FIRST, [SECOND], beyond)
     assert len(tried) == plans
     assert (found is None) == (plans == 0)
     for plan in tried:
@@ -77,6 +79,42 @@ def test_the_plan_that_parts_them_furthest_is_taken(monkeypatch):
 def test_a_cheaper_plan_that_does_nearly_as_well_is_preferred(monkeypatch):
     found, tried = proposed(monkeypatch, lambda plan: 4.0 - 1e-3 * plan.duration_s)
     assert found.plan.duration_s == min(plan.duration_s for plan in tried)
+
+
+THIRD = candidate(SEEN, ("amplifier-gain",))
+
+
+@pytest.mark.parametrize(
+    ("offset", "down", "separates", "sigma", "other", "takes_offset"),
+    [
+        # The rival that is hardest to tell decides ...
+        ([9.0, 2.5], [4.0, 5.0], "shaft-stiffness", 4.0, 5.0, False),
+        ([9.0, 4.5], [4.0, 5.0], "amplifier-gain", 4.5, 9.0, True),
+        # ... if any sweep tells it, ...
+        ([9.0, 1.9], [4.0, 1.0], "shaft-stiffness", 9.0, 1.9, True),
+        ([1.0, 3.0], [1.5, 2.5], "amplifier-gain", 3.0, 1.0, True),
+        # ... and where none tells any the one that comes nearest.
+        ([1.0, 1.9], [1.5, 0.5], "amplifier-gain", 1.9, 1.0, True),
+    ],
+)
+def test_of_several_rivals_the_one_that_is_hardest_to_tell_decides(
+    monkeypatch, offset, down, separates, sigma, other, takes_offset
+):
+    def judge(plan):
+        if plan.dc_offset_v:
+            return offset
+        return down if plan.direction == "down" else [0.5, 0.5]
+
+    found, _ = proposed(monkeypatch, judge, (SECOND, THIRD))
+    assert bool(found.plan.dc_offset_v) == takes_offset
+    assert found.separates == ("load-inertia", separates)
+    assert found.expected_sigma == sigma
+    ((name, by),) = found.others
+    assert {name, separates} == {"shaft-stiffness", "amplifier-gain"}
+    assert by == other
+    assert found.to_json()["others"] == [
+        {"separates": ["load-inertia", name], "expected_sigma": other}
+    ]
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.5])
@@ -112,24 +150,27 @@ def test_two_models_that_differ_are_parted_by_a_real_simulation_and_one_not_from
     )
 
     def apart(*of):
-        return module._separation(
+        return module._separations(
             ADSS, [groups[i] for i in of], plan, 5e-4, np.random.default_rng(0)
         )
 
-    assert apart(0, 0) == 0.0
-    assert 0.5 < apart(0, 1) < 50.0
+    assert apart(0, 0) == [0.0]
+    (one,) = apart(0, 1)
+    assert 0.5 < one < 50.0
+    # Others are told from the first, whoever else is.
+    assert apart(0, 0, 0) == [0.0, 0.0]
 
 
 def test_every_plan_is_judged_by_the_same_machines(monkeypatch):
     """Or plans would differ by the machines that were drawn for them."""
     asked = []
 
-    def separation(unit, groups, plan, noise_v, rng, executor):
+    def separations(unit, groups, plan, noise_v, rng, executor):
         machines = [[(g.ratios.tolist(), g.sizes.tolist()) for g in of_one] for of_one in groups]
         asked.append((machines, rng.uniform()))
-        return 1.0
+        return [1.0]
 
-    monkeypatch.setattr(module, "_separation", separation)
-    propose_measurement(ADSS, FIRST, SECOND, SEEN)
+    monkeypatch.setattr(module, "_separations", separations)
+    propose_measurement(ADSS, FIRST, [SECOND], SEEN)
     assert len(asked) > 5
     assert all(one == asked[0] for one in asked)
