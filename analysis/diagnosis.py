@@ -40,6 +40,9 @@ from sim.unit import Unit
 
 __all__ = ["Cause", "Diagnosis", "Size", "diagnose_response"]
 
+_FEWEST, _FEW = 8, 20
+"""Frequencies without which there is no diagnosis, and below which small causes hardly show."""
+
 _RIVALS = 3
 """How many rivals the next measurement is to tell from what is named."""
 
@@ -80,7 +83,8 @@ def diagnose_response(
     Raises
     ------
     AnalysisError
-        If a response has no usable point, a motion grew without bound, or the unit has one stage.
+        If a response has no usable point, all hold too few frequencies, a motion grew without
+        bound, or the unit has one stage.
     InputError
         If the responses are said to be of different units or specimens, or one is there twice.
     """
@@ -91,15 +95,28 @@ def diagnose_response(
             f"unit {unit.name} has one gear stage, and the search shares the backlash out between "
             "two; estimate tells its backlash"
         )
+    observed = observe(*responses)
+    _refuse_few(observed)
     started = time.perf_counter()
     with counting() as effort:
-        found = _diagnose(observe(*responses), unit, without, cache, seed, executor, progress)
+        found = _diagnose(observed, unit, without, cache, seed, executor, progress)
     return replace(
         found,
         warnings=(*unit_doubts(responses, unit), *_warnings(found)),
         elapsed_s=time.perf_counter() - started,
         simulated_s=effort.simulated_s,
     )
+
+
+def _refuse_few(observed: Observation) -> None:
+    """Anything fits a few points: "consistent" would say nothing of the servo."""
+    frequencies = len(np.unique(observed.frequency_hz))
+    if frequencies < _FEWEST:
+        held = "1 usable frequency" if frequencies == 1 else f"{frequencies} usable frequencies"
+        raise AnalysisError(
+            f"the response holds {held}, and nearly anything explains so few; measure {_FEWEST} at "
+            "least, better thirty or more from below ARF to above RF"
+        )
 
 
 def _diagnose(
@@ -243,6 +260,11 @@ def _warnings(diagnosis: Diagnosis) -> tuple[str, ...]:
         found.append(
             f"the response holds one source level: what was held out are {held_out}; "
             "measure at further levels"
+        )
+    if (frequencies := len(np.unique(observation.frequency_hz))) < _FEW:
+        found.append(
+            f"the response holds {frequencies} frequencies: that nothing is named says little, as "
+            "small causes do not show in so few; measure more"
         )
     if not np.any(np.isfinite(observation.values[1])):
         found.append("the response holds no phase: faults of the measuring chain hide there")

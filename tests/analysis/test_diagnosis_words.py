@@ -1,6 +1,7 @@
 """What a person reads of a diagnosis: chain or mechanics, and what is left at each level."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,9 @@ import report_makings as makings
 
 from analysis import diagnosis as module
 from analysis.next_measurement import NextMeasurement
+from daq.errors import AnalysisError
 from daq.plan import SweepPlan
+from sim.unit import load_unit
 
 LOAD, STIFF, GAIN = ("load-inertia",), ("shaft-stiffness",), ("amplifier-gain",)
 
@@ -236,3 +239,34 @@ def test_one_level_is_one_level_in_however_many_sweeps(explained, levels_vpk, sw
             if "one source level" in text]  # fmt: skip
     assert len(said) == (told is not None)
     assert told is None or told in said[0]
+
+
+@pytest.mark.parametrize(
+    ("frequencies", "told"),
+    [(1, "1 usable frequency,"), (7, "7 usable frequencies,"), (8, None), (61, None)],
+)
+def test_a_few_points_are_refused_as_anything_explains_them(frequencies, told):
+    seen = SimpleNamespace(frequency_hz=np.tile(np.linspace(100.0, 180.0, frequencies), 3))
+    if told is None:
+        module._refuse_few(seen)
+        return
+    with pytest.raises(AnalysisError, match=f"^the response holds {told} and nearly anything"):
+        module._refuse_few(seen)
+
+
+def test_a_file_of_one_point_is_refused_before_anything_is_simulated(monkeypatch):
+    monkeypatch.setattr(module, "search_causes", lambda *_, **__: pytest.fail("searched"))
+    response = makings.response()
+    one = response.take(response.frequency_hz == response.frequency_hz[0])
+    with pytest.raises(AnalysisError, match="1 usable frequency"):
+        module.diagnose_response(one, load_unit("adss"))
+
+
+@pytest.mark.parametrize(("frequencies", "warned"), [(8, True), (19, True), (20, False)])
+def test_that_few_frequencies_show_little_is_said(explained, frequencies, warned):
+    observation = explained.observation
+    hz = np.resize(np.linspace(100.0, 180.0, frequencies), len(observation))
+    seen = replace(observation, frequency_hz=hz)
+    said = [text for text in module._warnings(replace(explained, observation=seen))
+            if f"holds {frequencies} frequencies" in text]  # fmt: skip
+    assert len(said) == warned
