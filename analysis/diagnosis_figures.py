@@ -49,7 +49,9 @@ def residual_figure(diagnosis: Diagnosis) -> Figure:
     blocks = observation.blocks
     figure = Figure(figsize=(3.2 * max(len(blocks), 2) + 1.0, 5.6), layout="constrained")
     panels = figure.subplots(2, len(blocks), sharex=True, sharey="row", squeeze=False)
-    extended = verdict.best if diagnosis.causes else None
+    # Where nothing is named, what the best of the refused leaves is where to go on from.
+    best = None if verdict.best is verdict.baseline else verdict.best
+    label = "extended" if diagnosis.causes else "what comes nearest"
     for column, block in enumerate(blocks):
         panels[0, column].set_title(_swept(observation, block))
         panels[1, column].set_xlabel("frequency (Hz)")
@@ -58,12 +60,14 @@ def residual_figure(diagnosis: Diagnosis) -> Figure:
             axes.grid(alpha=0.3)
             frequency = observation.frequency_hz[block]
             _draw(axes, frequency, verdict.baseline, channel, block, factor, _PLAIN, "plain model")
-            if extended is not None:
-                _draw(axes, frequency, extended, channel, block, factor, _EXTENDED, "extended")
+            if best is not None:
+                _draw(axes, frequency, best, channel, block, factor, _EXTENDED, label)
     for (_, _, label), axes in zip(_CHANNELS, panels[:, 0], strict=True):
         axes.set_ylabel(f"measured - predicted,\n{label}")
     panels[0, 0].legend(fontsize=8)
     names = " + ".join(cause.effect for cause in diagnosis.causes) or "nothing named"
+    if best is not None and not diagnosis.causes:
+        names += f"; {' + '.join(best.effects)} comes nearest"
     figure.suptitle(f"{diagnosis.unit}: {verdict.word}, {names}", fontsize=11)
     return figure
 

@@ -187,7 +187,10 @@ def test_a_sweep_with_an_offset_is_diagnosed_together_with_what_it_follows(cache
     assert found.verdict.word in ("explained", "ambiguous")
     # Four of its error bars: missed by chance in one of some thousand machines.
     assert abs(found.ratio_extended[0] - ratio) < 4.0 * found.ratio_extended[1]
-    assert not found.warnings
+    # Both sweeps are of one level, and short.
+    one_level, short = found.warnings
+    assert "whole sweeps at that level" in one_level
+    assert "holds 16 frequencies" in short
     axes = residual_figure(found).axes[:2]
     assert [one.get_title() for one in axes] == ["2.5 V peak", "2.5 V peak, offset 1 V"]
     said = "\n".join(found.summary())
