@@ -22,6 +22,7 @@ from analysis.candidate import Candidate
 from analysis.certainty import hold_against_doubt
 from analysis.diagnosis_document import Cause, Diagnosis, Size
 from analysis.executor import Executor
+from analysis.harmonics import compare_harmonics
 from analysis.misfit import describe_departures, find_departures
 from analysis.next_measurement import NextMeasurement, propose_measurement
 from analysis.observation import Observation, observe
@@ -100,6 +101,10 @@ def diagnose_response(
     started = time.perf_counter()
     with counting() as effort:
         found = _diagnose(observed, unit, without, cache, seed, executor, progress)
+        if found.verdict.word == "unexplained":
+            best, rng = found.verdict.best.candidate, np.random.default_rng(seed)
+            harmonics = compare_harmonics(responses, found.observation, best, rng)
+            found = replace(found, harmonics=harmonics)
     return replace(
         found,
         warnings=(*unit_doubts(responses, unit), *_warnings(found)),

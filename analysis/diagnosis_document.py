@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from analysis.harmonics import Harmonic, describe_harmonics
 from analysis.holdout import HeldOut
 from analysis.misfit import Departure
 from analysis.next_measurement import CLEAR_SIGMA, NextMeasurement
@@ -53,7 +54,8 @@ class Diagnosis:
     `ratio_baseline`, `ratio_extended`: contribution ratio and its standard
     deviation under the plain and the extended model. `departures`: of the
     measurement from the plain model; `left`: from the set that stands first, named or refused.
-    `shape`, `left_shape`: both in words.
+    `shape`, `left_shape`: both in words. `harmonics`: where nothing explains it, those measured
+    beside those of the set that stands first.
     `cut_short`: whether a search that found no explanation did not try every set that was worth
     it, for what it may simulate. `simulated_s`: seconds of motion that were simulated for it.
     """
@@ -69,6 +71,7 @@ class Diagnosis:
     left_shape: str
     next_measurement: NextMeasurement | None
     observation: Observation
+    harmonics: tuple[Harmonic, ...] = ()
     cut_short: bool = False
     warnings: tuple[str, ...] = ()
     elapsed_s: float = 0.0
@@ -172,6 +175,7 @@ class Diagnosis:
             "residual_after": [one.to_json() for one in self.left],
             "shape": self.shape,
             "shape_after": self.left_shape,
+            "harmonics": [one.to_json() for one in self.harmonics],
             "by_level": [
                 {"source_vpk": level, "baseline": _rms(plain), "extended": _rms(extended)}
                 for level, plain, extended in self.by_level
@@ -257,6 +261,8 @@ class Diagnosis:
             if not self.causes:
                 name = f"{' + '.join(best.effects)}, which stands first and explains nothing"
             lines.append(f"  against {name}: {self.left_shape}")
+        if self.verdict.word == "unexplained":
+            lines.append(f"  harmonics: {describe_harmonics(self.harmonics)}")
         return lines
 
     def _sided(self) -> list[str]:
