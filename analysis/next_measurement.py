@@ -125,19 +125,19 @@ def propose_measurement(
     plans = list(_feasible_plans(unit, observation))
     groups = [tuple(groups_along(c, _GROUPS, rng)) for c in (first, *rivals)]
     apart = np.empty((len(plans), len(rivals)))
-    for number, plan in enumerate(plans):
+    for tried, plan in enumerate(plans):
         # The same machines in every plan, off their datasheets alike: plans differ by themselves.
         alike = np.random.default_rng(seed)
-        apart[number] = _separations(unit, groups, plan, observation.noise_v, alike, executor)
+        apart[tried] = _separations(unit, groups, plan, observation.noise_v, alike, executor)
         if progress is not None:
-            progress((number + 1) / len(plans))
+            progress((tried + 1) / len(plans))
     if not len(plans):
         return None
     # What no sweep tells from the first must not decide which sweep tells the others from it.
     told = np.flatnonzero(apart.max(axis=0) >= CLEAR_SIGMA)
     judged = apart[:, told].min(axis=1) if len(told) else apart.max(axis=1)
     good = np.flatnonzero(judged >= _ENOUGH * judged.max())
-    number = min(good, key=lambda one: plans[one].duration_s)
+    number = min(good.tolist(), key=lambda one: plans[one].duration_s)
     named = int(np.flatnonzero(apart[number] == judged[number])[0])
     names = [_name(rival) for rival in rivals]
     others = [(name, float(s)) for name, s in zip(names, apart[number], strict=True)]
