@@ -249,7 +249,8 @@ def diagnose_a_large_effect(capsys):
     sets = [[c["effect"] for c in found["causes"]], *(r["causes"] for r in found["rivals"])]
     assert found["verdict"] in ("explained", "ambiguous", "unexplained"), bench
     assert any(text.partition(":")[0] in names for names in sets), bench
-    assert found["gain"]["held_out_rms_ratio"] < 0.8, bench
+    # Where nothing explains it there is no extended model, and nothing gained.
+    assert found["gain"]["held_out_rms_ratio"] < (0.8 if found["causes"] else 1.01), bench
     assert abs(found["residual"][0]["sigma"]) > 3.0, bench
     if found["verdict"] == "ambiguous":
         assert found["next_measurement"] is not None
