@@ -272,7 +272,12 @@ def _warnings(diagnosis: Diagnosis) -> tuple[str, ...]:
             "small causes do not show in so few; measure more"
         )
     if not np.any(np.isfinite(observation.values[1])):
-        found.append("the response holds no phase: faults of the measuring chain hide there")
+        found.append(
+            "the response holds no phase: faults of the measuring chain hide there; measure it too"
+        )
     if not np.any(np.isfinite(observation.values[2])):
-        found.append("the response states no errors: what its scatter would tell is lost")
+        found.append(
+            "the response states no errors: what its scatter would tell is lost; give one standard "
+            "error of each gain, as lashbench measure does"
+        )
     return tuple(found)

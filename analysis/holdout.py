@@ -1,7 +1,8 @@
 """How well a hypothesis predicts what it has not been fitted to.
 
 Owns the split: each source level in turn is kept away from the fit and then
-predicted. Neighbouring frequencies are near-duplicates and are never split;
+predicted; where sweeps went both ways, so is each way of it, by fits that have seen neither that
+level nor that way. Neighbouring frequencies are near-duplicates and are never split;
 where all sweeps are of a single level each sweep takes its turn, and where there is but
 one the halves of its band. What the other levels leave open is not fixed at their best fit: every
 place that they allow predicts, as much as it is believed. It draws no conclusion.
@@ -31,6 +32,11 @@ _JUMPS = 0.01
 gain and the phase of a point or two lie anywhere, by 15 standard deviations in phase once."""
 
 _TRIES = 4
+
+_ENOUGH_ROWS = 0.4
+"""Share of the rows of other levels that went the other way from which these alone predict."""
+
+_Fold = tuple[slice, NDArray[np.bool_]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,12 +89,10 @@ def hold_out_surface(
     score = 0.0
     folds = _folds(observation)
 
-    def others_only(fold: slice) -> list[Fit]:
-        rows = np.ones(len(observation), dtype=bool)
-        rows[fold] = False
-        return surface.walk(start, rows, tries=_TRIES)
+    def others_only(fold: _Fold) -> list[Fit]:
+        return surface.walk(start, fold[1], tries=_TRIES)
 
-    for fold, fits in zip(folds, side_by_side(others_only, folds), strict=True):
+    for (fold, _), fits in zip(folds, side_by_side(others_only, folds), strict=True):
         share = surface.shares(fits)
         left = np.stack([fit.residual[:, fold] for fit in fits])
         spread = np.stack([fit.std[:, fold] for fit in fits])
@@ -99,9 +103,40 @@ def hold_out_surface(
     return HeldOut(score, residual, std)
 
 
-def _folds(observation: Observation) -> list[slice]:
+def _folds(observation: Observation) -> list[_Fold]:
+    """Rows that are predicted at a time, and which of the others (rows,) that is done by."""
+    down = _downwards(observation)
+    if len(observation.levels) > 1 and 0 < down.sum() < len(down):
+        return [(block, _strangers(observation, down, block)) for block in observation.blocks]
     for folds in (observation.levels, observation.blocks):
         if len(folds) > 1:
-            return list(folds)
+            return [(fold, _all_but(observation, fold)) for fold in folds]
     middle = len(observation) // 2
-    return [slice(0, middle), slice(middle, len(observation))]
+    halves = slice(0, middle), slice(middle, len(observation))
+    return [(half, _all_but(observation, half)) for half in halves]
+
+
+def _all_but(observation: Observation, fold: slice) -> NDArray[np.bool_]:
+    rows = np.ones(len(observation), dtype=bool)
+    rows[fold] = False
+    return rows
+
+
+def _downwards(observation: Observation) -> NDArray[np.bool_]:
+    """Which rows (rows,) were swept downwards."""
+    down = np.zeros(len(observation), dtype=bool)
+    for plan, rows in observation.plans:
+        down[rows] = plan.direction == "down"
+    return down
+
+
+def _strangers(
+    observation: Observation, down: NDArray[np.bool_], block: slice
+) -> NDArray[np.bool_]:
+    """Rows (rows,) of other levels that went the other way; of other levels, where these are few.
+
+    A further sweep of one level says little by itself.
+    """
+    elsewhere = observation.source_vpk != observation.source_vpk[block.start]
+    strangers = elsewhere & (down != down[block.start])
+    return strangers if strangers.sum() >= _ENOUGH_ROWS * elsewhere.sum() else elsewhere

@@ -91,13 +91,56 @@ def test_each_level_is_predicted_by_a_fit_that_has_not_seen_it():
     ],
 )
 def test_what_is_kept_away_is_a_level_else_a_sweep_else_half_a_band(levels, blocks, folds):
+    found = module._folds(swept(levels, blocks, ["up"] * len(blocks)))
+    assert [fold for fold, _ in found] == [slice(*ends) for ends in folds]
+    for fold, rows in found:
+        expected = np.ones(12, dtype=bool)
+        expected[fold] = False
+        assert rows.tolist() == expected.tolist()
+
+
+def swept(levels, blocks, directions):
+    """Twelve rows at levels, in blocks of sweeps that went one way or the other."""
+
     class Swept:
         def __len__(self):
             return 12
 
-    swept = Swept()
-    swept.levels, swept.blocks = ([slice(*ends) for ends in some] for some in (levels, blocks))
-    assert module._folds(swept) == [slice(*ends) for ends in folds]
+    one = Swept()
+    one.levels, one.blocks = ([slice(*ends) for ends in some] for some in (levels, blocks))
+    one.source_vpk = np.concatenate([np.full(b - a, float(n)) for n, (a, b) in enumerate(levels)])
+    one.plans = [
+        (SimpleNamespace(direction=way), np.arange(*ends))
+        for way, ends in zip(directions, blocks, strict=True)
+    ]
+    return one
+
+
+@pytest.mark.parametrize(
+    ("blocks", "directions", "rows"),
+    [
+        # Each block is told by the others' levels the other way, ...
+        (
+            [(0, 2), (2, 4), (4, 6), (6, 8), (8, 10), (10, 12)],
+            ["up", "down"] * 3,
+            [{6, 7, 10, 11}, {4, 5, 8, 9}, {2, 3, 10, 11}, {0, 1, 8, 9}, {2, 3, 6, 7},
+             {0, 1, 4, 5}],
+        ),
+        # ... and by the other levels alone where a short sweep is all that went the other way.
+        (
+            [(0, 4), (4, 8), (8, 11), (11, 12)],
+            ["up", "up", "up", "down"],
+            [{*range(4, 12)}, {*range(4), *range(8, 12)}, {*range(8)}, {*range(8)}],
+        ),
+    ],
+)  # fmt: skip
+def test_where_sweeps_went_both_ways_neither_the_level_nor_the_way_was_seen(
+    blocks, directions, rows
+):
+    levels = [(0, 4), (4, 8), (8, 12)]
+    found = module._folds(swept(levels, blocks, directions))
+    assert [fold for fold, _ in found] == [slice(*ends) for ends in blocks]
+    assert [{*np.flatnonzero(used)} for _, used in found] == rows
 
 
 @pytest.mark.parametrize("seed", range(4))
