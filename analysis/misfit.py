@@ -63,11 +63,13 @@ def find_departures(candidate: Candidate, observation: Observation) -> tuple[Dep
     for block in observation.blocks:
         for band in np.array_split(np.arange(block.start, block.stop), _BANDS):
             for channel, quantity, factor in ((0, "gain", DB_PER_NEPER), (1, "phase", 180 / np.pi)):
-                if len(band) == 0 or not np.all(np.isfinite(residual[channel, band])):
+                read = band[np.isfinite(residual[channel, band])]
+                # Half of it speaks for a band, and no less.
+                if len(read) == 0 or 2 * len(read) < len(band):
                     continue
-                mean = float(residual[channel, band].mean())
-                spread = runs[:, channel, band].mean(axis=1).std(ddof=1)
-                noise = np.sqrt(np.sum(observation.noise[band] ** 2)) / len(band)
+                mean = float(residual[channel, read].mean())
+                spread = runs[:, channel, read].mean(axis=1).std(ddof=1)
+                noise = np.sqrt(np.sum(observation.noise[read] ** 2)) / len(read)
                 sigma = mean / float(np.hypot(spread, noise))
                 found.append(
                     Departure(

@@ -45,6 +45,21 @@ def test_departures_are_found_where_they_are_and_nowhere_else():
     assert f"{LEVELS[1]:g} V of sweep 2, where the gain" in describe_departures(again, apart)
 
 
+@pytest.mark.parametrize(("unread", "told"), [(1, True), (2, False), (3, False)])
+def test_a_band_is_told_by_what_was_read_of_it_if_that_is_half_of_it(unread, told):
+    """Bands are of three rows here."""
+    values = read((), np.array([0.5]), np.random.default_rng(4)).copy()
+    band = slice(ROWS - 6, ROWS - 3)
+    values[0, band] += 0.3
+    values[0, ROWS - 6 : ROWS - 6 + unread] = np.nan
+    loud = observation(values)
+    found = find_departures(candidate(loud), loud)
+    at = [one for one in found if one.low_hz == loud.frequency_hz[ROWS - 6] and
+          one.source_vpk == LEVELS[1] and one.quantity == "gain"]  # fmt: skip
+    assert len(at) == told
+    assert all(np.isfinite(one.mean) for one in found)
+
+
 def departing(level_vpk, quantity="gain"):
     return Departure(34.0, 39.0, level_vpk, quantity, 1.0, 5.0)
 
