@@ -102,15 +102,14 @@ def compare_harmonics(
     """
     found: list[Harmonic] = []
     for plan, _ in observation.plans:
-        measured = dict(_measured(responses, plan))
+        measured = list(_measured(responses, plan))
         if not measured:
             continue
         cycles = np.stack(safe_cycles(list(_servos(candidate, rng)), plan))
         simulated = np.abs(cycles.mean(axis=3))
-        for level, source_vpk in enumerate(plan.levels_vpk):
-            if source_vpk in measured:
-                shares = _shares(simulated[:, level])
-                found += _compared(source_vpk, measured[source_vpk], shares, observation.noise_v)
+        for level, points, magnitudes in measured:
+            shares = _shares(simulated[:, level, points])
+            found += _compared(plan.levels_vpk[level], magnitudes, shares, observation.noise_v)
     return tuple(found)
 
 
@@ -172,8 +171,11 @@ def _told(parity: str, harmonics: Sequence[Harmonic]) -> str:
 
 def _measured(
     responses: Sequence[FrequencyResponse], plan: SweepPlan
-) -> Iterator[tuple[float, NDArray[np.float64]]]:
-    """Levels of a plan, and magnitudes (points, 3) of fundamental and harmonics over the source."""
+) -> Iterator[tuple[int, NDArray[np.intp], NDArray[np.float64]]]:
+    """Which level of a plan, which points of it, and fundamental and harmonics (points, 3) there.
+
+    Magnitudes over the source, where all three were read.
+    """
     for response in responses:
         if (response.direction or "up") != plan.direction:
             continue
@@ -181,10 +183,11 @@ def _measured(
             continue
         read = np.abs(np.column_stack([response.gain, response.harmonic2, response.harmonic3]))
         known = np.isfinite(read).all(axis=1) & np.isin(response.frequency_hz, plan.frequencies_hz)
-        for level in plan.levels_vpk:
-            rows = known & (response.source_vpk == level)
-            if rows.any():
-                yield level, read[rows]
+        for level, source_vpk in enumerate(plan.levels_vpk):
+            rows = np.flatnonzero(known & (response.source_vpk == source_vpk))
+            if len(rows):
+                points = np.searchsorted(plan.frequencies_hz, response.frequency_hz[rows])
+                yield level, points, read[rows]
 
 
 def _servos(candidate: Candidate, rng: np.random.Generator) -> Iterator[Servo]:

@@ -97,6 +97,9 @@ def test_a_row_without_a_harmonic_is_left_out_and_no_other():
     rows = (response.source_vpk == 2.5) & np.isfinite(third)
     of_rows = [np.abs(values[rows]) for values in (response.harmonic2, response.gain)]
     assert lower.measured == pytest.approx(np.exp(np.mean(np.log(of_rows[0] / of_rows[1]))))
+    # Machines are held against it at the same points.
+    (higher,) = (one for one in whole if (one.number, one.source_vpk) == (2, 2.5))
+    assert lower.simulated != higher.simulated
 
 
 def test_a_harmonic_tells_of_itself_what_a_document_holds():
