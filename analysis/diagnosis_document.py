@@ -12,13 +12,11 @@ from typing import Any
 import numpy as np
 
 from analysis.harmonics import Harmonic, describe_harmonics
-from analysis.holdout import HeldOut
 from analysis.misfit import Departure
 from analysis.next_measurement import CLEAR_SIGMA, NextMeasurement
 from analysis.observation import Observation
 from analysis.swept import sweep_document, sweep_lines
 from analysis.verdict import Judged, Verdict
-from daq.frf import DB_PER_NEPER
 from sim.catalogue import CATALOGUE
 
 __all__ = ["Cause", "Diagnosis", "Size"]
@@ -118,8 +116,8 @@ class Diagnosis:
         return [
             (
                 float(self.observation.source_vpk[level.start]),
-                _left(self.verdict.baseline.held_out, level),
-                _left(self.extended.held_out, level),
+                self.verdict.baseline.held_out.left(level),
+                self.extended.held_out.left(level),
             )
             for level in self.observation.levels
         ]
@@ -292,19 +290,6 @@ _LEAST_TOLD = 0.005
 def _sites(one: Judged) -> list[str]:
     """Where the causes of a set sit."""
     return sorted({CATALOGUE[effect].site for effect in one.effects})
-
-
-def _left(held_out: HeldOut, rows: slice) -> tuple[float, float]:
-    """Root mean square of the gain, dB, and of the phase, deg, that some rows are missed by."""
-    log_gain, phase = held_out.residual[:2, rows]
-    return float(DB_PER_NEPER * _root_mean_square(log_gain)), float(
-        np.degrees(_root_mean_square(phase))
-    )
-
-
-def _root_mean_square(values: np.ndarray) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
 
 
 def _rms(left: tuple[float, float]) -> dict[str, float]:

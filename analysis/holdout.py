@@ -68,7 +68,17 @@ class HeldOut:
     @property
     def rms_db(self) -> float:
         """Root mean square of the gain alone, dB."""
-        return float(DB_PER_NEPER * np.sqrt(np.nanmean(self.residual[0] ** 2)))
+        return self.left(slice(None))[0]
+
+    def left(self, rows: slice) -> tuple[float, float]:
+        """Root mean square of the gain, dB, and of the phase, deg, by which some rows are missed.
+
+        NaN of a phase that was not read.
+        """
+        squares = self.residual[:2, rows] ** 2
+        gain, phase = (np.sqrt(np.mean(one[np.isfinite(one)])) if np.isfinite(one).any() else np.nan
+                       for one in squares)  # fmt: skip
+        return float(DB_PER_NEPER * gain), float(np.degrees(phase))
 
     def rms_against(self, std: NDArray[np.float64]) -> float:
         """Root mean square of gain and phase over standard deviations given (3, rows)."""
