@@ -51,8 +51,9 @@ _Moments = tuple[NDArray[np.float64], NDArray[np.float64]]
 class NextMeasurement:
     """A sweep, the two sets of causes it parts, and by how many standard deviations.
 
-    `unit` is the unit's name, or the path of its file. `others`: further rivals of the first set,
-    and by how many it is parted from each.
+    `unit` is the unit's name, or the path of its file; `address` is where the instrument is, and
+    `serial` whose number the specimen has, as far as anybody said. `others`: further rivals of the
+    first set, and by how many it is parted from each.
     """
 
     unit: str
@@ -60,14 +61,19 @@ class NextMeasurement:
     separates: tuple[str, str]
     expected_sigma: float
     others: tuple[tuple[str, float], ...] = ()
+    address: str = ""
+    serial: str = ""
 
     @property
     def command(self) -> str:
-        """The options with which ``lashbench measure`` takes this sweep."""
+        """What takes this sweep; ``URL`` stands for an instrument that nobody said where it is."""
         f, unit = self.plan.frequencies_hz, self.unit
         if unit.lower() in config_names("units"):
             unit = unit.lower()
-        parts = [f"lashbench measure --unit {shlex.quote(unit)} --instrument URL"]
+        parts = [f"lashbench measure --unit {shlex.quote(unit)}"]
+        parts.append(f"--instrument {shlex.quote(self.address or 'URL')}")
+        if self.serial:
+            parts.append(f"--serial {shlex.quote(self.serial)}")
         parts += [f"--level {level:g}" for level in self.plan.levels_vpk]
         parts += [f"--start {f[0]:g} --stop {f[-1]:g} --points {len(f)}"]
         if self.plan.direction != "up":

@@ -1,7 +1,8 @@
 """Commands that are printed so that somebody pastes them into a shell.
 
 Owns how they name what was given on the command line: a unit of one's own is found by the path
-of its file alone, and a name that comes with lashbench may stand for another machine.
+of its file alone, and a name that comes with lashbench may stand for another machine. A bench is
+where the measurement says it was made.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import TYPE_CHECKING, TypeVar
 if TYPE_CHECKING:
     from analysis.diagnosis import Diagnosis
     from analysis.paper_diagnosis import PaperDiagnosis
+    from daq.frf import FrequencyResponse
 
 __all__ = ["pip_install", "pasted", "proposing"]
 
@@ -33,15 +35,28 @@ def pip_install(*words: str) -> str:
     return pasted([sys.executable, "-m", "pip", "install", *words])
 
 
-def proposing(result: Proposer, unit: str) -> Proposer:
-    """A diagnosis whose proposed command names the unit as it was given.
+def proposing(result: Proposer, unit: str, measured: Sequence[FrequencyResponse] = ()) -> Proposer:
+    """A diagnosis whose proposed command names the unit as it was given, and the bench.
 
     Parameters
     ----------
     unit
         Name of a unit that comes with lashbench, or the path of a file.
+    measured
+        What was diagnosed. The last that tells where it was measured, or whose number the specimen
+        has, is believed.
     """
     proposal = result.next_measurement
     if proposal is None:
         return result
-    return replace(result, next_measurement=replace(proposal, unit=unit))
+    address, serial = (_last_said(key, measured) for key in ("address", "serial"))
+    if address.startswith("replay:"):
+        # A transcript answers what it was asked, and nothing else.
+        address = ""
+    named = replace(proposal, unit=unit, address=address, serial=serial)
+    return replace(result, next_measurement=named)
+
+
+def _last_said(key: str, measured: Sequence[FrequencyResponse]) -> str:
+    said = [str(one.provenance.get(key) or "") for one in measured]
+    return next((text for text in reversed(said) if text), "")

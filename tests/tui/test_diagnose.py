@@ -18,9 +18,11 @@ from analysis.swept import check_together
 from daq.configs import config_path
 from daq.errors import InputError, LashbenchError
 from daq.formats import read_response
+from daq.frf import FrequencyResponse
 from daq.plan import SweepPlan
 from sim.machine_code import code_folder
 from tui.cli import main
+from tui.pasted import proposing
 
 PRACTICE = Path(__file__).parents[1] / "data" / "practice"
 SWEEP = str(PRACTICE / "practice-09.csv")
@@ -101,26 +103,73 @@ def test_a_response_of_another_unit_is_said_to_be_one(calls, capsys):
     assert "warning" not in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("asked", ["response", "paper"])
-def test_the_command_that_is_proposed_finds_a_unit_by_its_path(
-    calls, capsys, monkeypatch, tmp_path, asked
-):
-    @dataclass
-    class Proposing(Told):
-        next_measurement: NextMeasurement
+@dataclass
+class Proposing(Told):
+    next_measurement: NextMeasurement
 
-        def summary(self):
-            return [self.next_measurement.command]
+    def summary(self):
+        return [self.next_measurement.command]
 
-    proposal = NextMeasurement("ADSS", SweepPlan((100.0, 120.0), (1.0,)), ("a", "b"), 3.0)
+
+@pytest.fixture
+def proposed(calls, monkeypatch):
+    """Whatever is diagnosed ends with a sweep that is proposed."""
+    plan = SweepPlan((100.0, 120.0), (1.0,), settle_cycles=3, integrate_cycles=4)
+    proposal = NextMeasurement("ADSS", plan, ("a", "b"), 3.0)
     for diagnosing in ("diagnosis.diagnose_response", "paper_diagnosis.diagnose_paper"):
         monkeypatch.setattr(f"analysis.{diagnosing}", lambda *_, **__: Proposing(proposal))
+
+
+@pytest.mark.parametrize("asked", ["response", "paper"])
+def test_the_command_that_is_proposed_finds_a_unit_by_its_path(proposed, capsys, tmp_path, asked):
     own = tmp_path / "my gimbal.toml"
     own.write_text(config_path("units", "adss").read_text(encoding="utf-8"), encoding="utf-8")
     measured = SWEEP if asked == "response" else "--paper"
     assert main(["diagnose", measured, "--unit", str(own)]) == 0
     words = shlex.split(capsys.readouterr().out)
     assert words[words.index("--unit") + 1] == str(own)
+
+
+def test_the_command_that_is_proposed_runs_as_printed_on_the_bench_that_was_measured(
+    proposed, capsys, monkeypatch, tmp_path
+):
+    monkeypatch.chdir(tmp_path)
+    bench = "sim:?ratio=0.3&seed=1&effect=load-viscous-damping:B_L=0.05"
+    plan = ["--level", "1", "--start", "100", "--stop", "140", "--points", "8"]
+    there = ["--unit", "adss", "--instrument", bench, "--serial", "SN 7", "--db", "lab.db"]
+    assert main(["measure", *there, *plan, "--yes"]) == 0
+    assert main(["export", "1", "--db", "lab.db", "--out", "first.csv"]) == 0
+    capsys.readouterr()
+    assert main(["diagnose", "first.csv", "--unit", "adss"]) == 0
+    words = shlex.split(capsys.readouterr().out)
+    assert words[words.index("--instrument") + 1] == bench
+    assert words[words.index("--serial") + 1] == "SN 7"
+    assert main([*words[1:], "--db", "lab.db", "--yes", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["points"] == 2
+
+
+@pytest.mark.parametrize(
+    ("said", "asked"),
+    [
+        ([], "URL"),
+        (["replay:session.txt"], "URL"),
+        (["GPIB0::11::INSTR", "sim:"], "sim:"),
+        (["GPIB0::11::INSTR", ""], "GPIB0::11::INSTR"),
+        (["prologix:/dev/ttyUSB0?addr=11"], "prologix:/dev/ttyUSB0?addr=11"),
+    ],
+)
+def test_who_says_last_where_it_was_measured_is_believed(said, asked):
+    plan = SweepPlan((100.0, 120.0), (1.0,))
+    measured = [
+        FrequencyResponse.from_arrays(
+            [100.0], [1.0], [1.0], unit="ADSS", provenance={"address": one}
+        )
+        for one in said
+    ]
+    result = proposing(Proposing(NextMeasurement("ADSS", plan, ("a", "b"), 3.0)), "adss", measured)
+    words = shlex.split(result.next_measurement.command)
+    assert words[words.index("--instrument") + 1] == asked
+    assert "--serial" not in words
 
 
 def test_a_figure_that_cannot_be_made_does_not_cost_the_answer(

@@ -77,7 +77,7 @@ def diagnose(
             response, subject, further=others, cache=cache_folder(), executor=executor,
             progress=console.progress,
         )  # fmt: skip
-    _tell(proposing(result, unit), json, console)
+    _tell(proposing(result, unit, (response, *others)), json, console)
     if plots is not None:
         from analysis.diagnosis_figures import draw_diagnosis
 

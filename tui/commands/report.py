@@ -80,7 +80,7 @@ def report(
         estimate = _estimate(response, subject, remarks, console)
     diagnosis = _diagnose(response, subject, remarks, console) if diagnose else None
     if diagnosis is not None:
-        diagnosis = proposing(diagnosis, unit)
+        diagnosis = proposing(diagnosis, unit, [response])
     if not diagnose:
         remarks["diagnosis"] = "No diagnosis was made: it was left out on request."
     from analysis.report import write_report
