@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from analysis.arithmetic import on_one_core
+from analysis.bounds import bound_causes
 from analysis.calibration import Calibrated
 from analysis.candidate import Candidate
 from analysis.certainty import hold_against_doubt
@@ -165,6 +166,7 @@ def _diagnose(
         verdict = think_again(held, sharp.mean, observation, rng.spawn(1)[0], executor)
         sharp = None if verdict.word == "unexplained" else sharp
     named = verdict.word in ("explained", "ambiguous")
+    missing = verdict.word != "consistent"
     base = widen_if_open(base, verdict.baseline.candidate, observation, rng)
     best = base if sharp is None else sharp
     departures = find_departures(verdict.baseline.candidate, observation)
@@ -184,6 +186,7 @@ def _diagnose(
         left_shape=describe_departures(left, observation),
         next_measurement=proposal,
         observation=observation,
+        unseen=() if missing else bound_causes(unit, searched.few, searched.atlas),
         cut_short=searched.given_up or (searched.spared and verdict.word == "unexplained"),
     )
 

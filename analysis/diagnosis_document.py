@@ -16,6 +16,7 @@ from analysis.misfit import Departure
 from analysis.next_measurement import CLEAR_SIGMA, NextMeasurement
 from analysis.observation import Observation
 from analysis.swept import sweep_document, sweep_lines
+from analysis.unseen import Unseen, describe_unseen
 from analysis.verdict import Judged, Verdict
 from sim.catalogue import CATALOGUE
 
@@ -53,7 +54,8 @@ class Diagnosis:
     deviation under the plain and the extended model. `departures`: of the
     measurement from the plain model; `left`: from the set that stands first, named or refused.
     `shape`, `left_shape`: both in words. `harmonics`: where nothing explains it, those measured
-    beside those of the set that stands first.
+    beside those of the set that stands first. `unseen`: where nothing is missing, how large each
+    cause may be all the same.
     `cut_short`: whether a search that found no explanation did not try every set that was worth
     it, for what it may simulate. `simulated_s`: seconds of motion that were simulated for it.
     """
@@ -70,6 +72,7 @@ class Diagnosis:
     next_measurement: NextMeasurement | None
     observation: Observation
     harmonics: tuple[Harmonic, ...] = ()
+    unseen: tuple[Unseen, ...] = ()
     cut_short: bool = False
     warnings: tuple[str, ...] = ()
     elapsed_s: float = 0.0
@@ -174,6 +177,7 @@ class Diagnosis:
             "shape": self.shape,
             "shape_after": self.left_shape,
             "harmonics": [one.to_json() for one in self.harmonics],
+            "unseen": [one.to_json() for one in self.unseen],
             "by_level": [
                 {"source_vpk": level, "baseline": _rms(plain), "extended": _rms(extended)}
                 for level, plain, extended in self.by_level
@@ -238,6 +242,9 @@ class Diagnosis:
             lines.append(
                 f"    {one.probability:6.3f}  {name}" + (f"  ({remark})" if remark else "")
             )
+        if self.unseen:
+            lines.append("  what may be there unseen, each by itself:")
+            lines += [f"    {one.effect}: {describe_unseen(one.to_json())}" for one in self.unseen]
         if self.next_measurement is not None:
             proposal = self.next_measurement
             lines.append(f"  {_proposed(proposal)}")
@@ -305,7 +312,14 @@ def _sentence(diagnosis: Diagnosis) -> str:
     word, names = diagnosis.verdict.word, " with ".join(c.effect for c in diagnosis.causes)
     where = " and ".join(_WHERE[site] for site in diagnosis.sites)
     if word == "consistent":
-        return "Nothing beyond tolerance is needed to explain this response."
+        plain = diagnosis.verdict.baseline
+        likelier = [
+            one for one in diagnosis.verdict.judged if one.adequate and one.score > plain.score
+        ]
+        chance = (
+            f"; {_either(likelier)} is likelier by no more than chance brings" if likelier else ""
+        )
+        return f"Nothing beyond tolerance is needed to explain this response{chance}."
     if word == "unexplained":
         return "Something is missing that no cause known here explains."
     explains = f"{names} ({where}) explains it with probability {diagnosis.verdict.probability:.2f}"

@@ -12,6 +12,7 @@ from typing import Any
 from analysis.features import with_error
 from analysis.markup import Markup, element, joined, table
 from analysis.swept import sweep_lines
+from analysis.unseen import describe_unseen
 
 __all__ = [
     "diagnosis_section",
@@ -162,6 +163,7 @@ def diagnosis_section(data: Data, pictures: Sequence[tuple[Markup, str]]) -> Mar
         _residuals("Departures left with the causes", diagnosis.get("residual_after", []))
         if diagnosis["causes"]
         else Markup(""),
+        _unseen(diagnosis.get("unseen", [])),
         _next(diagnosis.get("next_measurement")),
         _notes(diagnosis.get("warnings", [])),
     )
@@ -336,6 +338,14 @@ def _residuals(title: str, bands: Sequence[Data]) -> Markup:
     head = ("band / Hz", *(["sweep"] if several else []), "V peak", "quantity")
     head += ("measured - model", "sigma")
     return joined(element("h3", heading), table(rows, head))
+
+
+def _unseen(causes: Sequence[Data]) -> Markup:
+    if not causes:
+        return Markup("")
+    rows = [(one["effect"], describe_unseen(one)) for one in causes]
+    heading = "What may be there unseen, each by itself"
+    return joined(element("h3", heading), table(rows, ("cause", "size")))
 
 
 def _next(proposal: Data | None) -> Markup:

@@ -99,11 +99,14 @@ class Searched:
 
     `given_up`: the search was left with none that explains, having taken all the motion that a
     measurement may (`analysis.purse`). `spared`: not all pairs were looked at that were worth it.
+    `few`, `atlas`: the rows that were looked at first, and every single cause there.
     """
 
     candidates: list[Candidate]
     given_up: bool
-    spared: bool = False
+    spared: bool
+    few: Observation
+    atlas: Atlas
 
 
 def search_causes(
@@ -197,7 +200,7 @@ def search_causes(
             if not given_up:
                 weigh_baseline(fine, rng)
     likeliest = sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
-    return Searched(likeliest, given_up, rough.spared)
+    return Searched(likeliest, given_up, rough.spared, rough.observation, atlas)
 
 
 def _without(effects: Collection[str], atlas: Atlas) -> Atlas:

@@ -84,7 +84,10 @@ def diagnosis(
     place = np.array([0.5, *([0.6] if hidden else [])])
     seen = synthetic.observation(synthetic.read(hidden, place, rng))
     candidates = [synthetic.candidate(seen, effects) for effects in [(), *judged]]
-    searched = Searched(candidates, given_up, spared)
+    atlas = {
+        c.hypothesis.effects: c.population for c in candidates if len(c.hypothesis.effects) < 2
+    }
+    searched = Searched(candidates, given_up, spared, seen, atlas)
     monkeypatch.setattr(diagnosis_module, "observe", lambda response: seen)
     monkeypatch.setattr(diagnosis_module, "search_causes", lambda *_, **__: searched)
     monkeypatch.setattr(diagnosis_module, "propose_measurement", lambda *_, **__: None)

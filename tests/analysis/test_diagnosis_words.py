@@ -9,6 +9,7 @@ import report_makings as makings
 
 from analysis import diagnosis as module
 from analysis.next_measurement import NextMeasurement
+from analysis.unseen import describe_unseen
 from daq.errors import AnalysisError
 from daq.plan import SweepPlan
 from sim.unit import load_unit
@@ -270,3 +271,29 @@ def test_that_few_frequencies_show_little_is_said(explained, frequencies, warned
     said = [text for text in module._warnings(replace(explained, observation=seen))
             if f"holds {frequencies} frequencies" in text]  # fmt: skip
     assert len(said) == warned
+
+
+def test_where_nothing_was_found_it_is_told_what_may_be_there_all_the_same(
+    monkeypatch, unexplained
+):
+    plain = makings.diagnosis(monkeypatch, (), [LOAD, STIFF])
+    assert plain.verdict.word == "consistent"
+    told, document = plain.summary(), plain.to_json()["unseen"]
+    assert [one["effect"] for one in document] == [*LOAD, *STIFF]
+    at = told.index("  what may be there unseen, each by itself:")
+    for line, one in zip(told[at + 1 : at + 3], document, strict=True):
+        assert line == f"    {one['effect']}: {describe_unseen(one)}"
+    assert unexplained.to_json()["unseen"] == []
+
+
+def test_a_cause_that_is_likelier_than_nothing_by_chance_is_told(monkeypatch):
+    plain = makings.diagnosis(monkeypatch, (), [LOAD, STIFF])
+    assert plain.summary()[0].endswith("is needed to explain this response.")
+    judged = tuple(
+        replace(one, score=plain.verdict.best.score + 20.0, objection="")
+        if one.effects == LOAD
+        else one
+        for one in plain.verdict.judged
+    )
+    said = replace(plain, verdict=replace(plain.verdict, judged=judged)).summary()[0]
+    assert said.endswith("; load-inertia is likelier by no more than chance brings.")

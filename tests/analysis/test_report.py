@@ -176,6 +176,7 @@ def test_every_verdict_has_its_words(report, monkeypatch, hidden, judged, verdic
     _, page = report(diagnosis=found)
     assert said in page.text
     assert page.text.count("Departures left") == (verdict == "explained")
+    assert page.text.count("What may be there unseen") == (verdict == "consistent")
     told = found.summary()
     for one in found.verdict.judged:
         name = " + ".join(one.effects) or "nothing hidden"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from screen import DIAGNOSIS, operated, run, text_of
 
+from analysis.unseen import Unseen
 from daq import session_events as kinds
 from daq.analyser import SourceState, SweepPoint
 from daq.errors import InputError
@@ -181,6 +182,10 @@ def test_a_diagnosis_is_told_with_causes_rivals_and_what_next():
     text = "\n".join(diagnosis_lines(nothing))
     assert "Causes: none named" in text
     assert "NEXT" not in text
+    assert "unseen" not in text
+    load = Unseen("load-inertia", "J_L", "kg.m^2", 0.0026, 0.0029, 0.00275)
+    text = "\n".join(diagnosis_lines(nothing | {"unseen": [load.to_json()]}))
+    assert "unseen, each by itself\n - load-inertia  J_L 0.0026 to 0.0029 kg.m^2" in text
 
 
 def test_without_colour_everything_is_still_said(tmp_path, monkeypatch):
