@@ -254,6 +254,7 @@ def looked_behind(
     monkeypatch.setattr(second_cause, "add_causes", lambda *_: None)
     monkeypatch.setattr(second_cause, "_worth", lambda *_: dict.fromkeys(ahead, few))
     monkeypatch.setattr(second_cause, "_stood_for", lambda *_: [])
+    monkeypatch.setattr(second_cause, "_look_at_second_alone", lambda *_: None)
     monkeypatch.setattr(
         second_cause, "is_felt_alike", lambda one, _: one.hypothesis.effects == stands_for_it
     )
