@@ -59,4 +59,5 @@ def proposing(result: Proposer, unit: str, measured: Sequence[FrequencyResponse]
 
 def _last_said(key: str, measured: Sequence[FrequencyResponse]) -> str:
     said = [str(one.provenance.get(key) or "") for one in measured]
-    return next((text for text in reversed(said) if text), "")
+    # What moves a terminal's cursor is no address, and nothing to paste.
+    return next((text for text in reversed(said) if text and text.isprintable()), "")

@@ -147,8 +147,8 @@ SMALL = (
 
 
 def test_a_small_cause_that_is_there_is_not_ruled_out():
-    # Of 88 drawn so, either unit and all causes, none was; with one in thirty two of three would be
-    # rarer than one in 300.
+    # Of 176 drawn so, either unit and all causes, one was; with one in sixty two of three are rarer
+    # than one in a thousand.
     ruled_out = []
     for sequence in np.random.SeedSequence().spawn(3):
         seed = int(sequence.generate_state(1)[0] % 2**31)

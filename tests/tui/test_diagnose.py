@@ -153,6 +153,7 @@ def test_the_command_that_is_proposed_runs_as_printed_on_the_bench_that_was_meas
     [
         ([], "URL"),
         (["replay:session.txt"], "URL"),
+        (["GPIB0::11::INSTR\x1b[2J"], "URL"),
         (["GPIB0::11::INSTR", "sim:"], "sim:"),
         (["GPIB0::11::INSTR", ""], "GPIB0::11::INSTR"),
         (["prologix:/dev/ttyUSB0?addr=11"], "prologix:/dev/ttyUSB0?addr=11"),
