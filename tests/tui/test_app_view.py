@@ -169,6 +169,7 @@ def test_a_proposed_plan_is_read_in_both_forms_and_refused_in_others():
 
 def test_a_diagnosis_is_told_with_causes_rivals_and_what_next():
     text = "\n".join(diagnosis_lines(DIAGNOSIS))
+    assert "\nRivals\n" in text
     for words in (
         "VERDICT: AMBIGUOUS", "before  4.2 standard errors, 1.9 dB", "load-inertia",
         "J_L = 0.0031 +- 0.0001 kg.m^2",
@@ -183,6 +184,9 @@ def test_a_diagnosis_is_told_with_causes_rivals_and_what_next():
     assert "Causes: none named" in text
     assert "NEXT" not in text
     assert "unseen" not in text
+    plain = {"causes": [], "probability": 0.7}
+    judged = "\n".join(diagnosis_lines(nothing | {"rivals": [plain]}))
+    assert "\nSets judged\n - no cause  probability 0.70" in judged
     load = Unseen("load-inertia", "J_L", "kg.m^2", 0.0026, 0.0029, 0.00275)
     text = "\n".join(diagnosis_lines(nothing | {"unseen": [load.to_json()]}))
     assert "unseen, each by itself\n - load-inertia  J_L 0.0026 to 0.0029 kg.m^2" in text

@@ -161,7 +161,7 @@ def diagnosis_lines(document: Mapping[str, Any]) -> list[str]:
         lines.append(f"    {_explained(cause['effect'])}{_parameters(cause['parameters'])}")
         lines += [f"    {text}" for text in _checked(cause["effect"])]
     if document.get("rivals"):
-        lines += ["", "Rivals"]
+        lines += ["", "Rivals" if document["causes"] else "Sets judged"]
         for rival in document["rivals"]:
             names = " + ".join(rival["causes"]) or "no cause"
             remark = f" ({rival['remark']})" if rival.get("remark") else ""
