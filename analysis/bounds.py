@@ -15,6 +15,7 @@ from analysis.atlas import Atlas
 from analysis.atlas_surfaces import felt_singles, surfaces_of
 from analysis.causes import Hypothesis
 from analysis.observation import Observation
+from analysis.screening import mesh
 from analysis.surface import Surface
 from analysis.unseen import Unseen
 from sim.unit import Unit
@@ -53,8 +54,7 @@ def bound_causes(unit: Unit, few: Observation, atlas: Atlas) -> tuple[Unseen, ..
 def _profile(surface: Surface, d: int) -> NDArray[np.float64]:
     """The best log-likelihood at each of the sizes (sizes,) of the first parameter, if any."""
     counts = _COUNTS[d]
-    lines = [np.linspace(0.0, 1.0, count) for count in counts]
-    grid = np.stack([m.ravel() for m in np.meshgrid(*lines, indexing="ij")], axis=1)
+    grid = mesh([np.linspace(0.0, 1.0, count) for count in counts])
     found = surface.scan(grid).reshape(counts)
     return found.max(axis=tuple(axis for axis in range(d) if axis != 1))
 

@@ -166,11 +166,12 @@ def _diagnose(
         verdict = think_again(held, sharp.mean, observation, rng.spawn(1)[0], executor)
         sharp = None if verdict.word == "unexplained" else sharp
     named = verdict.word in ("explained", "ambiguous")
-    missing = verdict.word != "consistent"
     base = widen_if_open(base, verdict.baseline.candidate, observation, rng)
     best = base if sharp is None else sharp
     departures = find_departures(verdict.baseline.candidate, observation)
     left = find_departures(verdict.best.candidate, observation)
+    consistent = verdict.word == "consistent"
+    unseen = bound_causes(unit, searched.few, searched.atlas) if consistent else ()
     proposal = _proposal(unit, verdict, observation, seed, executor, progress)
     if progress is not None:
         progress(1.0, "done")
@@ -186,7 +187,7 @@ def _diagnose(
         left_shape=describe_departures(left, observation),
         next_measurement=proposal,
         observation=observation,
-        unseen=() if missing else bound_causes(unit, searched.few, searched.atlas),
+        unseen=unseen,
         cut_short=searched.given_up or (searched.spared and verdict.word == "unexplained"),
     )
 

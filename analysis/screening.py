@@ -32,6 +32,7 @@ __all__ = [
     "Additions",
     "Place",
     "add_causes",
+    "mesh",
     "near",
     "ranked",
     "ratios_of_pairs",
@@ -211,7 +212,7 @@ def add_causes(unit: Unit, coarse: Observation, atlas: Atlas) -> Additions:
 
 
 def _added(surface: Surface, plain: NDArray[np.float64]) -> _Added:
-    sizes = _mesh([_centres(count) for count in _PAIR_SIZES[surface.places.shape[1]]])
+    sizes = mesh([_centres(count) for count in _PAIR_SIZES[surface.places.shape[1]]])
     ratios = ratios_of_pairs()
     expected = np.array(
         [[surface.expected(np.array([ratio, *size])) for size in sizes] for ratio in ratios]
@@ -274,7 +275,7 @@ def _refined(surface: Surface, counts: Sequence[int]) -> Place:
 
 def _best_of(surface: Surface, lines: Sequence[NDArray[np.float64]]) -> Place:
     """The best of all places with these coordinates; the ratio is the first of them."""
-    grid = _mesh(lines).reshape(len(lines[0]), -1, len(lines))
+    grid = mesh(lines).reshape(len(lines[0]), -1, len(lines))
     likelihood = surface.scan(grid.reshape(-1, len(lines))).reshape(grid.shape[:2])
     tops = likelihood.argmax(axis=1)
     places = [Place(grid[at, top], float(likelihood[at, top])) for at, top in enumerate(tops)]
@@ -292,5 +293,6 @@ def _centres(count: int) -> NDArray[np.float64]:
     return (np.arange(count) + 0.5) / count
 
 
-def _mesh(lines: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+def mesh(lines: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """All places (count, d) with these coordinates, the last of which runs fastest."""
     return np.stack([m.ravel() for m in np.meshgrid(*lines, indexing="ij")], axis=1)

@@ -150,7 +150,7 @@ def _look_at_second_alone(standing: _Standing) -> None:
         for second, key in seconds.items()
         if second not in fine.found
     }
-    if alone:
+    if alone and not fine.purse.is_spent:
         fine.start(alone, _ALL_GROUPS)
         catch_up(fine, alone, leader, _BEHIND)
 

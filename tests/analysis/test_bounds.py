@@ -26,7 +26,6 @@ PLAIN = 500.0
 class Known:
     """A surface whose log-likelihood is known: a parabola in the size, whatever the ratio is."""
 
-    effects: tuple[str, ...]
     best: float
     at: float
     curvature: float
@@ -39,9 +38,9 @@ class Known:
 def bound(monkeypatch, effect, best, at, curvature, felt=None):
     """What is told of one cause with such a surface, and another by what the load is felt as."""
     key = (effect,)
-    surfaces = {(): Known((), PLAIN, 0.0, 0.0), key: Known(key, best, at, curvature)}
+    surfaces = {(): Known(PLAIN, 0.0, 0.0), key: Known(best, at, curvature)}
     monkeypatch.setattr(bounds, "surfaces_of", lambda *_: surfaces)
-    more = {} if felt is None else {key: Known(key, felt, at, curvature)}
+    more = {} if felt is None else {key: Known(felt, at, curvature)}
     monkeypatch.setattr(bounds, "felt_singles", lambda *_: more)
     (found,) = bound_causes(ADSS, None, {})
     return found

@@ -1,5 +1,7 @@
 """A second cause that is all there is: it is held against the first by itself."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import synthetic_search
@@ -44,6 +46,12 @@ def test_one_that_is_known_is_not_looked_at_again(hunt):
 
 def test_beside_what_may_be_chance_none_is(hunt):
     look(hunt, _CALLED_FOR - 1.0)
+    assert SECOND not in hunt.found
+
+
+def test_where_all_is_spent_none_is(hunt):
+    hunt.purse = SimpleNamespace(is_spent=True)
+    look(hunt, _CALLED_FOR + 5.0)
     assert SECOND not in hunt.found
 
 
