@@ -162,8 +162,12 @@ def _mode(path: Path, exists: bool, read_only: bool) -> str:
     # A log beside the file must be taken into account, which needs the shared
     # memory file; without a log the file alone is the whole truth, and can be
     # read even where nothing may be written.
-    log = log_of(path)
-    return "mode=ro" if log.exists() and log.stat().st_size > 0 else "mode=ro&immutable=1"
+    try:
+        logged = log_of(path).stat().st_size > 0
+    except FileNotFoundError:
+        # Asked once only: whoever wrote may close the file, and remove its log, at any moment.
+        logged = False
+    return "mode=ro" if logged else "mode=ro&immutable=1"
 
 
 def _check_content(engine: sa.Engine, path: Path, *, create: bool, read_only: bool) -> None:

@@ -174,6 +174,26 @@ def test_what_only_the_log_holds_is_read_too(whole, tmp_path):
             assert reader.events(1)[-1].text == "only in the log"
 
 
+def test_whoever_writes_may_leave_while_another_opens(whole, tmp_path, monkeypatch):
+    path = tmp_path / "bench.db"
+    path.write_bytes(whole)
+    writer = Store(path)
+    writer.note(1, "late", "the log goes with its writer")
+    gone, look = [], os.stat
+
+    def look_and_leave(place, **how):
+        found = look(place, **how)
+        if str(place).endswith("-wal"):
+            writer.close()
+            gone.append(not os.path.lexists(place))
+        return found
+
+    monkeypatch.setattr(os, "stat", look_and_leave)
+    with Store(path, read_only=True) as reader:
+        assert reader.events(1)[-1].text == "the log goes with its writer"
+    assert gone[:1] == [True]
+
+
 @settings(
     max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )

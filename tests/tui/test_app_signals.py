@@ -27,9 +27,11 @@ from daq.hp35670a_setup import Timing
 from tui.app.application import BenchApp
 from tui.measure_options import PlanOptions
 
-# Whoever is silent is waited for less long than at a bench.
-daq.hp35670a.Timing = lambda: Timing(reply_s=0.5, block_s=1.0, overhead_s=3.0)
-daq.hp35670a_safe._BUDGET_S = 2.0
+# Whoever is silent is waited for less long than at a bench; whoever answers may take his time,
+# on a machine that is busy with other tests.
+if "silence" in sys.argv[2]:
+    daq.hp35670a.Timing = lambda: Timing(reply_s=0.5, block_s=1.0, overhead_s=3.0)
+    daq.hp35670a_safe._BUDGET_S = 2.0
 
 class Driven(BenchApp):
     def on_mount(self):
@@ -142,10 +144,15 @@ class OnTerminal:
             assert time.monotonic() < end, self.seen[-2000:]
             time.sleep(0.05)
 
-    def ended(self, within_s=30.0):
+    def ended(self, within_s=60.0):
         code = self.program.wait(within_s)
         self._reader.join(5.0)
         return code
+
+    def ends_by_signal(self):
+        """Check that it was interrupted; else show what its screen said last."""
+        code = self.ended()
+        assert code == 130, (code, self.seen[-3000:])
 
 
 def driving(db, within_s=40.0):
@@ -166,7 +173,7 @@ def test_a_signal_ends_session_and_screen_with_the_source_off(tmp_path, on_termi
     terminal = on_terminal(str(db), "sim:?ratio=0.3&seed=1")
     driving(db)
     terminal.program.send_signal(number)
-    assert terminal.ended() == 130
+    terminal.ends_by_signal()
     assert begun(db).state == "interrupted"
     assert begun(db).source_state is SourceState.CONFIRMED_OFF
 
@@ -178,7 +185,7 @@ def test_a_source_that_a_signal_could_not_switch_off_is_told_after_the_screen(
     terminal = on_terminal(str(db), "sim:?fault=silence:point=5")
     driving(db)
     terminal.program.send_signal(signal.SIGTERM)
-    assert terminal.ended(60.0) == 1
+    assert terminal.ended() == 1
     assert begun(db).source_state is SourceState.UNKNOWN
     assert b"error: SOURCE UNKNOWN: switch it off by hand" in terminal.seen.splitlines()[-1]
 
@@ -218,13 +225,13 @@ def test_a_terminal_that_goes_away_without_a_signal_ends_session_and_screen(tmp_
     terminal = on_terminal(str(db), "sim:?ratio=0.3&seed=1")
     driving(db)
     terminal.go_away()
-    assert terminal.ended() == 130
+    terminal.ends_by_signal()
     assert begun(db).state == "interrupted"
     assert begun(db).source_state is SourceState.CONFIRMED_OFF
     replay = on_terminal(str(db), program=REPLAY)
     replay.sees(b"REPLAY, no instrument")
     replay.go_away()
-    assert replay.ended() == 130
+    replay.ends_by_signal()
 
 
 def test_a_source_that_is_not_off_when_the_terminal_is_gone_is_an_exit_code(tmp_path, on_terminal):
@@ -232,7 +239,7 @@ def test_a_source_that_is_not_off_when_the_terminal_is_gone_is_an_exit_code(tmp_
     terminal = on_terminal(str(db), "sim:?fault=silence:point=5")
     driving(db)
     terminal.go_away()
-    assert terminal.ended(60.0) == 1
+    assert terminal.ended() == 1
     assert begun(db).source_state is SourceState.UNKNOWN
 
 
@@ -251,5 +258,5 @@ def test_a_terminal_that_takes_no_more_holds_no_signal_up_and_is_drawn_anew(tmp_
             terminal.look()
             terminal.sees(b"Unit under test")
     terminal.program.send_signal(signal.SIGTERM)
-    assert terminal.ended() == 130
+    terminal.ends_by_signal()
     assert begun(db).source_state is SourceState.CONFIRMED_OFF
