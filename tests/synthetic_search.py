@@ -74,6 +74,8 @@ def simulate_in(monkeypatch) -> Asked:
 
 def observed(effects, sizes, rng):
     """An observation of a machine with these effects at a ratio of 0.4."""
+    # It would pass for a search, and simulate a servo that has nothing to do with this world.
+    assert hunt.simulate_groups is not population.simulate_groups, "ask for the fixture `runs`"
     return synthetic.observation(read(effects, np.array([0.4, *sizes]), rng))
 
 

@@ -83,7 +83,7 @@ def test_a_search_that_has_spent_all_is_left_with_a_leader_that_explains_nothing
 @pytest.mark.parametrize("given_up", [False, True])
 @pytest.mark.parametrize("overdrawn", [False, True])
 def test_a_search_that_has_spent_all_holds_rare_causes_against_its_leader(
-    monkeypatch, overdrawn, given_up
+    runs, monkeypatch, overdrawn, given_up
 ):
     """A dead zone was left out, as pairs that explained nothing had taken all; and is no pair.
 
