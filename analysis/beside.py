@@ -9,7 +9,7 @@ It judges no hypothesis and keeps no run.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,11 +98,8 @@ def _add_up(
         return values.reshape(*values.shape[:-1], 3, -1)[..., rows][..., seen]
 
     one = additions.added[further]
-    sizes, shift, std = one.sizes, at_seen(one.shift[near]), at_seen(one.std[near])
-    if sizes.shape[1] == 1:
-        line = np.linspace(sizes[0], sizes[-1], _BETWEEN)
-        share = np.array([np.interp(line[:, 0], sizes[:, 0], each) for each in np.eye(len(sizes))])
-        sizes, shift, std = line, share.T @ shift, share.T @ std
+    own = replace(one, shift=at_seen(one.shift[near]), std=at_seen(one.std[near]))
+    sizes, shift, std = own.between(_BETWEEN)
     mean = at_seen(additions.plain[near].reshape(len(near), -1))[:, None] + shift
     for effect in known.effects:
         other = additions.added[(effect,)]

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from analysis.arithmetic import on_one_core
-from analysis.bounds import bound_causes
+from analysis.bounds import bound_beside, bound_causes
 from analysis.calibration import Calibrated
 from analysis.candidate import Candidate
 from analysis.certainty import hold_against_doubt
@@ -34,6 +34,7 @@ from analysis.sharpening import sharpen_candidate
 from analysis.sizing import size_candidate, widen_if_open
 from analysis.surely_off import hold_against_datasheet
 from analysis.swept import check_together, unit_doubts
+from analysis.unseen import Unseen
 from analysis.verdict import Judged, Verdict, judge_candidates
 from daq.errors import AnalysisError
 from daq.frf import FrequencyResponse
@@ -170,8 +171,12 @@ def _diagnose(
     best = base if sharp is None else sharp
     departures = find_departures(verdict.baseline.candidate, observation)
     left = find_departures(verdict.best.candidate, observation)
-    consistent = verdict.word == "consistent"
-    unseen = bound_causes(unit, searched.few, searched.atlas) if consistent else ()
+    few, atlas = searched.few, searched.atlas
+    unseen: tuple[Unseen, ...] = ()
+    if named:
+        unseen = bound_beside(unit, few, atlas, verdict.best.candidate, best)
+    elif verdict.word == "consistent":
+        unseen = bound_causes(unit, few, atlas)
     proposal = _proposal(unit, verdict, observation, seed, executor, progress)
     if progress is not None:
         progress(1.0, "done")

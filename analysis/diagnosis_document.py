@@ -16,7 +16,7 @@ from analysis.misfit import Departure
 from analysis.next_measurement import CLEAR_SIGMA, NextMeasurement
 from analysis.observation import Observation
 from analysis.swept import sweep_document, sweep_lines
-from analysis.unseen import Unseen, describe_unseen
+from analysis.unseen import Unseen, head_unseen, list_unseen
 from analysis.verdict import Judged, Verdict
 from sim.catalogue import CATALOGUE
 
@@ -54,8 +54,8 @@ class Diagnosis:
     deviation under the plain and the extended model. `departures`: of the
     measurement from the plain model; `left`: from the set that stands first, named or refused.
     `shape`, `left_shape`: both in words. `harmonics`: where nothing explains it, those measured
-    beside those of the set that stands first. `unseen`: where nothing is missing, how large each
-    cause may be all the same.
+    beside those of the set that stands first. `unseen`: how large each
+    cause may be all the same where nothing is missing, or each other one beside what is named.
     `cut_short`: whether a search that found no explanation did not try every set that was worth
     it, for what it may simulate. `simulated_s`: seconds of motion that were simulated for it.
     """
@@ -242,14 +242,14 @@ class Diagnosis:
             lines.append(
                 f"    {one.probability:6.3f}  {name}" + (f"  ({remark})" if remark else "")
             )
-        if self.unseen:
-            lines.append("  what may be there unseen, each by itself:")
-            lines += [f"    {one.effect}: {describe_unseen(one.to_json())}" for one in self.unseen]
         if self.next_measurement is not None:
             proposal = self.next_measurement
             lines.append(f"  {_proposed(proposal)}")
             lines.append(f"    {proposal.command}")
             lines.append("    and then diagnose the files of both measurements together")
+        if self.unseen:
+            lines.append(f"  {head_unseen(self.verdict.word)}:")
+            lines += [f"    {text}" for text in list_unseen([u.to_json() for u in self.unseen])]
         lines.append(f"  motion simulated for this: {self.simulated_s:.0f} s")
         lines += [f"  warning: {text}" for text in self.warnings]
         return lines

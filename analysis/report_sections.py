@@ -12,7 +12,7 @@ from typing import Any
 from analysis.features import with_error
 from analysis.markup import Markup, element, joined, table
 from analysis.swept import sweep_lines
-from analysis.unseen import describe_unseen
+from analysis.unseen import describe_unseen, head_unseen
 
 __all__ = [
     "diagnosis_section",
@@ -163,7 +163,7 @@ def diagnosis_section(data: Data, pictures: Sequence[tuple[Markup, str]]) -> Mar
         _residuals("Departures left with the causes", diagnosis.get("residual_after", []))
         if diagnosis["causes"]
         else Markup(""),
-        _unseen(diagnosis.get("unseen", [])),
+        _unseen(diagnosis.get("unseen", []), diagnosis["verdict"]),
         _next(diagnosis.get("next_measurement")),
         _notes(diagnosis.get("warnings", [])),
     )
@@ -340,12 +340,12 @@ def _residuals(title: str, bands: Sequence[Data]) -> Markup:
     return joined(element("h3", heading), table(rows, head))
 
 
-def _unseen(causes: Sequence[Data]) -> Markup:
+def _unseen(causes: Sequence[Data], verdict: str) -> Markup:
     if not causes:
         return Markup("")
     rows = [(one["effect"], describe_unseen(one)) for one in causes]
-    heading = "What may be there unseen, each by itself"
-    return joined(element("h3", heading), table(rows, ("cause", "size")))
+    heading = head_unseen(verdict)
+    return joined(element("h3", heading[0].upper() + heading[1:]), table(rows, ("cause", "size")))
 
 
 def _next(proposal: Data | None) -> Markup:

@@ -29,6 +29,7 @@ from analysis.surface import Surface
 from sim.unit import Unit
 
 __all__ = [
+    "Added",
     "Additions",
     "Place",
     "add_causes",
@@ -174,7 +175,7 @@ def rows_of(thinned: Observation, whole: Observation) -> NDArray[np.intp]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Added:
+class Added:
     """What a cause adds to the baseline.
 
     `sizes` (count, d - 1); `shift`, `std` (ratios, count, 3 rows): by how much it
@@ -184,6 +185,17 @@ class _Added:
     sizes: NDArray[np.float64]
     shift: NDArray[np.float64]
     std: NDArray[np.float64]
+
+    def between(
+        self, count: int
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """The same at so many sizes, between those there are; of one with several sizes as is."""
+        sizes = self.sizes
+        if sizes.shape[1] > 1:
+            return sizes, self.shift, self.std
+        line = np.linspace(sizes[0], sizes[-1], count)
+        share = np.array([np.interp(line[:, 0], sizes[:, 0], one) for one in np.eye(len(sizes))])
+        return line, share.T @ self.shift, share.T @ self.std
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -196,7 +208,7 @@ class Additions:
 
     coarse: Observation
     plain: NDArray[np.float64]
-    added: Mapping[Effects, _Added]
+    added: Mapping[Effects, Added]
     felt: Mapping[Effects, Surface]
 
 
@@ -211,7 +223,7 @@ def add_causes(unit: Unit, coarse: Observation, atlas: Atlas) -> Additions:
     return Additions(coarse, plain, dict(zip(causes, added, strict=True)), felt)
 
 
-def _added(surface: Surface, plain: NDArray[np.float64]) -> _Added:
+def _added(surface: Surface, plain: NDArray[np.float64]) -> Added:
     sizes = mesh([_centres(count) for count in _PAIR_SIZES[surface.places.shape[1]]])
     ratios = ratios_of_pairs()
     expected = np.array(
@@ -219,10 +231,10 @@ def _added(surface: Surface, plain: NDArray[np.float64]) -> _Added:
     )
     flat = expected.reshape(*expected.shape[:3], -1)
     shift = flat[:, :, 0] - plain.reshape(len(plain), 1, -1)
-    return _Added(sizes, np.ascontiguousarray(shift), np.ascontiguousarray(flat[:, :, 1]))
+    return Added(sizes, np.ascontiguousarray(shift), np.ascontiguousarray(flat[:, :, 1]))
 
 
-def _best_pair(plain: NDArray[np.float64], first: _Added, second: _Added) -> Place:
+def _best_pair(plain: NDArray[np.float64], first: Added, second: Added) -> Place:
     places = []
     for at, ratio in enumerate(ratios_of_pairs()):
         likelihood = total_densities(

@@ -1,4 +1,4 @@
-"""What may be there though nothing was found: a cause, and between which sizes it does not show.
+"""What may be there beside what was found: a cause, and between which sizes it does not show.
 
 Owns the record of it, as a document and in words for a person. It imports nothing heavy, so that a
 screen may say it; the sizes are computed in `analysis.bounds`.
@@ -6,16 +6,16 @@ screen may say it; the sizes are computed in `analysis.bounds`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["Unseen", "describe_unseen"]
+__all__ = ["Unseen", "describe_unseen", "head_unseen", "list_unseen"]
 
 
 @dataclass(frozen=True, slots=True)
 class Unseen:
-    """Between which sizes a cause may be there unseen, if it is the only one.
+    """Between which sizes a cause may be there unseen, if no other is there but what is named.
 
     `parameter` is its first; the others may be anything. `low`, `high`: the nearest sizes that are
     ruled out, None where none is on that side. Most causes are absent at zero and have a `high`
@@ -39,6 +39,20 @@ class Unseen:
             "high": self.high,
             "datasheet": self.datasheet,
         }
+
+
+def head_unseen(verdict: str) -> str:
+    """What stands above the entries of ``unseen`` of a diagnosis with that verdict."""
+    beside = "" if verdict == "consistent" else " beside what is named"
+    return f"what may be there unseen{beside}, each by itself"
+
+
+def list_unseen(entries: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The entries of ``unseen`` a line each, those that say something of their cause first."""
+    silent = [one["effect"] for one in entries if one["low"] is None is one["high"]]
+    told = [one for one in entries if one["effect"] not in silent]
+    lines = [f"{one['effect']}: {describe_unseen(one)}" for one in told]
+    return [*lines, f"of any size: {', '.join(silent)}"] if silent else lines
 
 
 def describe_unseen(unseen: Mapping[str, Any]) -> str:

@@ -188,8 +188,13 @@ def test_a_diagnosis_is_told_with_causes_rivals_and_what_next():
     judged = "\n".join(diagnosis_lines(nothing | {"rivals": [plain]}))
     assert "\nSets judged\n - no cause  probability 0.70" in judged
     load = Unseen("load-inertia", "J_L", "kg.m^2", 0.0026, 0.0029, 0.00275)
-    text = "\n".join(diagnosis_lines(nothing | {"unseen": [load.to_json()]}))
-    assert "unseen, each by itself\n - load-inertia  J_L 0.0026 to 0.0029 kg.m^2" in text
+    size = "\n - load-inertia: J_L 0.0026 to 0.0029 kg.m^2"
+    plain = nothing | {"verdict": "consistent", "unseen": [load.to_json()]}
+    assert f"\n\nWhat may be there unseen, each by itself{size}" in "\n".join(
+        diagnosis_lines(plain)
+    )
+    named = "\n".join(diagnosis_lines(DIAGNOSIS | {"unseen": [load.to_json()]}))
+    assert f"\n\nWhat may be there unseen beside what is named, each by itself{size}" in named
 
 
 def test_without_colour_everything_is_still_said(tmp_path, monkeypatch):

@@ -15,7 +15,7 @@ from textual.containers import VerticalScroll
 from textual.widgets import ProgressBar, Static
 
 from analysis.swept import sweep_lines
-from analysis.unseen import describe_unseen
+from analysis.unseen import head_unseen, list_unseen
 from daq.errors import LashbenchError
 from tui.app.desk import plan_of_document
 from tui.app.step_screen import StepScreen
@@ -166,9 +166,6 @@ def diagnosis_lines(document: Mapping[str, Any]) -> list[str]:
             names = " + ".join(rival["causes"]) or "no cause"
             remark = f" ({rival['remark']})" if rival.get("remark") else ""
             lines.append(f" - {names}  probability {rival['probability']:.2f}{remark}")
-    if document.get("unseen"):
-        lines += ["", "May be there unseen, each by itself"]
-        lines += [f" - {one['effect']}  {describe_unseen(one)}" for one in document["unseen"]]
     ratio = document.get("contribution_ratio")
     if ratio:
         lines += ["", f"contribution ratio before {_value(ratio['baseline'])}, "
@@ -179,6 +176,10 @@ def diagnosis_lines(document: Mapping[str, Any]) -> list[str]:
         apart = " from ".join(proposed["separates"])
         sigma = _number(proposed.get("expected_sigma"))
         lines += ["", f"MEASURE THIS NEXT (key N): tells {apart}, {sigma} sigma expected"]
+    if document.get("unseen"):
+        heading = head_unseen(document["verdict"])
+        lines += ["", heading[0].upper() + heading[1:]]
+        lines += [f" - {text}" for text in list_unseen(document["unseen"])]
     return lines
 
 
