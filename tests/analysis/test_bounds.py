@@ -264,8 +264,7 @@ FOUND_FIRST = ("amplifier-saturation", "mesh2-damping", "shaft-damping", "tachom
 
 
 def test_a_small_cause_beside_a_larger_one_is_not_ruled_out_and_a_large_one_is():
-    # Of a hundred drawn so, of all causes, about one was; two of three are rarer than one in
-    # a thousand.
+    # Of 137 drawn so none was; were it one in fifty, two of three would be rarer than one in 800.
     ruled_out = []
     for sequence in np.random.SeedSequence().spawn(3):
         seed = int(sequence.generate_state(1)[0] % 2**31)
@@ -279,7 +278,7 @@ def test_a_small_cause_beside_a_larger_one_is_not_ruled_out_and_a_large_one_is()
         sharp = size_candidate(found, few, rng)
         bounded = told(bound_beside(unit, few, atlas, found, sharp))
         assert first not in bounded
-        assert not may_be(bounded["load-viscous-damping"], 5.0), seed
+        assert not may_be(bounded["load-viscous-damping"], 0.4), seed
         if not may_be(bounded[cause], size):
             ruled_out.append((seed, first, bounded[cause], size))
     assert len(ruled_out) < 2, ruled_out
