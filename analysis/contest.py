@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.adequacy import judge_adequacy
+from analysis.baseline_runs import level_baseline
 from analysis.candidate import Candidate, Effects
 from analysis.doubt import is_doubtful, is_given_up, is_nothing_missing, is_refused_now
 from analysis.holdout import AT_NOISE, HeldOut, hold_out
@@ -21,7 +22,6 @@ from analysis.hunt import Hunt
 from analysis.likeness import is_felt_alike, plainer_places
 from analysis.parts import parts_of, places_of_parts
 from analysis.plausibility import is_pressed
-from analysis.verdict import LEAST_LEAD, may_be_chance
 
 __all__ = [
     "CLOSE",
@@ -38,7 +38,6 @@ __all__ = [
     "see_it_predict",
     "settle",
     "settle_doubt",
-    "weigh_baseline",
     "weigh_parts",
     "weigh_plainer",
 ]
@@ -122,6 +121,8 @@ def compare(fine: Hunt, rng: np.random.Generator) -> bool:
     missing = True
     for done, (most, behind) in enumerate(_LAST_ROUNDS):
         missing = not is_nothing_missing(fine, rng)
+        if not missing and level_baseline(fine):
+            missing = not is_nothing_missing(fine, rng)
         if not missing or _is_left(fine, rng):
             break
         first, *near = fine.leading(most, behind)
@@ -367,25 +368,6 @@ def _is_open(fine: Hunt, part: Effects, place: NDArray[np.float64], hopeful: boo
 def _is_at(one: Candidate, place: NDArray[np.float64]) -> bool:
     """Whether a candidate is best about a place (d,)."""
     return bool(np.all(abs(one.best.place - place) <= _MOVED))
-
-
-def weigh_baseline(fine: Hunt, rng: np.random.Generator) -> None:
-    """Give the plain model more runs where few of its own say that the leader leads by chance.
-
-    They fit each other badly, and what leads has more: larger play led by 178, and by as much in
-    three of the 39 runs that the plain model could be asked about.
-    """
-    while (leader := fine.best).hypothesis.effects:
-        baseline = fine.found[()]
-        lead = leader.best.log_likelihood - baseline.best.log_likelihood
-        if lead < LEAST_LEAD or len(baseline.population) >= len(leader.population):
-            return
-        # Chance of its own: where it is not called for all comes out as if it had not been asked.
-        own = rng.spawn(1)[0]
-        if not may_be_chance(baseline, leader, judge_adequacy(baseline, own).sigma, own):
-            return
-        fine.settle([()], LAST_GROUPS)
-        fine.hear()
 
 
 def _say_the_same(one: Candidate, other: Candidate) -> bool:

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from analysis.atlas import Atlas, coarse_stride, make_atlas
+from analysis.baseline_runs import weigh_baseline
 from analysis.candidate import Candidate, Effects
 from analysis.contest import (
     CLOSE,
@@ -30,7 +31,6 @@ from analysis.contest import (
     look_at_every_ratio,
     see_it_predict,
     settle_doubt,
-    weigh_baseline,
     weigh_parts,
     weigh_plainer,
 )
