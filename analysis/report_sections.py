@@ -344,8 +344,7 @@ def _unseen(causes: Sequence[Data], verdict: str) -> Markup:
     if not causes:
         return Markup("")
     rows = [(one["effect"], describe_unseen(one)) for one in causes]
-    heading = head_unseen(verdict)
-    return joined(element("h3", heading[0].upper() + heading[1:]), table(rows, ("cause", "size")))
+    return joined(element("h3", head_unseen(verdict).capitalize()), table(rows, ("cause", "size")))
 
 
 def _next(proposal: Data | None) -> Markup:

@@ -108,17 +108,20 @@ def test_what_is_felt_alike_speaks_for_a_size_too(monkeypatch):
 ROWS, SCATTER = 40, 0.1
 
 
-def beside(monkeypatch, effect, slope, offset=0.0, left=0.0):
+def beside(monkeypatch, effect, slope, offset=0.0, left=0.0, wider=0.0):
     """What is told of a cause that adds so much per coordinate beside one that was found.
 
-    `offset`: what the sum gets wrong at all sizes; `left`: what the one that was found leaves.
+    `offset`: what the sum gets wrong at all sizes; `left`: what the one that was found leaves;
+    `wider`: how much wider single runs of it scatter at its largest, as a share.
     """
     hypothesis = Hypothesis(ADSS, (effect,))
     coordinates = (np.arange(13) + 0.5) / 13
     known = hypothesis.datasheet[0]
     size = coordinates - (0.5 / 13 if np.isnan(known) else known)
     shift = np.tile((slope * size + offset)[None, :, None], (15, 1, 3 * ROWS))
-    added = Added(coordinates[:, None], shift, np.full_like(shift, SCATTER))
+    scatter = SCATTER * (1.0 + wider * coordinates)
+    std = np.tile(scatter[None, :, None], (15, 1, 3 * ROWS))
+    added = Added(coordinates[:, None], shift, std)
     additions = Additions(None, None, {(effect,): added, FOUND: added}, {})
     monkeypatch.setattr(bounds, "add_causes", lambda *_: additions)
     monkeypatch.setattr(bounds, "rows_of", lambda *_: np.arange(ROWS))
@@ -158,7 +161,7 @@ def test_beside_what_was_found_a_cause_is_bounded_by_what_it_would_add(monkeypat
 
 
 def test_what_a_sum_gets_wrong_where_a_cause_does_nothing_speaks_against_no_size(monkeypatch):
-    off = 1.2 * apart_at(AGAINST)
+    off = 2.0 * apart_at(AGAINST)
     found = beside(monkeypatch, "load-inertia", apart_at(AGAINST) / 0.05, offset=off)
     assert found.low < found.datasheet < found.high
 
@@ -168,6 +171,11 @@ def test_what_would_take_away_what_is_left_is_not_ruled_out(monkeypatch):
     # What was found leaves as much as a cable 0.6 above nothing would add.
     found = beside(monkeypatch, "cable-stiffness", slope, left=-0.6 * slope)
     assert (found.high or np.inf) > size_at("cable-stiffness", 0.5 / 13 + 0.6)
+
+
+def test_that_runs_of_a_cause_lie_far_apart_speaks_against_no_size(monkeypatch):
+    found = beside(monkeypatch, "cable-stiffness", 0.0, wider=2.0)
+    assert (found.low, found.high) == (None, None)
 
 
 @pytest.mark.parametrize(
@@ -238,10 +246,7 @@ def test_a_small_cause_that_is_there_is_not_ruled_out():
     # Of 176 drawn so, either unit and all causes, one was; with one in sixty two of three are rarer
     # than one in a thousand.
     ruled_out = []
-    for sequence in np.random.SeedSequence().spawn(3):
-        seed = int(sequence.generate_state(1)[0] % 2**31)
-        rng = np.random.default_rng(seed)
-        unit = load_unit(str(rng.choice(["adss", "edss"])))
+    for seed, unit, rng in drawn(3):
         cause, settings, size = small(
             unit, rng.choice(SMALL), ratio := rng.uniform(0.05, 0.95), rng
         )
@@ -249,6 +254,14 @@ def test_a_small_cause_that_is_there_is_not_ruled_out():
         if not may_be(one, size):
             ruled_out.append((seed, one, size))
     assert len(ruled_out) < 2, ruled_out
+
+
+def drawn(count):
+    """So many seeds of chance, each with a unit and what else is drawn from it."""
+    for sequence in np.random.SeedSequence().spawn(count):
+        seed = int(sequence.generate_state(1)[0] % 2**31)
+        rng = np.random.default_rng(seed)
+        yield seed, load_unit(str(rng.choice(["adss", "edss"]))), rng
 
 
 def small(unit, effect, ratio, rng):
@@ -266,10 +279,7 @@ FOUND_FIRST = ("amplifier-saturation", "mesh2-damping", "shaft-damping", "tachom
 def test_a_small_cause_beside_a_larger_one_is_not_ruled_out_and_a_large_one_is():
     # Of 137 drawn so none was; were it one in fifty, two of three would be rarer than one in 800.
     ruled_out = []
-    for sequence in np.random.SeedSequence().spawn(3):
-        seed = int(sequence.generate_state(1)[0] % 2**31)
-        rng = np.random.default_rng(seed)
-        unit = load_unit(str(rng.choice(["adss", "edss"])))
+    for seed, unit, rng in drawn(3):
         first, ratio = str(rng.choice(FOUND_FIRST)), rng.uniform(0.05, 0.95)
         cause, settings, size = small(unit, rng.choice(SMALL), ratio, rng)
         effects = (hidden.drawn_effect(unit, first, rng), *settings)

@@ -287,6 +287,15 @@ def test_where_nothing_was_found_it_is_told_what_may_be_there_all_the_same(
     assert unexplained.to_json()["unseen"] == []
 
 
+def test_beside_what_is_named_it_is_told_what_else_may_be_there(monkeypatch):
+    named = makings.diagnosis(monkeypatch, LOAD, [LOAD, STIFF])
+    assert named.verdict.best.effects == LOAD
+    told, document = named.summary(), named.to_json()["unseen"]
+    assert [one["effect"] for one in document] == [*STIFF]
+    at = told.index("  what may be there unseen beside what is named, each by itself:")
+    assert told[at + 1] == f"    {list_unseen(document)[0]}"
+
+
 def test_a_cause_that_is_likelier_than_nothing_by_chance_is_told(monkeypatch):
     plain = makings.diagnosis(monkeypatch, (), [LOAD, STIFF])
     assert plain.summary()[0].endswith("is needed to explain this response.")

@@ -177,8 +177,7 @@ def diagnosis_lines(document: Mapping[str, Any]) -> list[str]:
         sigma = _number(proposed.get("expected_sigma"))
         lines += ["", f"MEASURE THIS NEXT (key N): tells {apart}, {sigma} sigma expected"]
     if document.get("unseen"):
-        heading = head_unseen(document["verdict"])
-        lines += ["", heading[0].upper() + heading[1:]]
+        lines += ["", head_unseen(document["verdict"]).capitalize()]
         lines += [f" - {text}" for text in list_unseen(document["unseen"])]
     return lines
 
