@@ -16,7 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.answer import CALL_FOR_DIAGNOSIS
 from analysis.arithmetic import on_one_core
+from analysis.backlash import Uncertain, backlash_of_places
 from analysis.ensemble import Machine
 from analysis.executor import Executor
 from analysis.fit import Posterior, fit_posterior
@@ -36,29 +38,14 @@ _WIDE_RESIDUAL = 1.35
 """Robust residual, in standard deviations, from which the model is said to lack something."""
 
 
-@dataclass(frozen=True, slots=True)
-class Uncertain:
-    """A value with one standard deviation and, where known, its 95 % interval."""
-
-    value: float
-    std: float
-    interval95: tuple[float, float] | None = None
-
-    def to_json(self) -> dict[str, Any]:
-        """As JSON; the interval only where there is one."""
-        content: dict[str, Any] = {"value": self.value, "std": self.std}
-        if self.interval95 is not None:
-            content["interval95"] = list(self.interval95)
-        return content
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Estimate:
     """The estimate of both stages' backlash.
 
     `curve` is the paper's error index over the ratio, None where the response
     shows no pair of features. `simulated_s` says how many seconds of motion
-    were simulated for it; `sweeps` what was swept, where it was a response.
+    were simulated for it; `sweeps` what was swept, where it was a response. `refuted`: whether
+    the plain model does not fit, so that its numbers are no answer before a diagnosis.
     """
 
     unit: str
@@ -70,6 +57,7 @@ class Estimate:
     warnings: tuple[str, ...]
     simulated_s: float
     sweeps: tuple[dict[str, Any], ...] = ()
+    refuted: bool = False
 
     def to_json(self) -> dict[str, Any]:
         """The document of ``estimate --json``."""
@@ -81,6 +69,7 @@ class Estimate:
             "b_t_deg": self.b_t_deg.to_json(),
             "error_index": None if self.curve is None else self.curve.to_json(),
             "sweeps": list(self.sweeps),
+            "refuted": self.refuted,
             "warnings": list(self.warnings),
             "simulated_s": self.simulated_s,
         }
@@ -162,10 +151,14 @@ def estimate_response(
     if misfit > _WIDE_RESIDUAL:
         warnings.append(
             f"the model leaves {misfit:.1f} standard deviations of the response unexplained; "
-            "run diagnose before trusting the ratio"
+            f"{CALL_FOR_DIAGNOSIS}"
         )
     found = _from_posterior(unit, posterior, curve, tuple(warnings), effort.simulated_s)
-    return replace(found, sweeps=tuple(sweep_document(plan) for plan, _ in observation.plans))
+    return replace(
+        found,
+        sweeps=tuple(sweep_document(plan) for plan, _ in observation.plans),
+        refuted=misfit > _WIDE_RESIDUAL,
+    )
 
 
 @on_one_core()
@@ -192,7 +185,7 @@ def estimate_features(
         fitted = fit_features(arf_hz, rf_hz, unit, seed=seed, progress=progress)
     warnings = list(fitted.warnings)
     b_t = unit.backlash.b_t_deg
-    return _assemble(
+    found = _assemble(
         unit,
         fitted.ratios,
         np.full_like(fitted.ratios, b_t),
@@ -201,6 +194,7 @@ def estimate_features(
         tuple(warnings),
         effort.simulated_s,
     )
+    return replace(found, refuted=bool(fitted.warnings))
 
 
 def free_axes(unit: Unit, total_backlash_unknown: bool = False) -> tuple[Axis, ...]:
@@ -263,32 +257,14 @@ def _assemble(
     simulated_s: float,
 ) -> Estimate:
     """Equations (15) and (20) applied to every place of the posterior."""
-    b_t = _uncertain(total_deg, weight)
+    found = backlash_of_places(unit, ratios, total_deg, weight)
     return Estimate(
         unit=unit.name,
-        contribution_ratio=_uncertain(ratios, weight),
-        b1_deg=_uncertain(ratios * total_deg * unit.output_ratio, weight),
-        b2_deg=_uncertain((1.0 - ratios) * total_deg, weight),
-        # A total that was taken from the unit's file has no interval to be told.
-        b_t_deg=b_t if b_t.std else replace(b_t, interval95=None),
+        contribution_ratio=found.contribution_ratio,
+        b1_deg=found.b1_deg,
+        b2_deg=found.b2_deg,
+        b_t_deg=found.b_t_deg,
         curve=curve,
         warnings=warnings,
         simulated_s=simulated_s,
     )
-
-
-def _uncertain(values: NDArray[np.float64], weight: NDArray[np.float64]) -> Uncertain:
-    """Mean, standard deviation and central 95 % interval of a weighted grid.
-
-    A number that is the same everywhere is known, without the rounding of weights
-    that add up to one but for the last digit.
-    """
-    if np.ptp(values) == 0.0:
-        value = float(values[0])
-        return Uncertain(value, 0.0, (value, value))
-    mean = float(weight @ values)
-    std = float(np.sqrt(weight @ (values - mean) ** 2))
-    order = np.argsort(values, kind="stable")
-    ranked, share = values[order], np.cumsum(weight[order]) - 0.5 * weight[order]
-    low, high = np.interp([0.025, 0.975], share, ranked)
-    return Uncertain(mean, std, (float(low), float(high)))

@@ -1,0 +1,141 @@
+"""Which model of the unit is accepted, and what that model says of the backlash of each stage.
+
+Owns the choice between the plain model and an extended one, from the documents of
+``estimate --json`` and ``diagnose --json`` alone. It computes no number and words no advice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+__all__ = ["CALL_FOR_DIAGNOSIS", "QUANTITIES", "Answer", "State", "accept_model", "model_name"]
+
+Number = Mapping[str, Any]
+"""``{"value", "std"}``, with ``"interval95"`` where it is known."""
+
+State = Literal["accepted", "not judged", "open", "refuted", "none"]
+
+QUANTITIES = ("contribution_ratio", "b1_deg", "b2_deg", "b_t_deg")
+
+CALL_FOR_DIAGNOSIS = "run diagnose before trusting the ratio"
+"""End of the warning by which an estimate says that the plain model does not fit."""
+
+PLAIN = "plain model"
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What is known of the backlash of a unit, and from which model.
+
+    Parameters
+    ----------
+    state
+        "accepted": a diagnosis accepts one model. "not judged": the estimate of the plain model
+        fits, and no diagnosis was made. "open": a diagnosis leaves several models. "refuted":
+        the plain model does not fit and no other model is accepted. "none": nothing was
+        estimated.
+    source
+        Where the numbers come from, in words for a person.
+    numbers
+        The numbers of `QUANTITIES` of the model in force; empty where the state is "open",
+        "refuted" or "none".
+    models
+        Every model that may be true, the accepted or likeliest first. Each holds ``causes``,
+        ``probability`` (None where it was not judged) and `QUANTITIES`.
+    diagnosed
+        Whether a diagnosis was made.
+    """
+
+    state: State
+    source: str
+    numbers: Mapping[str, Number]
+    models: tuple[Mapping[str, Any], ...] = ()
+    diagnosed: bool = False
+
+    @property
+    def contribution_ratio(self) -> Number | None:
+        """Share of stage 1 in the backlash seen at the output; None where no model is in force."""
+        return self.numbers.get("contribution_ratio")
+
+    @property
+    def b1_deg(self) -> Number | None:
+        """Backlash of stage 1, degrees at shaft 1; None where no model is in force."""
+        return self.numbers.get("b1_deg")
+
+    @property
+    def b2_deg(self) -> Number | None:
+        """Backlash of stage 2, degrees at the output; None where no model is in force."""
+        return self.numbers.get("b2_deg")
+
+    @property
+    def b_t_deg(self) -> Number | None:
+        """Total backlash, degrees at the output; None where no model is in force."""
+        return self.numbers.get("b_t_deg")
+
+
+def accept_model(
+    estimate: Mapping[str, Any] | None, diagnosis: Mapping[str, Any] | None = None
+) -> Answer:
+    """Choose the model whose numbers are told.
+
+    A diagnosis decides where there is one. Without it the plain model is taken, unless the
+    estimate itself says that this model does not fit.
+
+    Parameters
+    ----------
+    estimate
+        Document of ``estimate --json``; None, or a document without a ratio, if there is none.
+    diagnosis
+        Document of ``diagnose --json`` of the same points; None if none was made.
+    """
+    if diagnosis is not None and "verdict" in diagnosis:
+        return _of_diagnosis(diagnosis)
+    if estimate is None or estimate.get("contribution_ratio") is None:
+        return Answer("none", "no estimate: none", {})
+    if _refuted(estimate):
+        return Answer("refuted", f"{PLAIN} refuted: none", {})
+    numbers = _numbers(estimate)
+    model: dict[str, Any] = {"causes": [], "probability": None, **numbers}
+    return Answer("not judged", f"{PLAIN}, not judged", numbers, (model,))
+
+
+def _refuted(estimate: Mapping[str, Any]) -> bool:
+    """Whether an estimate says that the plain model does not fit; older ones say it in words."""
+    said = estimate.get("refuted")
+    if said is not None:
+        return bool(said)
+    return any(CALL_FOR_DIAGNOSIS in str(text) for text in estimate.get("warnings") or ())
+
+
+def _of_diagnosis(diagnosis: Mapping[str, Any]) -> Answer:
+    word = diagnosis["verdict"]
+    if word == "unexplained":
+        source = f"{PLAIN} refuted, and no known cause explains the response: none"
+        return Answer("refuted", source, {}, diagnosed=True)
+    models = tuple(diagnosis.get("models") or ())
+    if word == "ambiguous":
+        names = _either([model_name(model["causes"]) for model in models])
+        source = f"undecided between {names}: none" if models else "undecided: none"
+        return Answer("open", source, {}, models, diagnosed=True)
+    causes = [cause["effect"] for cause in diagnosis["causes"]]
+    source = f"extended by {' and '.join(causes)}" if causes else f"{PLAIN}, consistent"
+    ratio = diagnosis["contribution_ratio"]["extended"]
+    numbers = _numbers({**diagnosis, "contribution_ratio": ratio})
+    if not models:
+        models = ({"causes": causes, "probability": None, **numbers},)
+    return Answer("accepted", source, numbers, models, diagnosed=True)
+
+
+def model_name(causes: Sequence[str]) -> str:
+    """A model in words: its causes, or that it is the plain one."""
+    return " with ".join(causes) or PLAIN
+
+
+def _either(names: Sequence[str]) -> str:
+    return " or ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
+
+
+def _numbers(document: Mapping[str, Any]) -> dict[str, Number]:
+    return {name: document[name] for name in QUANTITIES if document.get(name) is not None}

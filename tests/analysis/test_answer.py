@@ -1,0 +1,101 @@
+"""Which model's numbers are told, from the documents of an estimate and of a diagnosis."""
+
+import pytest
+
+from analysis.answer import QUANTITIES, accept_model
+
+WARNED = ["the model leaves 5.4 standard deviations of the response unexplained; run diagnose "
+          "before trusting the ratio"]  # fmt: skip
+
+
+def number(value, std=0.01):
+    return {"value": value, "std": std, "interval95": [value - 2 * std, value + 2 * std]}
+
+
+def estimated(ratio=0.6, **more):
+    return {
+        "contribution_ratio": number(ratio),
+        "b1_deg": number(0.4),
+        "b2_deg": number(0.03),
+        "b_t_deg": {"value": 0.066, "std": 0.0},
+        "warnings": [],
+    } | more
+
+
+def model(*causes, ratio, probability=0.9):
+    rest = {"b1_deg": number(0.1), "b2_deg": number(0.05), "b_t_deg": number(0.07)}
+    return {
+        "causes": list(causes),
+        "probability": probability,
+        "contribution_ratio": number(ratio),
+        **rest,
+    }
+
+
+def diagnosed(verdict, *models):
+    first = models[0] if models else None
+    accepted = first if verdict in ("consistent", "explained") else None
+    baseline = number(0.6)
+    return {
+        "verdict": verdict,
+        "causes": [{"effect": name} for name in first["causes"]] if first else [],
+        "contribution_ratio": {
+            "baseline": baseline,
+            "extended": first["contribution_ratio"] if first else baseline,
+        },
+        **{name: accepted and accepted[name] for name in QUANTITIES[1:]},
+        "models": list(models),
+    }
+
+
+def test_an_explained_diagnosis_replaces_the_estimate_it_refutes():
+    answer = accept_model(
+        estimated(0.6, warnings=WARNED), diagnosed("explained", model("load-inertia", ratio=0.17))
+    )
+    assert (answer.state, answer.source) == ("accepted", "extended by load-inertia")
+    assert answer.contribution_ratio["value"] == 0.17
+    assert answer.b1_deg["value"] == 0.1
+    assert answer.b_t_deg["value"] == 0.07
+
+
+def test_a_consistent_diagnosis_accepts_the_plain_model_by_its_own_numbers():
+    answer = accept_model(estimated(0.6), diagnosed("consistent", model(ratio=0.58)))
+    assert (answer.state, answer.source) == ("accepted", "plain model, consistent")
+    assert answer.contribution_ratio["value"] == 0.58
+
+
+@pytest.mark.parametrize("estimate", [estimated(0.6), estimated(0.6, warnings=WARNED), None])
+def test_no_number_is_told_where_a_diagnosis_accepts_no_model(estimate):
+    unexplained = accept_model(estimate, diagnosed("unexplained"))
+    assert (unexplained.state, unexplained.numbers) == ("refuted", {})
+    assert unexplained.source.endswith(": none")
+    left = accept_model(
+        estimate, diagnosed("ambiguous", model("load-inertia", ratio=0.2), model(ratio=0.7))
+    )
+    assert (left.state, left.contribution_ratio, left.b1_deg) == ("open", None, None)
+    assert left.source == "undecided between load-inertia or plain model: none"
+    assert len(left.models) == 2
+
+
+@pytest.mark.parametrize(
+    "refuted",
+    # Histories hold estimates of earlier versions, which say it in words alone.
+    [{"refuted": True}, {"warnings": WARNED}, {"refuted": True, "warnings": WARNED}],
+)
+def test_a_refuted_plain_model_gives_no_number_before_a_diagnosis(refuted):
+    answer = accept_model(estimated(**refuted))
+    assert (answer.state, answer.source) == ("refuted", "plain model refuted: none")
+    assert (answer.contribution_ratio, answer.models, answer.diagnosed) == (None, (), False)
+
+
+def test_an_estimate_that_fits_is_told_as_not_judged():
+    answer = accept_model(estimated(0.6, refuted=False, warnings=["names unit EDSS"]))
+    assert (answer.state, answer.source) == ("not judged", "plain model, not judged")
+    assert answer.contribution_ratio["value"] == 0.6
+    assert answer.b_t_deg == {"value": 0.066, "std": 0.0}
+
+
+@pytest.mark.parametrize("estimate", [None, {}, {"failed": "no usable point"}])
+def test_nothing_estimated_is_told_as_such(estimate):
+    answer = accept_model(estimate)
+    assert (answer.state, answer.numbers) == ("none", {})
