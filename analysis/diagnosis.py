@@ -30,6 +30,7 @@ from analysis.observation import Observation, observe
 from analysis.progress import Progress, part_of
 from analysis.search import search_causes
 from analysis.second_thoughts import UNDOING, think_again
+from analysis.settled import settled
 from analysis.sharpening import sharpen_candidate
 from analysis.sizing import size_candidate, widen_if_open
 from analysis.surely_off import hold_against_datasheet
@@ -91,8 +92,9 @@ def diagnose_response(
     InputError
         If the responses are said to be of different units or specimens, or one is there twice.
     """
-    responses = (response, *further)
+    responses: tuple[FrequencyResponse, ...] = (response, *further)
     check_together(responses)
+    responses = tuple(map(settled, responses))
     if unit.stages == 1:
         raise AnalysisError(
             f"unit {unit.name} has one gear stage, and the search shares the backlash out between "

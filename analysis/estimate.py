@@ -26,6 +26,7 @@ from analysis.lattice import RATIO, Axis
 from analysis.observation import observe
 from analysis.paper_estimate import IndexCurve, index_curve_of_response
 from analysis.progress import Progress
+from analysis.settled import settled
 from analysis.swept import check_together, sweep_document, sweep_lines
 from daq.errors import InputError
 from daq.frf import FrequencyResponse
@@ -138,14 +139,15 @@ def estimate_response(
     InputError
         If the responses are said to be of different units or specimens, or one is there twice.
     """
-    responses = (response, *further)
+    responses: tuple[FrequencyResponse, ...] = (response, *further)
     check_together(responses)
+    responses = tuple(map(settled, responses))
     observation, axes = observe(*responses), free_axes(unit, total_backlash_unknown)
     with counting() as effort:
         posterior = fit_posterior(
             unit, observation, axes, seed=seed, cache=cache, executor=executor, progress=progress
         )
-    curve = index_curve_of_response(response, observation, posterior.draws)
+    curve = index_curve_of_response(responses[0], observation, posterior.draws)
     warnings = []
     misfit = _robust_rms(posterior)
     if misfit > _WIDE_RESIDUAL:

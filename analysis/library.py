@@ -80,7 +80,7 @@ def run_families(
 def run_name(unit: Unit, family: Sequence[Machine], observation: Observation) -> str:
     """File name of a family's runs, another for everything that they depend on."""
     machines = [asdict(machine) for machine in family]
-    known = [_EDITION, unit.model_dump(mode="json"), observation.sweeps(), machines]
+    known = [_EDITION, unit.physics, observation.sweeps(), machines]
     mark = hashlib.sha256(json.dumps(known, sort_keys=True).encode()).hexdigest()[:24]
     return f"runs-{mark}.npz"
 

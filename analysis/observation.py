@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.settled import settled
 from daq.errors import AnalysisError, InputError
 from daq.frf import DB_PER_NEPER, GAIN_STD_COMPONENTS, FrequencyResponse, PointFlag
 from daq.plan import SweepPlan
@@ -218,6 +219,7 @@ def _levels(number: int, response: FrequencyResponse) -> Iterator[_Level]:
             "the response does not say at which source level it was swept, and a servo with play "
             "answers differently at each; write the level into it (docs/how-to/foreign-files.md)"
         )
+    response = settled(response)
     usable = ((response.flags & (PointFlag.SPOILT | PointFlag.OVERLOAD)) == 0) & (
         np.abs(response.gain) > 0
     )

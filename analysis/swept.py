@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from analysis.settled import settled
 from daq.errors import InputError
 from daq.frf import FrequencyResponse
 from daq.plan import SweepPlan
@@ -41,7 +42,7 @@ def check_together(responses: Sequence[FrequencyResponse]) -> None:
                 f"the responses are of different {what}, {' and '.join(different)}; "
                 "take them one by one"
             )
-    for one, other in combinations(responses, 2):
+    for one, other in combinations(map(settled, responses), 2):
         if np.array_equal(one.gain, other.gain):
             raise InputError("a response was given twice; it says no more than once")
 

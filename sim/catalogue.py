@@ -17,7 +17,16 @@ from typing import Any
 
 from daq.errors import ConfigurationError
 from sim.drivetrain import Drivetrain, shaft_end
-from sim.effect import Effect, EffectParameter, around, drive_voltage, span, table_1, times
+from sim.effect import (
+    Effect,
+    EffectParameter,
+    around,
+    drive_voltage,
+    load_frequency,
+    span,
+    table_1,
+    times,
+)
 from sim.elements import (
     ConstantTorque,
     Damper,
@@ -265,7 +274,7 @@ _ALL = (
         "payload-flexibility",
         (
             _P("J_p", "kg.m^2", around("J_L", 0.02, 0.5), (1e-12, math.inf)),
-            _P("f_p", "Hz", times(lambda unit: unit.limits.start_hz, 2.0, 30.0), (1e-3, 1e5)),
+            _P("f_p", "Hz", times(load_frequency, 2.0, 30.0), (1e-3, 1e5)),
             _P("zeta_p", "1", span(0.005, 0.1)),
         ),
         "plant",

@@ -15,7 +15,19 @@ from typing import Any, Literal
 from sim.drivetrain import Drivetrain
 from sim.unit import Unit
 
-__all__ = ["Effect", "EffectParameter", "around", "drive_voltage", "span", "table_1", "times"]
+__all__ = [
+    "Effect",
+    "EffectParameter",
+    "around",
+    "drive_voltage",
+    "load_frequency",
+    "span",
+    "table_1",
+    "times",
+]
+
+SOURCE_MOST_VPK = 5.0
+"""What the source of a 35670A gives at most, V peak."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,5 +101,18 @@ def times(scale: Callable[[Unit], float], low: float, high: float) -> Callable[[
 
 
 def drive_voltage(unit: Unit) -> float:
-    """The largest voltage that a sweep puts on the motor, V."""
-    return unit.electronics.k_a * unit.limits.source_vpk
+    """The largest voltage that the analyser's source puts on the motor, V."""
+    return unit.electronics.k_a * SOURCE_MOST_VPK
+
+
+def load_frequency(unit: Unit) -> float:
+    """A fourteenth of the frequency of the load on shaft 1, as 1, 2 or 5 times a power of ten, Hz.
+
+    A natural scale of what swings on the load. Rounded, so that a small change of the unit
+    leaves ranges, and the runs that depend on them, as they are.
+    """
+    stiffness = unit.stage1.k_s1 * unit.output_ratio**2
+    scale = math.sqrt(stiffness / unit.load.J_L) / (2.0 * math.pi * 14.0)
+    decade = 10.0 ** math.floor(math.log10(scale))
+    steps = (decade, 2.0 * decade, 5.0 * decade, 10.0 * decade)
+    return min(steps, key=lambda step: abs(math.log(step / scale)))

@@ -182,6 +182,14 @@ class Unit(_Section):
             if isinstance(value, float)
         }
 
+    @property
+    def physics(self) -> dict[str, Any]:
+        """What decides how it moves, as JSON: neither its name nor its limits, nor its tolerance.
+
+        Whatever is stored of a unit, and every seed, depends on this alone.
+        """
+        return self.model_dump(mode="json", exclude={"schema_", "name", "limits"})
+
     def with_parameters(self, **changes: float) -> Unit:
         """A copy with some parameters changed by symbol, checked like a file.
 
