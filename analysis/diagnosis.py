@@ -33,6 +33,7 @@ from analysis.second_thoughts import UNDOING, think_again
 from analysis.settled import settled
 from analysis.sharpening import sharpen_candidate
 from analysis.sizing import size_candidate, widen_if_open
+from analysis.stated_error import error_doubts
 from analysis.surely_off import hold_against_datasheet
 from analysis.swept import check_together, unit_doubts
 from analysis.unseen import Unseen
@@ -111,7 +112,7 @@ def diagnose_response(
             found = replace(found, harmonics=harmonics)
     return replace(
         found,
-        warnings=(*unit_doubts(responses, unit), *_warnings(found)),
+        warnings=(*unit_doubts(responses, unit), *error_doubts(responses), *_warnings(found)),
         elapsed_s=time.perf_counter() - started,
         simulated_s=effort.simulated_s,
     )
@@ -288,7 +289,7 @@ def _warnings(diagnosis: Diagnosis) -> tuple[str, ...]:
         )
     if not np.any(np.isfinite(observation.values[2])):
         found.append(
-            "the response states no errors: what its scatter would tell is lost; give one standard "
-            "error of each gain, as lashbench measure does"
+            "the response states no cycle-to-cycle scatter: what that would tell is lost; give one "
+            "standard error of each gain, as lashbench measure does"
         )
     return tuple(found)

@@ -27,6 +27,7 @@ from analysis.observation import observe
 from analysis.paper_estimate import IndexCurve, index_curve_of_response
 from analysis.progress import Progress
 from analysis.settled import settled
+from analysis.stated_error import error_doubts
 from analysis.swept import check_together, sweep_document, sweep_lines
 from daq.errors import InputError
 from daq.frf import FrequencyResponse
@@ -148,7 +149,7 @@ def estimate_response(
             unit, observation, axes, seed=seed, cache=cache, executor=executor, progress=progress
         )
     curve = index_curve_of_response(responses[0], observation, posterior.draws)
-    warnings = []
+    warnings = error_doubts(responses)
     misfit = _robust_rms(posterior)
     if misfit > _WIDE_RESIDUAL:
         warnings.append(

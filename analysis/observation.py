@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.settled import settled
+from analysis.stated_error import stated_error
 from daq.errors import AnalysisError, InputError
-from daq.frf import DB_PER_NEPER, GAIN_STD_COMPONENTS, FrequencyResponse, PointFlag
+from daq.frf import DB_PER_NEPER, FrequencyResponse, PointFlag
 from daq.plan import SweepPlan
 
 __all__ = [
@@ -226,11 +227,17 @@ def _levels(number: int, response: FrequencyResponse) -> Iterator[_Level]:
     if not np.any(usable):
         raise AnalysisError("the response holds no usable point; measure it again")
     kept = response.take(usable)
+    stated = stated_error(kept)
+    if kept.integrate_cycles is None and stated.cycles is not None:
+        kept = replace(kept, integrate_cycles=stated.cycles)
     least_v = np.sqrt(2.0) * LEAST_NOISE * np.max(np.abs(kept.gain) * kept.source_vpk)
     for source_vpk in kept.levels_vpk:
         readings = kept.at_level(source_vpk)
         _refuse_repeated(readings.frequency_hz, source_vpk)
-        scatter = readings.gain_std_db / DB_PER_NEPER * np.sqrt(2.0 / _components(response))
+        if stated.components is None:
+            scatter = np.full(len(readings), np.nan)
+        else:
+            scatter = readings.gain_std_db / DB_PER_NEPER * np.sqrt(2.0 / stated.components)
         least = least_v / (np.abs(readings.gain) * readings.source_vpk)
         scatter = np.where(scatter > 0, np.maximum(scatter, least), scatter)
         yield _Level(number, float(source_vpk), readings, scatter)
@@ -246,14 +253,6 @@ def _refuse_repeated(frequency_hz: NDArray[np.float64], source_vpk: float) -> No
             f"{such}, and a sweep is simulated with each once; leave one row of it in a CSV "
             "(lashbench export writes a stored measurement as one)"
         )
-
-
-def _components(response: FrequencyResponse) -> int:
-    """Over how many components of the reading its stated error counts the scatter.
-
-    Responses made here say so; others are taken to count both.
-    """
-    return 1 if response.provenance.get(GAIN_STD_COMPONENTS) == 1 else 2
 
 
 def _reading_noise(volts: NDArray[np.float64]) -> float:

@@ -22,7 +22,14 @@ from daq.plan import Direction
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["DB_PER_NEPER", "GAIN_STD_COMPONENTS", "FrequencyResponse", "PointFlag"]
+__all__ = [
+    "DB_PER_NEPER",
+    "GAIN_STD_COMPONENTS",
+    "GAIN_STD_IS",
+    "FrequencyResponse",
+    "PointFlag",
+    "error_words",
+]
 
 DB_PER_NEPER = 20.0 / np.log(10.0)
 """20 log10(e): a relative change of 1 in magnitude, in dB."""
@@ -31,8 +38,27 @@ GAIN_STD_COMPONENTS = "gain_std_components"
 """Provenance key: over how many components `gain_std_db` counts the scatter.
 
 Responses made here count it along the gain (1) and say so; files made elsewhere may count
-both components of the reading (2).
+both components of the reading (2). `GAIN_STD_IS` says the same in words, and comes first.
 """
+
+GAIN_STD_IS = "gain_std_is"
+"""Provenance key: what `gain_std_db` is, in words (see `error_words`)."""
+
+
+def error_words(integrate_cycles: int, components: int = 1) -> str:
+    """The words by which a file says that `gain_std_db` is cycle-to-cycle scatter.
+
+    Parameters
+    ----------
+    integrate_cycles
+        Cycles of the mean of which it is the standard error.
+    components
+        1: scatter along the gain; 2: of both components of the reading together.
+    """
+    along = "along the gain" if components == 1 else "of both components"
+    return (
+        f"cycle-to-cycle scatter {along}, standard error of the mean over {integrate_cycles} cycles"
+    )
 
 
 class PointFlag(IntFlag):

@@ -13,7 +13,13 @@ import numpy as np
 import sqlalchemy as sa
 
 from daq.analyser import Identity, SourceState, SweepPoint
-from daq.frf import GAIN_STD_COMPONENTS, FrequencyResponse, PointFlag
+from daq.frf import (
+    GAIN_STD_COMPONENTS,
+    GAIN_STD_IS,
+    FrequencyResponse,
+    PointFlag,
+    error_words,
+)
 from daq.store_records import Measurement, MeasurementHeader, StoredPoint, plan_from_text
 
 __all__ = ["measurement_of", "point_of", "point_row", "response_of"]
@@ -130,6 +136,7 @@ def _provenance(measurement: Measurement, rows: Sequence[StoredPoint]) -> dict[s
     simulated = instrument is not None and instrument.simulated
     provenance: dict[str, Any] = {
         GAIN_STD_COMPONENTS: 1,
+        GAIN_STD_IS: error_words(header.plan.integrate_cycles),
         "kind": "simulated" if simulated else "measured",
         "measurement_id": measurement.id,
         "state": measurement.state,

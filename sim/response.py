@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.errors import AnalysisError
-from daq.frf import GAIN_STD_COMPONENTS, FrequencyResponse
+from daq.frf import GAIN_STD_COMPONENTS, GAIN_STD_IS, FrequencyResponse, error_words
 from daq.plan import SweepPlan
 from sim.assembly import Law, PiecewiseLinearSystem
 from sim.effects import EffectSetting
@@ -97,6 +97,7 @@ def simulate(
     provenance = {
         "kind": "simulated",
         GAIN_STD_COMPONENTS: 1,
+        GAIN_STD_IS: error_words(plan.integrate_cycles),
         "software": f"lashbench {_version()}",
         "contribution_ratio": float(ratio),
         "effects": [{"id": e.id, **e.values} for e in effects],

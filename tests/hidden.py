@@ -12,7 +12,7 @@ import numpy as np
 
 from analysis.causes import Hypothesis
 from analysis.ensemble import TOLERANCES
-from daq.frf import DB_PER_NEPER, FrequencyResponse
+from daq.frf import DB_PER_NEPER, GAIN_STD_IS, FrequencyResponse, error_words
 from daq.plan import SweepPlan, spaced_frequencies
 from sim.catalogue import COMMON
 from sim.effects import EffectSetting
@@ -121,7 +121,10 @@ def reading(response: FrequencyResponse, rng: np.random.Generator) -> FrequencyR
         direction=response.direction,
         settle_cycles=response.settle_cycles,
         integrate_cycles=response.integrate_cycles,
-        provenance={"dc_offset_v": response.dc_offset_v},
+        provenance={
+            "dc_offset_v": response.dc_offset_v,
+            GAIN_STD_IS: error_words(response.integrate_cycles, 2),
+        },
     )
 
 

@@ -38,7 +38,7 @@ from daq.formats.atomic import write_text
 from daq.formats.believable import disbelief
 from daq.formats.csv_columns import EXTRA_KEYS, extra_columns, extra_comments
 from daq.formats.toml import toml_key, toml_value
-from daq.frf import FrequencyResponse, PointFlag
+from daq.frf import GAIN_STD_COMPONENTS, GAIN_STD_IS, FrequencyResponse, PointFlag
 
 __all__ = ["COLUMNS", "read", "write"]
 
@@ -107,6 +107,8 @@ def read(path: Path) -> FrequencyResponse:
     provenance = {k: v for k, v in table.comments.items() if k not in _PROCEDURE}
     if "spoilt_points" in table.comments:
         provenance["spoilt_points"] = table.comments["spoilt_points"]
+    if _is_plain(table):
+        provenance[GAIN_STD_COMPONENTS] = 2
     return FrequencyResponse.from_arrays(
         table["frequency_hz"],
         table["source_vpk"],
@@ -155,6 +157,17 @@ def write(response: FrequencyResponse, path: Path) -> None:
     extra_columns(comments, len(kept), path)
     lines += [",".join(_cell(value) for value in row) for row in columns.tolist()]
     write_text(path, "\n".join(lines) + "\n")
+
+
+def _is_plain(table: _Table) -> bool:
+    """Whether a file has the keys of this format alone, its cycles, and errors.
+
+    By the format its errors are those of the mean over these cycles. A file that names a `kind`
+    came through a program, and one that knows no cycles cannot have counted any.
+    """
+    stated = {"settle_cycles", "integrate_cycles"} <= table.comments.keys()
+    words = {"kind", GAIN_STD_COMPONENTS, GAIN_STD_IS} & table.comments.keys()
+    return stated and not words and bool(np.any(table["gain_std_db"] > 0.0))
 
 
 def _cell(value: float) -> str:

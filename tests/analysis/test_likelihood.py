@@ -9,17 +9,17 @@ from scipy.stats import t as student
 from analysis.emulator import TAIL_FREEDOM, Prediction
 from analysis.likelihood import match_prediction
 from analysis.observation import observe
-from daq.frf import FrequencyResponse
+from daq.frf import GAIN_STD_IS, FrequencyResponse, error_words
 
 ROWS = 40
+WORDS = error_words(30, 2)
 
 
 def observation(gain=None, **fields):
     f = np.linspace(100.0, 140.0, ROWS)
     gain = np.full(ROWS, 0.1) if gain is None else gain
-    seen = observe(
-        FrequencyResponse.from_arrays(f, 2.5, gain, unit="ADSS", gain_std_db=0.2, **fields)
-    )
+    scatter = {"gain_std_db": np.linspace(0.2, 0.21, ROWS), "provenance": {GAIN_STD_IS: WORDS}}
+    seen = observe(FrequencyResponse.from_arrays(f, 2.5, gain, unit="ADSS", **scatter, **fields))
     return replace(seen, noise=np.zeros(ROWS))
 
 

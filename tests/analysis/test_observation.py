@@ -25,6 +25,7 @@ def response(levels=(1.5, 2.5), frequencies=(100.0, 110.0, 120.0), **changes):
         "settle_cycles": 7,
         "integrate_cycles": 9,
         "direction": "down",
+        "provenance": {"gain_std_components": 2},
     }
     return FrequencyResponse.from_arrays(f, v, **{**fields, **changes})
 

@@ -66,10 +66,14 @@ def diagnose(
 
     response, *others = (read_response(path) for path in (file, *further))
     from analysis.diagnosis import diagnose_response
+    from analysis.stated_error import error_doubts, error_notes
     from analysis.swept import check_together, unit_doubts
 
     check_together((response, *others))
-    for doubt in unit_doubts((response, *others), subject):
+    for note in error_notes((response, *others)):
+        console.note(note)
+    doubts = unit_doubts((response, *others), subject) + error_doubts((response, *others))
+    for doubt in doubts:
         # Now, as well as with the answer: it may be a slip, and the answer takes a minute.
         console.note(f"warning: {doubt}")
     with executor_at(cluster) as executor:

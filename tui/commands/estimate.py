@@ -73,9 +73,12 @@ def estimate(
             raise InputError(f"{file}: give either a response or --arf-hz and --rf-hz, not both")
         subject, responses = _unit(unit), [_response(path) for path in (file, *further)]
         from analysis.estimate import estimate_response
+        from analysis.stated_error import error_notes
         from analysis.swept import unit_doubts
 
         warnings = unit_doubts(responses, subject)
+        for note in error_notes(responses):
+            console.note(note)
         with executor_at(cluster) as executor:
             result = estimate_response(
                 responses[0], subject, total_backlash_unknown, progress=console.progress,
