@@ -188,7 +188,7 @@ def _stated_and_shown(level: FrequencyResponse) -> NDArray[np.float64]:
 
 def _rank_correlation(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
     ranks = np.argsort(np.argsort(np.stack([one, other]), axis=1), axis=1)
-    return float(np.corrcoef(ranks)[0, 1])
+    return float(np.asarray(np.corrcoef(ranks))[0, 1])
 
 
 def _shown(value: object) -> str:
