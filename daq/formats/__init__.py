@@ -2,8 +2,9 @@
 
 Each format is one module with ``read(path)`` and, where it can be written,
 ``write(response, path)``; it is imported when a file of its kind is met, so
-that a heavy library is loaded by those who need it. No format interprets
-what it reads, and none takes half of a file.
+that a heavy library is loaded by those who need it. Binary formats are read in
+a child process (`daq.formats.apart`). No format interprets what it reads, and none
+takes half of a file.
 """
 
 from __future__ import annotations
@@ -29,6 +30,9 @@ READABLE = {
 }
 """Module that reads files of each suffix."""
 
+_BINARY = frozenset({"daq.formats.hdf5", "daq.formats.mat", "daq.formats.sdf"})
+"""Modules whose files are read in a child process: a damaged one can end the process."""
+
 WRITABLE = {suffix: module for suffix, module in READABLE.items() if module != "daq.formats.sdf"}
 """Module that writes files of each suffix; SDF is the analyser's own and only read."""
 
@@ -43,13 +47,22 @@ def read_response(path: str | Path) -> FrequencyResponse:
     InputError
         If the suffix is not that of a format that can be read.
     """
-    response: FrequencyResponse = import_module(_module(path, READABLE, "read")).read(Path(path))
+    response = _read(_module(path, READABLE, "read"), Path(path))
     try:
         found = disbelief("dc_offset_v", [response.dc_offset_v])
     except InputError as error:
         raise FileFormatError(f"{path}: {error}") from error
     if found is not None:
         raise FileFormatError(f"{path}: {found[1]}")
+    return response
+
+
+def _read(module: str, path: Path) -> FrequencyResponse:
+    if module in _BINARY:
+        from daq.formats.apart import read_apart
+
+        return read_apart(module, path)
+    response: FrequencyResponse = import_module(module).read(path)
     return response
 
 

@@ -3,8 +3,8 @@
 Owns that layout: column vectors under the names of the response's arrays, and
 the rest of it as a JSON text in the variable `document` (in MATLAB:
 ``jsondecode(document)``). The text at the head of the file carries a digest of
-what follows, because the reader of scipy can crash on a damaged file: nothing
-that was not written here gets that far.
+what follows, which tells damage. scipy's reader can crash on a file that was made
+to harm, so `daq.formats` calls `read` in a child process.
 """
 
 from __future__ import annotations

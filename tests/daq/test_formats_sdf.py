@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from sdf_files import HP_35665A, HP_35670A, VOLT, Channel, File
 
 from daq.errors import FileFormatError, InputError
-from daq.formats import read_response, write_response
+from daq.formats import read_response, sdf, write_response
 from daq.frf import PointFlag
 
 
@@ -128,7 +128,7 @@ def test_damage_never_ends_the_program(tmp_path, data):
 
 def complaint(path) -> str | None:
     try:
-        read_response(path)
+        sdf.read(path)
     except FileFormatError as error:
         return str(error)
     return None

@@ -19,6 +19,8 @@ from daq.transports.transcript import Replay
 from sim.unit import load_unit
 
 SLOW = ("hdf5", "history", "analyser", "adapter", "prologix")
+APART = ("mat",)
+"""Each example takes a child process."""
 NAMES = (
     "csv", "hdf5", "uff", "mat", "sdf", "unit", "bench", "recipe", "transcript", "history",
     "block", "replies", "address", "prologix", "analyser", "adapter",
@@ -67,7 +69,7 @@ def test_no_bytes_make_a_reader_fail_otherwise_than_it_may(readers, name):
     whole = seeds(name)
 
     @settings(
-        max_examples=8 if name in SLOW else 40,
+        max_examples=3 if name in APART else 8 if name in SLOW else 40,
         deadline=None,
         suppress_health_check=list(HealthCheck),
     )
