@@ -21,13 +21,20 @@ from sqlalchemy.pool import QueuePool
 
 from daq.bounded_text import parse_json
 from daq.errors import FileFormatError, InputError, LashbenchError, MeasurementError
-from daq.store_schema import SCHEMA_VERSION, migrate, schema_version
+from daq.store_schema import SCHEMA_VERSION, lay_over, migrate, schema_version
 
 __all__ = ["engine_of", "log_of", "open_engine", "telling_faults"]
 
 _MAGIC = b"SQLite format 3\x00"
 _BUSY_S = 5.0
 WRITES = "lashbench_writes"
+_MOST_BYTES = 8 << 20
+"""Bytes of one value or statement: a plan of 100,000 points has two million."""
+_HEAP_BYTES = 128 << 20
+"""Memory that SQLite may take in this process, whatever a file makes it do; it needs a few MiB."""
+_CHECKED_BYTES = 32 << 20
+"""Size up to which a file is checked whole when it is opened, which takes 0.1 s; above it, what
+is read is checked as it is read."""
 
 
 def open_engine(path: Path, *, create: bool, read_only: bool) -> sa.Engine:
@@ -41,18 +48,28 @@ def open_engine(path: Path, *, create: bool, read_only: bool) -> sa.Engine:
         If the file is not a history, is damaged, or is newer than this program.
     """
     exists = _check_place(path, create=create, read_only=read_only)
-    engine = engine_of(path, mode=_mode(path, exists, read_only))
+    mode = _mode(path, exists, read_only)
+    engine = engine_of(path, mode=mode)
     try:
         with telling_faults(path):
-            _check_content(engine, path, create=create, read_only=read_only)
+            version = _check_content(engine, path, create=create, read_only=read_only)
     except BaseException:
         engine.dispose()
         raise
-    return engine
+    if version == SCHEMA_VERSION:
+        return engine
+    engine.dispose()
+    return engine_of(path, mode=mode, older=version)
 
 
-def engine_of(path: Path, mode: str) -> sa.Engine:
-    """An engine on a file in one of SQLite's URI modes; nothing is opened yet."""
+def engine_of(path: Path, mode: str, older: int | None = None) -> sa.Engine:
+    """An engine on a file in one of SQLite's URI modes; nothing is opened yet.
+
+    Parameters
+    ----------
+    older
+        Version of an older layout that is to be read as if it were of this one.
+    """
     uri = f"{_behind_links(path).as_uri()}?{mode}"
 
     def connect() -> sqlite3.Connection:
@@ -67,8 +84,18 @@ def engine_of(path: Path, mode: str) -> sa.Engine:
 
     @event.listens_for(engine, "connect")
     def _settle(connection: sqlite3.Connection, _record: object) -> None:
+        # Before the first statement, which reads the layout that a file claims to have.
+        for kind in (sqlite3.SQLITE_LIMIT_LENGTH, sqlite3.SQLITE_LIMIT_SQL_LENGTH):
+            connection.setlimit(kind, _MOST_BYTES)
+        for kind in (sqlite3.SQLITE_LIMIT_ATTACHED, sqlite3.SQLITE_LIMIT_TRIGGER_DEPTH):
+            connection.setlimit(kind, 0)
+        connection.execute(f"PRAGMA hard_heap_limit = {_HEAP_BYTES}")
+        connection.execute("PRAGMA trusted_schema = OFF")
+        connection.execute("PRAGMA cell_size_check = ON")
         connection.execute("PRAGMA synchronous = NORMAL")
         connection.execute("PRAGMA foreign_keys = ON")
+        if older is not None:
+            lay_over(connection, older)
         # SQLite's own lower() knows the letters of ASCII only.
         connection.create_function("casefold", 1, str.casefold, deterministic=True)
 
@@ -103,6 +130,10 @@ def telling_faults(path: Path) -> Iterator[None]:
         yield
     except (DBAPIError, sqlite3.Error) as error:
         raise _plain(path, error) from error
+    except MemoryError as error:
+        raise FileFormatError(
+            f"{path}: takes more memory than a history can; restore a copy"
+        ) from error
     except UnicodeDecodeError as error:
         # SQLite quotes damaged text in its complaint, which then cannot be decoded.
         raise FileFormatError(f"{path}: is damaged (text that is not UTF-8)") from error
@@ -170,28 +201,40 @@ def _mode(path: Path, exists: bool, read_only: bool) -> str:
     return "mode=ro" if logged else "mode=ro&immutable=1"
 
 
-def _check_content(engine: sa.Engine, path: Path, *, create: bool, read_only: bool) -> None:
+def _check_content(engine: sa.Engine, path: Path, *, create: bool, read_only: bool) -> int:
+    """Version of the layout; that of this program, unless the file may only be read."""
     with engine.connect() as connection:
-        fault = connection.exec_driver_sql("PRAGMA quick_check(1)").scalar_one()
+        # First: a check evaluates what the layout says.
+        version = schema_version(connection, str(path))
+        if not path.exists() or path.stat().st_size <= _CHECKED_BYTES:
+            fault = connection.exec_driver_sql("PRAGMA quick_check(1)").scalar_one()
+        else:
+            fault = _length_fault(connection, path)
         if fault != "ok":
             first = " ".join(fault.split())
             raise FileFormatError(
                 f"{path}: is damaged ({first}); restore a copy, nothing was changed"
             )
-        version = schema_version(connection, str(path))
     if not read_only and (version or create):
         # Only now: it alters the file, which must be ours.
         with closing(engine.raw_connection()) as raw, closing(raw.cursor()) as cursor:
             cursor.execute("PRAGMA journal_mode = WAL")
-    if version == SCHEMA_VERSION:
-        return
     if version == 0 and not create:
         raise FileFormatError(f"{path}: is empty, no history")
-    if read_only:
-        raise FileFormatError(
-            f"{path}: has the layout {version} of an older lashbench and may not be written; "
-            "open it once where it may be"
-        )
+    if version == SCHEMA_VERSION or read_only:
+        return version
     with engine.execution_options(**{WRITES: True}).begin() as connection:
         # Asked again under the lock: another program may have been first.
         migrate(connection, schema_version(connection, str(path)))
+    return SCHEMA_VERSION
+
+
+def _length_fault(connection: sa.Connection, path: Path) -> str:
+    """Whether a file without a log ends before its last page, as one that was cut does."""
+    pages, size = (
+        int(connection.exec_driver_sql(f"PRAGMA {name}").scalar_one())
+        for name in ("page_count", "page_size")
+    )
+    if not log_of(path).exists() and path.stat().st_size < pages * size:
+        return f"{path.stat().st_size} bytes of {pages * size}"
+    return "ok"

@@ -16,7 +16,13 @@ from daq.errors import InputError
 from daq.plan import SweepPlan
 
 __all__ = [
+    "CORRECTABLE",
+    "LONGEST_TEXT",
+    "Answer",
+    "Correction",
+    "Diagnosed",
     "Estimate",
+    "HistoryLine",
     "Measurement",
     "MeasurementHeader",
     "MeasurementState",
@@ -25,6 +31,9 @@ __all__ = [
     "plan_from_text",
     "plan_text",
 ]
+
+LONGEST_TEXT = 65536
+"""Characters of a name, a serial number or a remark."""
 
 MeasurementState = Literal["complete", "interrupted", "aborted"]
 """How a measurement stands. One that is still running, or whose program was
@@ -80,6 +89,8 @@ class Measurement:
     """Points in force, superseded ones not counted."""
     flagged: int
     """Points in force that carry a flag other than that of being taken a second time."""
+    points_version: int = 0
+    """Raised whenever a point is added: what was analysed is of one version of the points."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,13 +120,112 @@ class SessionEvent:
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """What an analysis said of a measurement, kept so that the history can show it."""
+    """What an estimate said of a measurement, kept so that the history can show it.
+
+    Parameters
+    ----------
+    measurement
+        Identifier of the measurement.
+    made
+        ISO 8601, UTC; to be shown only, as a clock may be wrong.
+    software, edition
+        Name and version of the program, and of the inference in it.
+    document
+        The document of ``estimate --json``, or ``{"failed": reason}``.
+    points_version
+        `Measurement.points_version` that it is of; None where nobody knows.
+    physics
+        Digest of the unit's values that it was made with, as the caller makes it.
+    elapsed_s
+        How long it took, s.
+    """
 
     measurement: int
     made: str
-    """ISO 8601, UTC."""
     software: str
     document: Mapping[str, Any]
+    points_version: int | None = None
+    physics: str = ""
+    edition: str = ""
+    elapsed_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosed:
+    """What a diagnosis said of a measurement, and of those that were diagnosed with it.
+
+    Parameters
+    ----------
+    points
+        `Measurement.points_version` of every measurement that it is of, by identifier.
+    as_measured
+        Whether the unit's values were those that the measurement was made with.
+    document
+        The document of ``diagnose --json``.
+
+    The rest is as for `Estimate`.
+    """
+
+    measurement: int
+    made: str
+    software: str
+    document: Mapping[str, Any]
+    points: Mapping[int, int]
+    physics: str = ""
+    as_measured: bool = True
+    edition: str = ""
+    elapsed_s: float | None = None
+
+
+CORRECTABLE = ("serial", "operator", "notes")
+"""What can be corrected of a measurement afterwards."""
+
+
+@dataclass(frozen=True, slots=True)
+class Correction:
+    """A line of the audit trail: who corrected what, and what stood there before."""
+
+    time: str
+    """ISO 8601, UTC."""
+    person: str
+    field: str
+    """One of `CORRECTABLE`."""
+    old: str
+    new: str
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """The gist of an estimate or a diagnosis in force: a few fields of its document."""
+
+    made: str
+    software: str
+    edition: str
+    summary: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class HistoryLine:
+    """A measurement as a list shows it; the whole of it is a `Measurement`."""
+
+    id: int
+    unit: str
+    serial: str
+    started: str
+    ended: str | None
+    state: MeasurementState
+    source_state: SourceState
+    points: int
+    flagged: int
+    planned: int
+    levels_vpk: tuple[float, ...]
+    simulated: bool
+    operator: str
+    notes: str
+    corrections: int
+    """How many lines its audit trail has."""
+    estimate: Answer | None = None
+    diagnosis: Answer | None = None
 
 
 def plan_text(plan: SweepPlan) -> str:

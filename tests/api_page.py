@@ -79,7 +79,7 @@ def _entry(name: str, thing: object) -> Iterator[str]:
         return
     plain = issubclass(thing, Exception) or getattr(thing, "_is_protocol", False)
     yield f"- `{name}{'' if plain else _parameters(thing)}`: {_summary(thing)}"
-    for member, value in sorted(vars(thing).items()):
+    for member, value in sorted(_members(thing).items()):
         function = value.__func__ if isinstance(value, classmethod) else value
         if member.startswith("_"):
             continue
@@ -87,6 +87,12 @@ def _entry(name: str, thing: object) -> Iterator[str]:
             yield f"  - `.{member}`: {_summary(value)}"
         elif inspect.isfunction(function):
             yield f"  - `.{member}{_parameters(function)}`: {_summary(function)}"
+
+
+def _members(thing: type) -> dict[str, object]:
+    """What a class has of its own and of those of the project that it is made of."""
+    bases = [base for base in thing.__mro__ if base.__module__.split(".")[0] in FLOORS]
+    return {name: value for base in reversed(bases) for name, value in vars(base).items()}
 
 
 def _parameters(thing: object) -> str:

@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from daq.errors import FileFormatError, InputError
+
 if TYPE_CHECKING:
     from daq.frf import FrequencyResponse
     from daq.store import Store
@@ -17,6 +19,8 @@ if TYPE_CHECKING:
 __all__ = ["following", "responses_together"]
 
 _MARK = "follows"
+_DIGITS = 18
+"""What an identifier in a history can have."""
 
 
 def following(header: MeasurementHeader, measurement: int) -> MeasurementHeader:
@@ -36,12 +40,21 @@ def responses_together(store: Store, measurement: int) -> list[FrequencyResponse
     """
     header = store.measurement(measurement).header
     responses = [store.response(measurement)]
-    known = {one.id: one for one in store.measurements() if one.id != measurement}
-    while (before := header.configurations.get(_MARK, "")).isdecimal():
-        # A copied or cut history may lack it, or hold another of that number: no reason to stop.
-        one = known.pop(int(before), None)
-        if one is None or one.points == 0:
+    seen = {measurement}
+    while (before := header.configurations.get(_MARK, "")).isdecimal() and len(before) <= _DIGITS:
+        if int(before) in seen:
             break
+        seen.add(int(before))
+        try:
+            one = store.measurement(int(before))
+        except FileFormatError:
+            raise
+        except InputError:
+            # A copied or cut history may lack it: no reason to stop.
+            break
+        if one.points == 0:
+            break
+        # Or it holds another of that number.
         if (one.header.unit, one.header.serial) != (header.unit, header.serial):
             break
         responses.append(store.response(one.id))

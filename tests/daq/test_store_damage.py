@@ -85,10 +85,16 @@ def test_an_older_file_is_brought_up_with_all_it_holds(old, tmp_path):
     assert layout(old) == layout(fresh)
 
 
-def test_an_older_file_that_may_not_be_written_says_what_to_do(old):
+def test_an_older_file_that_may_not_be_written_is_read_as_it_is(old):
     before = old.read_bytes()
-    with pytest.raises(FileFormatError, match="older lashbench"):
-        Store(old, read_only=True)
+    with Store(old, read_only=True) as store:
+        first, second = store.lines()
+        assert (first.points, first.planned, first.flagged) == (6, 6, 1)
+        assert first.levels_vpk == store.measurement(1).header.plan.levels_vpk
+        assert (second.state, second.estimate, second.diagnosis) == ("interrupted", None, None)
+        assert store.measurement(1).points == 6
+        assert len(store.response(1)) == 6
+        assert store.latest_estimates() == {}
     assert old.read_bytes() == before
 
 

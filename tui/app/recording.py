@@ -105,10 +105,10 @@ def _from_history(path: Path, measurement: int | None) -> Recording:
 
     with Store(path, read_only=True) as store:
         if measurement is None:
-            with_points = [m.id for m in store.measurements() if m.points]
+            with_points = store.lines(last=1, with_points=True)
             if not with_points:
                 raise InputError(f"{path}: no measurement in it has a point")
-            measurement = with_points[-1]
+            measurement = with_points[0].id
         found = store.measurement(measurement)
         points = store.points(measurement, superseded=True)
         events = store.events(measurement)
