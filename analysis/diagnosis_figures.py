@@ -17,6 +17,7 @@ from analysis.observation import Observation
 from analysis.verdict import Judged
 from daq.formats.atomic import file_stem, replacing
 from daq.frf import DB_PER_NEPER
+from daq.visible_text import visible_line
 
 __all__ = ["draw_diagnosis", "probability_figure", "residual_figure"]
 
@@ -68,7 +69,8 @@ def residual_figure(diagnosis: Diagnosis) -> Figure:
     names = " + ".join(cause.effect for cause in diagnosis.causes) or "nothing named"
     if best is not None and not diagnosis.causes:
         names += f"; {' + '.join(best.effects)} comes nearest"
-    figure.suptitle(f"{diagnosis.unit}: {verdict.word}, {names}", fontsize=11)
+    title = f"{visible_line(diagnosis.unit)}: {verdict.word}, {names}"
+    figure.suptitle(title, fontsize=11, parse_math=False)
     return figure
 
 

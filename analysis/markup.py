@@ -10,6 +10,8 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from daq.visible_text import visible
+
 __all__ = ["Markup", "data_block", "element", "joined", "table"]
 
 _VOID = frozenset({"meta", "br", "hr", "col"})
@@ -98,8 +100,5 @@ def _piece(child: Child) -> str:
 
 
 def _safe(text: str | bool) -> str:
-    # Characters that no HTML may hold, not even escaped, would make it unreadable elsewhere.
-    kept = "".join(
-        c if c.isprintable() or c in "\n\t" else "\N{REPLACEMENT CHARACTER}" for c in str(text)
-    )
-    return html.escape(kept, quote=True)
+    # Some may stand in no HTML, not even escaped; others show as something else than they are.
+    return html.escape(visible(str(text)), quote=True)

@@ -18,6 +18,7 @@ from matplotlib.ticker import MultipleLocator, NullLocator
 from analysis.resonance import LevelFeatures
 from daq.formats.atomic import replacing
 from daq.frf import FrequencyResponse, PointFlag
+from daq.visible_text import visible_line
 
 __all__ = ["draw_response", "save_response_figure"]
 
@@ -109,7 +110,8 @@ def _mark(gain: Axes, found: LevelFeatures, colour: str) -> None:
 def _dress(gain: Axes, phase: Axes, response: FrequencyResponse) -> None:
     simulated = response.provenance.get("kind") == "simulated"
     # A name is no formula, whatever dollars stand in it.
-    gain.set_title(f"{response.unit}{', SIMULATED' if simulated else ''}", parse_math=False)
+    title = visible_line(response.unit) + (", SIMULATED" if simulated else "")
+    gain.set_title(title, parse_math=False)
     gain.set_ylabel("gain V_o/V_i (dB re 1 V/V)")
     # Above the curves, of which none has room to spare.
     handles, labels = gain.get_legend_handles_labels()

@@ -9,7 +9,7 @@ from __future__ import annotations
 import unicodedata
 from collections.abc import Sequence
 
-from tui.output import visible
+from daq.visible_text import visible
 
 __all__ = ["WIDTH", "columns_of", "table_lines", "wrapped"]
 

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
 
+from daq.visible_text import visible, visible_line
 from tui.places import log_path
 
 __all__ = ["LEVELS", "logging_to_file", "silence"]
@@ -21,6 +22,16 @@ LEVELS = ("debug", "info", "warning", "error")
 _BYTES = 1_000_000
 _WARNINGS = "py.warnings"
 """Where Python puts what it and libraries warn of."""
+
+
+class _Seen(logging.Formatter):
+    """Writes an entry as it may be shown: a line for the message, whatever others put into it."""
+
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802
+        return visible_line(super().formatMessage(record))
+
+    def format(self, record: logging.LogRecord) -> str:
+        return visible(super().format(record))
 
 
 def silence() -> None:
@@ -48,7 +59,7 @@ def logging_to_file(level: str = "info") -> Iterator[Path | None]:
     except OSError:
         yield None
         return
-    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
+    handler.setFormatter(_Seen("%(asctime)s %(levelname)s %(name)s: %(message)s"))
     logger.addHandler(handler)
     warned = logging.getLogger(_WARNINGS)
     warned.addHandler(handler)

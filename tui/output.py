@@ -20,10 +20,11 @@ from typing import Annotated, Any, TextIO
 from cyclopts import Parameter
 
 from daq.errors import LashbenchError
+from daq.visible_text import visible, visible_line
 from tui.narrator import Narrator
 from tui.pace import Pace, duration
 
-__all__ = ["Console", "Injected", "as_json", "hush", "readers_may_leave", "visible"]
+__all__ = ["Console", "Injected", "as_json", "hush", "readers_may_leave"]
 
 _LOG = logging.getLogger("lashbench.console")
 
@@ -134,14 +135,14 @@ class Console:
         if remaining_s is None:
             remaining_s = self._live.pace.remaining_s(fraction)
         left = "" if remaining_s is None else f"{duration(remaining_s)} left  "
-        line = f"{100 * fraction:3.0f} %  {left}{text}"
+        line = f"{100 * fraction:3.0f} %  {left}{visible_line(text)}"
         self._narrate(f"\r\x1b[K{line[:78]}", fleeting=True)
 
     def picture(self, lines: Sequence[str]) -> None:
         """Draw lines in place of those drawn before; only where they fit on a terminal."""
         if not self.watched or self._height() < len(lines) + 2:
             return
-        drawn = "".join(f"{line}\n" for line in lines)
+        drawn = "".join(f"{visible_line(line)}\n" for line in lines)
         self._narrate(f"{self._erasure()}{drawn}")
         self._live.lines = len(lines)
 
@@ -150,7 +151,7 @@ class Console:
         if not (self.watched and sys.stdin.isatty()):
             return None
         self._clear()
-        self._narrate(question)
+        self._narrate(visible(question))
         return sys.stdin.readline().strip()
 
     def _height(self) -> int:
@@ -183,15 +184,6 @@ class Console:
 
 Injected = Annotated[Console, Parameter(parse=False, show=False)]
 """A parameter of a verb that `tui.cli` fills in; it is no option."""
-
-
-_CONTROLS = {code: f"\\x{code:02x}" for code in (*range(32), *range(127, 160))}
-del _CONTROLS[ord("\n")], _CONTROLS[ord("\t")]
-
-
-def visible(text: str) -> str:
-    """Text that tells a terminal nothing: files and histories may hold what would."""
-    return text.translate(_CONTROLS)
 
 
 def hush(stream: TextIO) -> None:

@@ -326,6 +326,14 @@ def test_markup_is_escaped_once_and_a_number_that_is_none_refused():
         data_block({"a": float("nan")}, "d")
 
 
+def test_what_is_not_seen_is_written_out(report):
+    _, page = report(makings.response(serial="SN\u202e4\x1b[2J", notes="zero\u200bwidth"))
+    assert "SN\\u202e4\\x1b[2J" in page.text
+    assert "zero\\u200bwidth" in page.text
+    assert not {"\u202e", "\x1b", "\u200b"} & set(page.text)
+    assert page.data["measurement"]["serial"] == "SN\u202e4\x1b[2J"
+
+
 def test_a_long_remark_does_not_fill_the_pages(report):
     _, page = report(makings.response(notes="word " * 5000))
     assert "the rest is in the data" in page.text

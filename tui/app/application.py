@@ -14,6 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
+from rich.text import Text
 from textual.app import SystemCommand
 from textual.binding import Binding, BindingType
 from textual.screen import ModalScreen, Screen
@@ -22,6 +23,7 @@ from daq.analyser import SourceState
 from daq.errors import LashbenchError
 from daq.formats.atomic import write_text
 from daq.session_events import Finished, PointStored, RunIn
+from daq.visible_text import visible, visible_line
 from tui.app import bench_owner, messages
 from tui.app.analyses import Analyses
 from tui.app.analysis_keeper import AnalysisKeeper
@@ -139,7 +141,7 @@ class BenchApp(TerminalApp):
         if run.measurement is not None:
             word = run.finished.state if run.finished is not None else run.phase
             parts.append(f"#{run.measurement} {word} {run.done}/{run.total}")
-        return " " + " | ".join(parts)
+        return visible_line(" " + " | ".join(parts))
 
     # ------------------------------------------------------------ keys everywhere
 
@@ -158,7 +160,7 @@ class BenchApp(TerminalApp):
     def action_copy(self) -> None:
         """Copy the step's result; it is written to a file too, for terminals that take none."""
         screen = self.screen
-        text = screen.copy_text() if isinstance(screen, StepScreen) else ""
+        text = visible(screen.copy_text()) if isinstance(screen, StepScreen) else ""
         if not text:
             self.notify("there is nothing to copy here yet")
             return
@@ -194,7 +196,7 @@ class BenchApp(TerminalApp):
         if run.source not in (None, SourceState.CONFIRMED_OFF):
             code, line = LashbenchError.exit_code, f"error: {run.source_text}"
             _LOG.error("left with %s", run.source_text)
-        self.exit(code, code, line)
+        self.exit(code, code, line and Text(visible_line(line)))
 
     def get_system_commands(self, screen: Screen) -> Iterable[SystemCommand]:
         """The palette: steps, keys of the step, and what Textual offers."""
@@ -235,7 +237,7 @@ class BenchApp(TerminalApp):
         self.keeper.stop_now()
         self.analyses.give_up()
         line = f"error: internal: {type(error).__name__}: {error}. {self.log_words}"
-        self._exit_renderables.append(line)
+        self._exit_renderables.append(Text(visible_line(line)))
         self._close_messages_no_wait()
 
     # ------------------------------------------------------------ sessions

@@ -10,7 +10,8 @@ from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
 from textual.screen import ModalScreen
-from textual.widgets import Button, Static, TextArea
+
+from tui.app.widgets.plain import Passage, Push, Words
 
 __all__ = ["Dialog", "ErrorDialog", "HelpDialog", "QuestionDialog"]
 
@@ -27,7 +28,7 @@ class Dialog(ModalScreen[bool | None]):
     def compose(self) -> ComposeResult:
         """Title, content, keys."""
         with Vertical(id="dialog"):
-            yield Static(self.heading, id="title", markup=False)
+            yield Words(self.heading, id="title")
             yield from self.content()
 
     def content(self) -> ComposeResult:
@@ -53,8 +54,8 @@ class ErrorDialog(Dialog):
 
     def content(self) -> ComposeResult:
         """The text and what to press."""
-        yield TextArea(self.text, read_only=True, soft_wrap=True, show_cursor=False, id="text")
-        yield Static("Enter or Esc closes, C copies the text", id="keys")
+        yield Passage(self.text, id="text")
+        yield Words("Enter or Esc closes, C copies the text", id="keys")
 
     def action_copy(self) -> None:
         """Hand the text to the terminal's clipboard."""
@@ -72,17 +73,17 @@ class QuestionDialog(Dialog):
     def on_mount(self) -> None:
         """Bind the key of this question; the safe answer has the focus."""
         self._bindings.bind(self.key, "answer(True)", self.yes)
-        self.query_one("#no", Button).focus()
+        self.query_one("#no", Push).focus()
 
     def content(self) -> ComposeResult:
         """The question, both answers."""
-        yield Static(self.text, markup=False)
+        yield Words(self.text)
         with Horizontal(classes="field"):
-            yield Button(f"{self.yes} [{self.key}]".replace("[", "\\["), id="yes", compact=True)
-            yield Button(f"{self.no} \\[Esc]", id="no", compact=True)
-        yield Static(f"{self.key}: {self.yes}   Esc or Enter: {self.no}", id="keys", markup=False)
+            yield Push(f"{self.yes} [{self.key}]", id="yes", compact=True)
+            yield Push(f"{self.no} [Esc]", id="no", compact=True)
+        yield Words(f"{self.key}: {self.yes}   Esc or Enter: {self.no}", id="keys")
 
-    def on_button_pressed(self, event: Button.Pressed) -> None:
+    def on_button_pressed(self, event: Push.Pressed) -> None:
         """Answer by button."""
         self.dismiss(event.button.id == "yes")
 
@@ -98,5 +99,5 @@ class HelpDialog(Dialog):
 
     def content(self) -> ComposeResult:
         """The text."""
-        yield TextArea(self.text, read_only=True, soft_wrap=True, show_cursor=False, id="text")
-        yield Static("Enter or Esc closes", id="keys")
+        yield Passage(self.text, id="text")
+        yield Words("Enter or Esc closes", id="keys")

@@ -10,9 +10,9 @@ from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
 from textual.screen import ModalScreen
-from textual.widgets import Input, Label, Static
 
 from daq.plan import SweepPlan
+from tui.app.widgets.plain import Caption, Field, Words
 from tui.measure_options import PlanOptions
 from tui.options import real_number
 
@@ -58,14 +58,14 @@ class PlanDialog(ModalScreen[PlanOptions | None]):
     def compose(self) -> ComposeResult:
         """A line per field."""
         with Vertical(id="dialog"):
-            yield Static("The sweep", classes="heading")
+            yield Words("The sweep", classes="heading")
             for name, label, unit in _FIELDS:
                 with Horizontal(classes="field"):
-                    yield Label(label)
-                    yield Input(self._values[name], id=f"plan-{name}", compact=True)
-                    yield Label(unit, classes="unit")
-            yield Static("", id="fault", markup=False)
-            yield Static("Enter takes it, Esc keeps the old plan, Tab goes on", id="keys")
+                    yield Caption(label)
+                    yield Field(self._values[name], id=f"plan-{name}", compact=True)
+                    yield Caption(unit, classes="unit")
+            yield Words("", id="fault")
+            yield Words("Enter takes it, Esc keeps the old plan, Tab goes on", id="keys")
 
     def action_leave(self) -> None:
         """Close without a change."""
@@ -76,7 +76,7 @@ class PlanDialog(ModalScreen[PlanOptions | None]):
         try:
             options = self._options()
         except ValueError as error:
-            self.query_one("#fault", Static).update(str(error))
+            self.query_one("#fault", Words).update(str(error))
             return
         self.dismiss(options)
 
@@ -94,7 +94,7 @@ class PlanDialog(ModalScreen[PlanOptions | None]):
         )
 
     def _text(self, name: str) -> str:
-        return self.query_one(f"#plan-{name}", Input).value.strip()
+        return self.query_one(f"#plan-{name}", Field).value.strip()
 
     def _count(self, name: str) -> int:
         text = self._text(name)

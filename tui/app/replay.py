@@ -11,13 +11,15 @@ from typing import ClassVar
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Vertical
-from textual.widgets import Footer, ProgressBar, Static
+from textual.widgets import Footer, ProgressBar
 
 from daq.store_records import StoredPoint
+from daq.visible_text import visible_line
 from tui.app.recording import Recording
 from tui.app.style import STYLE
 from tui.app.terminal_app import TerminalApp
 from tui.app.widgets.bode import BodePlot
+from tui.app.widgets.plain import Words
 from tui.app.widgets.traces import traces_of_points
 from tui.app.words import point_words, span_words
 
@@ -64,11 +66,11 @@ class ReplayApp(TerminalApp):
 
     def compose(self) -> ComposeResult:
         """Banner, plot, lines."""
-        yield Static(id="banner", markup=False)
+        yield Words(id="banner")
         with Vertical(classes="pane"):
             yield BodePlot()
             yield ProgressBar(total=max(0.001, self.recording.duration_s), show_eta=False)
-            yield Static("", id="text", markup=False)
+            yield Words("", id="text")
         yield Footer(compact=True)
 
     def on_mount(self) -> None:
@@ -137,8 +139,8 @@ class ReplayApp(TerminalApp):
         over = self.at_s >= self.recording.duration_s
         word = "PAUSED" if self.paused else "END" if over else "playing"
         simulated = "SIMULATED | " if self.recording.simulated else ""
-        self.query_one("#banner", Static).update(
-            f" REPLAY, no instrument | {simulated}{self.recording.title}"
+        self.query_one("#banner", Words).update(
+            visible_line(f" REPLAY, no instrument | {simulated}{self.recording.title}")
         )
         cursor = self.query_one(BodePlot).reading
         clock = f"{span_words(self.at_s)} of {span_words(self.recording.duration_s)}"
@@ -147,4 +149,4 @@ class ReplayApp(TerminalApp):
             f"now: {latest}" if latest else "",
             f"cursor: {cursor}" if cursor else said,
         ]
-        self.query_one("#text", Static).update("\n".join(lines))
+        self.query_one("#text", Words).update("\n".join(lines))

@@ -11,11 +11,14 @@ from typing import TYPE_CHECKING, ClassVar, cast
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Container
+from textual.content import Content
 from textual.events import Key
 from textual.screen import Screen
-from textual.widgets import Footer, Static
+from textual.style import Style
+from textual.widgets import Footer
 
 from daq.analyser import SourceState
+from tui.app.widgets.plain import Words
 
 if TYPE_CHECKING:
     from tui.app.application import BenchApp
@@ -59,11 +62,11 @@ class StepScreen(Screen[None]):
 
     def compose(self) -> ComposeResult:
         """The frame, with the step's own widgets in it."""
-        yield Static(id="step-bar")
-        yield Static(id="banner", markup=False)
+        yield Words(id="step-bar")
+        yield Words(id="banner")
         with Container(id="body"):
             yield from self.body()
-        yield Static(id="hint", markup=False)
+        yield Words(id="hint")
         yield Footer(compact=True)
 
     def body(self) -> ComposeResult:
@@ -118,17 +121,25 @@ class StepScreen(Screen[None]):
         self.bench.go(self.STEP - 1)
 
     def _show_frame(self) -> None:
-        trail = "  ".join(
-            f"[reverse b][{number} {title}][/]"
-            if number == self.STEP
-            else f"[@click=app.go({number})]{number} {title}[/]"
-            for number, title in enumerate(_TITLES, start=1)
-        ).replace(f"[{self.STEP} ", f"\\[{self.STEP} ")
-        self.query_one("#step-bar", Static).update(trail)
-        banner = self.query_one("#banner", Static)
+        self.query_one("#step-bar", Words).update(_trail(self.STEP))
+        banner = self.query_one("#banner", Words)
         banner.update(self.bench.banner_text())
         source = self.desk.run.source
         alarm = source in (SourceState.UNCONFIRMED, SourceState.UNKNOWN)
         banner.set_class(source is SourceState.ON, "-driving")
         banner.set_class(alarm, "-alarm")
-        self.query_one("#hint", Static).update(f"> {self.hint()}" if self.hint() else "")
+        self.query_one("#hint", Words).update(f"> {self.hint()}" if self.hint() else "")
+
+
+def _trail(here: int) -> Content:
+    """The steps by name, the one on top marked, the others to be clicked."""
+    parts: list[str | tuple[str, str | Style]] = []
+    for number, title in enumerate(_TITLES, start=1):
+        if parts:
+            parts.append("  ")
+        if number == here:
+            parts.append((f"[{number} {title}]", "reverse bold"))
+        else:
+            action = Style.from_meta({"@click": f"app.go({number})"})
+            parts.append((f"{number} {title}", action))
+    return Content.assemble(*parts)

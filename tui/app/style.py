@@ -10,6 +10,7 @@ STYLE = """
 Screen { layers: base dialog; }
 #step-bar { height: 1; background: $panel; }
 #banner { height: 1; background: $surface; text-style: bold; }
+#banner, #step-bar, #hint { text-wrap: nowrap; text-overflow: ellipsis; }
 #banner.-driving { background: $warning; color: black; }
 #banner.-alarm { background: $error; color: white; }
 #body { height: 1fr; }

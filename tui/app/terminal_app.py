@@ -12,11 +12,13 @@ from typing import TYPE_CHECKING
 
 from textual.app import App
 
+from daq.visible_text import visible, visible_line
 from tui.entry import INTERRUPTED
 from tui.signals import ending_on_signals
 
 if TYPE_CHECKING:
     from textual.driver import Driver
+    from textual.notifications import SeverityLevel
     from textual.timer import Timer
 
 __all__ = ["TerminalApp"]
@@ -41,6 +43,29 @@ class TerminalApp(App[int]):
 
             return LastingDriver if found is LinuxDriver else found
         return found
+
+    def notify(
+        self,
+        message: str,
+        *,
+        title: str = "",
+        severity: SeverityLevel = "information",
+        timeout: float | None = None,
+        markup: bool = False,
+    ) -> None:
+        """A note that goes away: plain text, whatever it holds and whoever asks for markup."""
+        del markup
+        super().notify(
+            visible(message),
+            title=visible_line(title),
+            severity=severity,
+            timeout=timeout,
+            markup=False,
+        )
+
+    def copy_to_clipboard(self, text: str) -> None:
+        """Hand text to the terminal, as it is seen: it may be pasted at a prompt."""
+        super().copy_to_clipboard(visible(text))
 
     def end_at_once(self) -> None:
         """Nobody may be there to read or to press anything."""

@@ -9,12 +9,12 @@ from __future__ import annotations
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical, VerticalScroll
-from textual.widgets import Static
 
 from daq.errors import LashbenchError
 from tui.app.dialogs import QuestionDialog
 from tui.app.plan_dialog import PlanDialog
 from tui.app.step_screen import StepScreen
+from tui.app.widgets.plain import Words
 from tui.app.words import plan_words
 from tui.measure_options import PlanOptions
 
@@ -45,17 +45,17 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
     def body(self) -> ComposeResult:
         """Plan above, checks below."""
         with Vertical(classes="pane"):
-            yield Static("Plan", classes="heading")
-            yield Static("", id="plan", markup=False)
-            yield Static("")
-            yield Static("Checks", classes="heading")
+            yield Words("Plan", classes="heading")
+            yield Words("", id="plan")
+            yield Words("")
+            yield Words("Checks", classes="heading")
             with VerticalScroll(id="lines"):
-                yield Static("", id="checks", markup=False)
+                yield Words("", id="checks")
 
     def show_body(self) -> None:
         """The plan, and every check told so far."""
-        self.query_one("#plan", Static).update(self._plan_text())
-        self.query_one("#checks", Static).update("\n".join(self._lines()))
+        self.query_one("#plan", Words).update(self._plan_text())
+        self.query_one("#checks", Words).update("\n".join(self._lines()))
         self.query_one("#lines", VerticalScroll).scroll_end(animate=False)
 
     def hint(self) -> str:

@@ -12,13 +12,14 @@ from typing import Any
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import VerticalScroll
-from textual.widgets import ProgressBar, Static
+from textual.widgets import ProgressBar
 
 from analysis.swept import sweep_lines
 from analysis.unseen import head_unseen, list_unseen
 from daq.errors import LashbenchError
 from tui.app.desk import plan_of_document
 from tui.app.step_screen import StepScreen
+from tui.app.widgets.plain import Words
 from tui.app.words import plan_words
 
 __all__ = ["DiagnosisScreen", "diagnosis_lines"]
@@ -57,7 +58,7 @@ sweep itself. D then diagnoses both measurements together.
         """Progress and words."""
         yield ProgressBar(total=100, show_eta=False, id="share")
         with VerticalScroll(classes="pane", id="scroll"):
-            yield Static("", id="text", markup=False)
+            yield Words("", id="text")
 
     def on_mount(self) -> None:
         """The words have the focus, to be scrolled."""
@@ -71,7 +72,7 @@ sweep itself. D then diagnoses both measurements together.
         bar.display = running is not None
         if running is not None:
             bar.update(progress=100 * running[0])
-        self.query_one("#text", Static).update("\n".join(self._lines()))
+        self.query_one("#text", Words).update("\n".join(self._lines()))
 
     def hint(self) -> str:
         """Diagnose, measure next, or go on."""

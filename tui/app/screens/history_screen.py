@@ -14,12 +14,12 @@ import numpy as np
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
-from textual.widgets import DataTable, Static
 
 from daq.errors import LashbenchError
 from tui.app.step_screen import StepScreen
 from tui.app.widgets.bode import BodePlot
 from tui.app.widgets.panel import Panel
+from tui.app.widgets.plain import Table, Words
 from tui.app.widgets.traces import traces_of_response
 from tui.history_rows import measurement_row, trend_lines, trend_rows
 from tui.reports import estimates_in_force
@@ -68,14 +68,14 @@ contribution ratio of every estimated session with its error bar. U lists all un
     def body(self) -> ComposeResult:
         """Table, plot, words."""
         with Vertical(classes="pane"):
-            yield DataTable(id="sessions", cursor_type="row", zebra_stripes=True)
+            yield Table(id="sessions", cursor_type="row", zebra_stripes=True)
             yield Panel("trend")
             yield BodePlot()
-            yield Static("", id="text", markup=False)
+            yield Words("", id="text")
 
     def on_mount(self) -> None:
         """Columns; gain alone where there is little room."""
-        table = self.query_one("#sessions", DataTable)
+        table = self.query_one("#sessions", Table)
         table.add_columns("", "#", "started", "unit", "state", "points", "r", "b1/deg", "b2/deg")
         self.query_one(BodePlot).set_class(self.size.height < 40, "-gain-only")
         super().on_mount()
@@ -89,7 +89,7 @@ contribution ratio of every estimated session with its error bar. U lists all un
     def show_body(self) -> None:
         """Trend and words."""
         self._draw_trend()
-        self.query_one("#text", Static).update("\n".join(self._lines()))
+        self.query_one("#text", Words).update("\n".join(self._lines()))
 
     def hint(self) -> str:
         """The report, then whatever is wanted."""
@@ -162,7 +162,7 @@ contribution ratio of every estimated session with its error bar. U lists all un
         self.arrive()
         self.show()
 
-    def on_data_table_row_selected(self, event: DataTable.RowSelected) -> None:
+    def on_data_table_row_selected(self, event: Table.RowSelected) -> None:
         """Open it."""
         measurement = next(m for m in self.bench.measurements() if str(m.id) == event.row_key.value)
         self.bench.open_measurement(measurement)
@@ -186,7 +186,7 @@ contribution ratio of every estimated session with its error bar. U lists all un
         self._rows = [measurement_row(m, known.get(m.id, {})) for m in measurements]
 
     def _fill(self) -> None:
-        table = self.query_one("#sessions", DataTable)
+        table = self.query_one("#sessions", Table)
         cursor = table.cursor_row
         table.clear()
         for row in reversed(self._rows):
@@ -216,7 +216,7 @@ contribution ratio of every estimated session with its error bar. U lists all un
         ]
 
     def _under_cursor(self) -> int | None:
-        table = self.query_one("#sessions", DataTable)
+        table = self.query_one("#sessions", Table)
         newest_first = self._rows[::-1]
         if 0 <= table.cursor_row < len(newest_first):
             return int(newest_first[table.cursor_row]["id"])

@@ -11,13 +11,12 @@ from collections.abc import Sequence
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
-from textual.content import Content
-from textual.widgets import Input, Label, OptionList, Static
 from textual.widgets.option_list import Option
 
 from tui.app.desk import SIMULATED_URL
 from tui.app.messages import InstrumentsListed
 from tui.app.step_screen import StepScreen
+from tui.app.widgets.plain import Caption, Choices, Field, Words, choice
 
 __all__ = ["InstrumentScreen"]
 
@@ -58,13 +57,13 @@ Connecting asks who is there and what the source does. It drives nothing.
     def body(self) -> ComposeResult:
         """List, field, answer."""
         with Vertical(classes="pane"):
-            yield Static("Instrument", classes="heading")
-            yield OptionList(*self._options([]), id="found", compact=True)
+            yield Words("Instrument", classes="heading")
+            yield Choices(*self._options([]), id="found", compact=True)
             with Horizontal(classes="field"):
-                yield Label("address")
-                yield Input(self.desk.url, id="url", compact=True)
-            yield Static("searching this machine for instruments", id="search", markup=False)
-            yield Static("", id="answer", markup=False)
+                yield Caption("address")
+                yield Field(self.desk.url, id="url", compact=True)
+            yield Words("searching this machine for instruments", id="search")
+            yield Words("", id="answer")
 
     def on_mount(self) -> None:
         """Search beside the screen."""
@@ -74,21 +73,21 @@ Connecting asks who is there and what the source does. It drives nothing.
 
     def arrive(self) -> None:
         """The address may have come with a session that is to be resumed."""
-        field = self.query_one("#url", Input)
+        field = self.query_one("#url", Field)
         if field.value != self.desk.url:
             field.value = self.desk.url
             field.focus()
 
     def listed(self, message: InstrumentsListed) -> None:
         """Show what was found."""
-        options = self.query_one("#found", OptionList)
+        options = self.query_one("#found", Choices)
         kept = options.highlighted
         options.clear_options()
         options.add_options(self._options(message.found))
         options.highlighted = kept
         count = len(message.found)
         words = [f"{count} found on this machine" if count else "none found on this machine"]
-        self.query_one("#search", Static).update("; ".join([*words, *message.notes]))
+        self.query_one("#search", Words).update("; ".join([*words, *message.notes]))
 
     def show_body(self) -> None:
         """Who answered, or why nobody did."""
@@ -106,7 +105,7 @@ Connecting asks who is there and what the source does. It drives nothing.
             ]
         elif desk.link_fault:
             lines = ["NOT CONNECTED", desk.link_fault, "", *_REMEDIES]
-        self.query_one("#answer", Static).update("\n".join(lines))
+        self.query_one("#answer", Words).update("\n".join(lines))
 
     def hint(self) -> str:
         """Connect, then check."""
@@ -116,12 +115,12 @@ Connecting asks who is there and what the source does. It drives nothing.
 
     def copy_text(self) -> str:
         """What the instrument said, or the fault."""
-        return str(self.query_one("#answer", Static).content)
+        return str(self.query_one("#answer", Words).content)
 
-    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+    def on_option_list_option_selected(self, event: Choices.OptionSelected) -> None:
         """Connect what was chosen."""
         if event.option.id is not None:
-            self.query_one("#url", Input).value = event.option.id
+            self.query_one("#url", Field).value = event.option.id
             self.action_connect()
 
     def on_input_submitted(self) -> None:
@@ -134,7 +133,7 @@ Connecting asks who is there and what the source does. It drives nothing.
         if bench.keeper.busy:
             self.notify("the instrument is in use; stop it first", severity="warning")
             return
-        desk.url = self.query_one("#url", Input).value.strip()
+        desk.url = self.query_one("#url", Field).value.strip()
         desk.identity, desk.link_fault = None, ""
         bench.keeper.look()
         self.show()
@@ -147,4 +146,4 @@ Connecting asks who is there and what the source does. It drives nothing.
     def _options(found: Sequence[tuple[str, str]]) -> list[Option]:
         # An address that two searches found is listed once.
         places = dict([*_SIMULATED, *found])
-        return [Option(Content(f"{words}:  {url}"), id=url) for url, words in places.items()]
+        return [choice(f"{words}:  {url}", url) for url, words in places.items()]

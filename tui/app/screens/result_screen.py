@@ -13,12 +13,12 @@ import numpy as np
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical, VerticalScroll
-from textual.widgets import Static
 from textual_plot import HiResMode
 
 from tui.app.step_screen import StepScreen
 from tui.app.widgets.bode import BodePlot
 from tui.app.widgets.panel import Panel
+from tui.app.widgets.plain import Words
 from tui.app.widgets.traces import traces_of_response
 
 if TYPE_CHECKING:
@@ -63,9 +63,9 @@ least index marks the likeliest ratio. E estimates once more. Ctrl+Y copies ever
         with Vertical(id="plots", classes="pane"):
             yield BodePlot()
             yield Panel("index")
-            yield Static(_INDEX_WORDS, id="index-words")
+            yield Words(_INDEX_WORDS, id="index-words")
         with VerticalScroll(id="words", classes="pane"):
-            yield Static("", id="text", markup=False)
+            yield Words("", id="text")
 
     def on_mount(self) -> None:
         """Gain alone where there is little room."""
@@ -93,7 +93,7 @@ least index marks the likeliest ratio. E estimates once more. Ctrl+Y copies ever
         plot.draw(traces, None, features)
         if results.estimate is not None:
             _draw_index(self.query_one("#index", Panel), results.estimate)
-        self.query_one("#text", Static).update("\n".join(self._lines()))
+        self.query_one("#text", Words).update("\n".join(self._lines()))
 
     def hint(self) -> str:
         """Wait, or go on."""

@@ -9,12 +9,13 @@ from __future__ import annotations
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
-from textual.widgets import ProgressBar, Static
+from textual.widgets import ProgressBar
 
 from daq.errors import LashbenchError
 from tui.app.dialogs import QuestionDialog
 from tui.app.step_screen import StepScreen
 from tui.app.widgets.bode import BodePlot
+from tui.app.widgets.plain import Words
 from tui.app.widgets.traces import traces_of_points, traces_of_response
 from tui.app.words import clock_in, plan_words, point_words, span_words
 
@@ -68,7 +69,7 @@ Marks: a letter shape per level, ! overload, ~ not periodic, - coarse, ? spoilt.
         with Vertical(classes="pane"):
             yield BodePlot()
             yield ProgressBar(show_eta=False, classes="decoration")
-            yield Static("", id="text", markup=False)
+            yield Words("", id="text")
 
     def on_mount(self) -> None:
         """Gain alone where there is little room."""
@@ -92,7 +93,7 @@ Marks: a letter shape per level, ! overload, ~ not periodic, - coarse, ? spoilt.
         lines = [] if self._band_from is None else [(self._band_from, "band")]
         plot.draw(traces, span, lines)
         self.query_one(ProgressBar).update(total=max(1, run.total), progress=run.done)
-        self.query_one("#text", Static).update("\n".join(self._lines()))
+        self.query_one("#text", Words).update("\n".join(self._lines()))
 
     def hint(self) -> str:
         """The word that the session waits for."""
@@ -235,7 +236,7 @@ Marks: a letter shape per level, ! overload, ~ not periodic, - coarse, ? spoilt.
 
     def on_bode_plot_cursor_moved(self) -> None:
         """The reading follows the cursor."""
-        self.query_one("#text", Static).update("\n".join(self._lines()))
+        self.query_one("#text", Words).update("\n".join(self._lines()))
 
     # ------------------------------------------------------------ inside
 

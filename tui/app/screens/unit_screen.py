@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Horizontal, Vertical, VerticalScroll
-from textual.widgets import DataTable, Input, Label, OptionList, Static
 from textual.widgets.option_list import Option
 
 from daq.errors import LashbenchError
+from daq.visible_text import visible_line
 from tui.app.step_screen import StepScreen
+from tui.app.widgets.plain import Caption, Choices, Field, Table, Words, choice
 
 if TYPE_CHECKING:
     from daq.store_records import Measurement
@@ -55,25 +56,25 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
         """Unit and operator on top, sessions below."""
         with Horizontal(id="choice"):
             with Vertical(id="left", classes="pane"):
-                yield Static("Unit under test", classes="heading")
-                yield OptionList(*self._units(), id="units", compact=True)
+                yield Words("Unit under test", classes="heading")
+                yield Choices(*self._units(), id="units", compact=True)
                 for name, label, hint in (
                     ("file", "unit file", "or the path of one"),
                     *((remark, _REMARKS[remark], "") for remark in _REMARKS),
                 ):
                     with Horizontal(classes="field"):
-                        yield Label(label)
-                        yield Input(id=name, placeholder=hint, compact=True)
-                yield Static("", id="whose")
-                yield Static("", id="limits", markup=False)
+                        yield Caption(label)
+                        yield Field(id=name, placeholder=hint, compact=True)
+                yield Words("", id="whose")
+                yield Words("", id="limits")
             with VerticalScroll(id="parameters", classes="pane"):
-                yield Static("", id="parameter-list", markup=False)
-        yield Static("Sessions of this bench", classes="heading pane", id="sessions-heading")
-        yield DataTable(id="sessions", cursor_type="row", zebra_stripes=True)
+                yield Words("", id="parameter-list")
+        yield Words("Sessions of this bench", classes="heading pane", id="sessions-heading")
+        yield Table(id="sessions", cursor_type="row", zebra_stripes=True)
 
     def on_mount(self) -> None:
         """The table's columns, the first unit, and the offer to resume."""
-        table = self.query_one("#sessions", DataTable)
+        table = self.query_one("#sessions", Table)
         table.add_columns("", "#", "started (UTC)", "unit", "serial", "state", "points")
         if self.desk.unit is None:
             self._choose("adss")
@@ -85,8 +86,8 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
         """Sessions as they are now, and what is on the desk wherever it came from."""
         self._list_sessions()
         for name in _REMARKS:
-            self.query_one(f"#{name}", Input).value = getattr(self.desk, name)
-        units = self.query_one("#units", OptionList)
+            self.query_one(f"#{name}", Field).value = visible_line(getattr(self.desk, name))
+        units = self.query_one("#units", Choices)
         places = {option.id: place for place, option in enumerate(units.options)}
         # None of them, where another of that name is on the desk.
         units.highlighted = places.get(self.desk.unit_name)
@@ -106,8 +107,8 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
         pairs = [f"{left} {right}" for left, right in zip(cells[:half], cells[half:], strict=False)]
         origin = self.desk.unit_origin.splitlines()
         lines = [f"{unit.name}: SI units, b_t in degrees", *origin, *pairs, *cells[2 * half :]]
-        self.query_one("#parameter-list", Static).update("\n".join(lines))
-        self.query_one("#limits", Static).update(
+        self.query_one("#parameter-list", Words).update("\n".join(lines))
+        self.query_one("#limits", Words).update(
             f"limits: {limits.source_vpk:g} V peak, offset {limits.source_offset_v:g} V\n"
             f"        {limits.start_hz:g} to {limits.stop_hz:g} Hz"
         )
@@ -124,27 +125,31 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
 
     def copy_text(self) -> str:
         """The unit's parameters."""
-        return str(self.query_one("#parameter-list", Static).content)
+        return str(self.query_one("#parameter-list", Words).content)
 
-    def on_option_list_option_highlighted(self, event: OptionList.OptionHighlighted) -> None:
+    def on_option_list_option_highlighted(self, event: Choices.OptionHighlighted) -> None:
         """A unit that comes with lashbench."""
         if event.option.id is not None and event.option_list.has_focus:
             self._choose(event.option.id)
 
-    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+    def on_option_list_option_selected(self, event: Choices.OptionSelected) -> None:
         """Chosen: on to who measures."""
         if event.option.id is not None:
             self._choose(event.option.id)
             self._begin_anew()
-        self.query_one("#serial", Input).focus()
+        self.query_one("#serial", Field).focus()
 
-    def on_input_changed(self, event: Input.Changed) -> None:
+    def on_input_changed(self, event: Field.Changed) -> None:
         """What is typed is on the desk at once."""
-        if event.input.id in _REMARKS and self.desk.remarks_of is None:
-            setattr(self.desk, event.input.id, event.value.strip())
+        name = event.input.id
+        if name not in _REMARKS or self.desk.remarks_of is not None:
+            return
+        # What came from a history is shown with escapes, and stays as it is until it is changed.
+        if event.value != visible_line(getattr(self.desk, name)):
+            setattr(self.desk, name, event.value.strip())
             self._show_frame()
 
-    def on_input_submitted(self, event: Input.Submitted) -> None:
+    def on_input_submitted(self, event: Field.Submitted) -> None:
         """Enter goes on; a typed file is read first."""
         if event.input.id == "file" and event.value.strip():
             if not self._choose(event.value.strip()):
@@ -155,7 +160,7 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
         else:
             self.focus_next()
 
-    def on_data_table_row_selected(self, event: DataTable.RowSelected) -> None:
+    def on_data_table_row_selected(self, event: Table.RowSelected) -> None:
         """Resume an interrupted session, open another."""
         measurement = next(m for m in self._measurements if str(m.id) == event.row_key.value)
         if measurement.state == "interrupted":
@@ -194,13 +199,13 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
     def _show_whose(self) -> None:
         """Remarks of a measurement that has them already can be read, not changed."""
         kept_by = self.desk.remarks_of
-        whose = self.query_one("#whose", Static)
+        whose = self.query_one("#whose", Words)
         whose.display = kept_by is not None
         whose.update(
             f"session {kept_by} keeps them as they are;\nEnter on a unit: a new measurement"
         )
         for name in _REMARKS:
-            self.query_one(f"#{name}", Input).disabled = kept_by is not None
+            self.query_one(f"#{name}", Field).disabled = kept_by is not None
 
     def _choose(self, name: str) -> bool:
         if self.bench.keeper.busy and name != self.desk.unit_name:
@@ -221,12 +226,12 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
     def _units() -> list[Option]:
         from daq.configs import config_names
 
-        return [Option(name.upper(), id=name) for name in config_names("units")]
+        return [choice(name.upper(), name) for name in config_names("units")]
 
     def _list_sessions(self) -> None:
         self._listed_beside = running = self._under_way()
         self._measurements = self._recent(running)
-        table = self.query_one("#sessions", DataTable)
+        table = self.query_one("#sessions", Table)
         table.clear()
         for measurement in self._measurements:
             header = measurement.header
@@ -249,7 +254,7 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
             words = f"Session {running} is under way: step 4   {words}"
         elif not self._measurements:
             words = f"No sessions yet in {self.desk.db}"
-        self.query_one("#sessions-heading", Static).update(words)
+        self.query_one("#sessions-heading", Words).update(words)
 
     def _under_way(self) -> int | None:
         return self.desk.run.measurement if self.desk.run.live else None

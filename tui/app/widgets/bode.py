@@ -15,11 +15,11 @@ from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
 from textual.message import Message
-from textual.widgets import Static
 from textual_plot import HiResMode
 
 from tui.app.widgets.axes import DegreeAxis, LogHertzAxis
 from tui.app.widgets.panel import LEFT, Panel
+from tui.app.widgets.plain import Words
 from tui.app.widgets.traces import Trace, legend
 
 __all__ = ["BodePlot"]
@@ -80,7 +80,7 @@ class BodePlot(Vertical, can_focus=True):
         """Gain, phase, legend."""
         yield _Panel("gain")
         yield _Panel("phase")
-        yield Static("", id="legend-line", markup=False)
+        yield Words("", id="legend-line")
 
     def on_mount(self) -> None:
         """Axes and the first, empty drawing."""
@@ -173,7 +173,7 @@ class BodePlot(Vertical, can_focus=True):
             if names := dict.fromkeys(label for _, label in self._lines if label):
                 words += f"  \u2502 {', '.join(names)}"
             unit = "phase, wrapped, deg" if self.has_class("-phase-only") else "gain, dB re 1 V/V"
-            self.query_one("#legend-line", Static).update(f"{unit} over Hz   {words}")
+            self.query_one("#legend-line", Words).update(f"{unit} over Hz   {words}")
 
     def _log_span(self) -> tuple[float, float] | None:
         if self._span is not None:
