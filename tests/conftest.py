@@ -6,7 +6,9 @@ and how long an example takes says nothing.
 
 import os
 import signal
+import subprocess
 
+import pytest
 from hypothesis import settings
 
 # Before anything loads numpy; what a test starts inherits it.
@@ -27,3 +29,21 @@ def pytest_collection_modifyitems(items):
     """Files with slow tests go first: at the end a core would wait for one of them alone."""
     slow = {item.path for item in items if item.get_closest_marker("slow")}
     items.sort(key=lambda item: item.path not in slow)
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A disk of 64 KiB; mounting one takes root."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    words = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(place)]
+    try:
+        done = subprocess.run(words, capture_output=True, text=True)
+    except OSError as error:
+        pytest.skip(f"no small disk can be mounted: {error}")
+    if done.returncode:
+        pytest.skip(f"no small disk can be mounted: {done.stderr.strip()}")
+    try:
+        yield place
+    finally:
+        subprocess.run(["umount", "--lazy", str(place)], check=True)

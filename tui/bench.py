@@ -114,7 +114,7 @@ def bench_session(
     faults: list[str] = []
     with ExitStack() as stack:
         store = stack.enter_context(Store(history, create=request.resume is None))
-        lock = stack.enter_context(BenchLock(history))
+        lock = stack.enter_context(BenchLock(history, instrument=url))
         analyser = connect(url, unit, transcript, faults.append)
         # The watchdog opens the instrument anew, which must be free by then.
         watch = stack.enter_context(ExitStack())

@@ -191,6 +191,21 @@ def test_two_sessions_do_not_share_a_bench(tmp_path):
         end(process)
 
 
+def test_another_history_is_not_measured_on_an_instrument_in_use(tmp_path, capsys):
+    with served(linear_analyser(known_gain)) as url:
+        process = start(url, tmp_path / "bench.db", 0, (130.0, 170.0, 400, 3, 4, 2.0))
+        process.stdout.readline()
+        short = ["--level", "1", "--start", "130", "--stop", "170", "--points", "3", *QUICK]
+        other = ["--instrument", url, "--db", str(tmp_path / "other.db"), "--yes"]
+        assert cli.main(["measure", "--unit", "adss", *other, *short]) == 1
+        told = capsys.readouterr().err
+        assert f"(process {process.pid}, history {tmp_path / 'bench.db'}) is measuring on" in told
+        assert source_state(url) is SourceState.ON
+        process.terminate()
+        end(process)
+        assert cli.main(["measure", "--unit", "adss", *other, *short]) == 0
+
+
 def test_the_lock_is_shared_with_the_watchdog_and_leaves_nothing(tmp_path):
     db = tmp_path / "bench.db"
     with served(linear_analyser(known_gain)) as url:
