@@ -1,99 +1,221 @@
-"""What an estimate means for whoever adjusts the gears, in plain words.
+"""What the answer means for whoever adjusts the gears, in plain words.
 
-Owns the sentence about which stage to adjust and the comparison of b1 and b2
-with their limits. It estimates nothing.
+Owns the judgement of b1 and b2 against their limits and the sentence about which stage to adjust:
+one function decides and everything else prints what it decided. It estimates nothing and chooses
+no model (`analysis.answer` does).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
 
+from analysis.answer import Answer, model_name
 from sim.unit import Unit
 
-__all__ = ["limit_lines", "stage_actions", "stage_to_adjust"]
+__all__ = ["Advice", "Stage", "StageVerdict", "advise", "judge_limit", "span_of"]
+
+StageVerdict = Literal["PASS", "FAIL", "UNDECIDED"]
 
 _HALF = 0.5
 _SIGMA = 2.0
-"""Standard errors by which a value must clear a limit for the verdict to be sure."""
+"""Standard deviations on either side that stand for a 95 % interval which is not stated."""
 
 
-def stage_to_adjust(document: Mapping[str, Any]) -> str:
-    """Which stage holds more of the backlash, from the document of ``estimate --json``.
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """One gear stage: its number, what its limit says of it (None without a limit), and a line.
 
-    The verdict is taken only where the whole 95 % interval of the contribution
-    ratio lies on one side of one half.
+    The line is empty where neither the backlash nor a limit is known.
     """
-    ratio = document["contribution_ratio"]
-    if ratio["value"] == 1.0 and not ratio["std"]:
-        return "There is one gear stage: it holds all of the backlash."
-    low, high = ratio.get("interval95") or _interval(ratio)
-    share = f"{100 * ratio['value']:.0f} % of the backlash sits in stage 1 (95 %: "
-    share += f"{100 * low:.0f} to {100 * high:.0f} %)"
+
+    stage: int
+    verdict: StageVerdict | None
+    line: str
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """What to do, in one sentence, and each stage beside its limit."""
+
+    headline: str
+    stages: tuple[Stage, ...]
+
+    def lines(self) -> list[str]:
+        """The headline, then a line for each stage of which something is known."""
+        return [self.headline, *(stage.line for stage in self.stages if stage.line)]
+
+
+def advise(answer: Answer, unit: Unit | None = None) -> Advice:
+    """What to do about the stages, by every model that may be true.
+
+    Limits decide where the unit sets any (``b1_deg``, ``b2_deg`` under ``[limits]``). Without
+    them the stage that holds more of the backlash is named, where the whole 95 % interval of the
+    contribution ratio lies on its side of one half. Nothing is decided that the models left do
+    not agree on, and nothing at all where no model is accepted.
+
+    Parameters
+    ----------
+    unit
+        The unit that the answer is about, with its limits; None if it is not known.
+    """
+    one_stage = _has_one_stage(answer, unit)
+    stages = tuple(
+        _judged(answer, number, _limit(unit, number), unit)
+        for number in (1, 2)[: 1 if one_stage else 2]
+    )
+    limited = [stage for stage in stages if stage.verdict is not None]
+    if not answer.models or any("contribution_ratio" not in one for one in answer.models):
+        headline = _without_model(answer, one_stage)
+    elif limited:
+        headline = _by_limits(limited)
+    elif one_stage:
+        headline = "There is one gear stage: it holds all of the backlash."
+    else:
+        headline = _by_ratio(answer)
+    return Advice(headline, stages)
+
+
+def judge_limit(spans: Sequence[tuple[float, float]], limit: float) -> StageVerdict:
+    """A limit against the 95 % intervals of a backlash, one of each model that may be true.
+
+    PASS where every interval lies within the limit, FAIL where every one lies above it.
+    """
+    if spans and all(high <= limit for _, high in spans):
+        return "PASS"
+    if spans and all(low > limit for low, _ in spans):
+        return "FAIL"
+    return "UNDECIDED"
+
+
+def span_of(number: Mapping[str, Any]) -> tuple[float, float]:
+    """The 95 % interval of a number; two standard deviations on either side if it is not stated."""
+    if number.get("interval95"):
+        low, high = number["interval95"]
+        return float(low), float(high)
+    std = number["std"] or 0.0
+    return max(0.0, number["value"] - _SIGMA * std), number["value"] + _SIGMA * std
+
+
+def _has_one_stage(answer: Answer, unit: Unit | None) -> bool:
+    if unit is not None:
+        return unit.stages == 1
+    ratio = answer.contribution_ratio
+    return ratio is not None and ratio["value"] == 1.0 and not ratio["std"]
+
+
+def _limit(unit: Unit | None, stage: int) -> float | None:
+    limit: float | None = None if unit is None else getattr(unit.limits, f"b{stage}_deg")
+    return limit
+
+
+def _judged(answer: Answer, stage: int, limit: float | None, unit: Unit | None) -> Stage:
+    """One stage against its limit, by every model that may be true."""
+    told = [model.get(f"b{stage}_deg") for model in answer.models]
+    numbers = [number for number in told if number is not None]
+    known = len(numbers) == len(told) > 0
+    said = _told(stage, numbers) if known else f"b{stage} is not known"
+    if limit is None and not known:
+        return Stage(stage, None, "")
+    if limit is None:
+        most = _most(answer, stage, unit)
+        all_of_it = "" if most is None else f", all of it would be {most:.4f} deg"
+        return Stage(stage, None, f"Stage {stage}: {said}; no limit set{all_of_it}.")
+    verdict = judge_limit([span_of(number) for number in numbers] if known else [], limit)
+    line = f"Stage {stage}: {verdict}. {said}; limit {limit:.4f} deg: {_ACTIONS[verdict]}"
+    return Stage(stage, verdict, line)
+
+
+def _told(stage: int, numbers: Sequence[Mapping[str, Any]]) -> str:
+    low = min(span_of(number)[0] for number in numbers)
+    high = max(span_of(number)[1] for number in numbers)
+    if len(numbers) > 1:
+        return f"b{stage} = {low:.4f} to {high:.4f} deg (95 %, over the models left)"
+    (number,) = numbers
+    std = number["std"] or 0.0
+    return f"b{stage} = {number['value']:.4f} +- {std:.4f} deg (95 %: {low:.4f} to {high:.4f})"
+
+
+def _most(answer: Answer, stage: int, unit: Unit | None) -> float | None:
+    """The backlash of a stage that holds all of it, by the likeliest model."""
+    total = answer.models[0].get("b_t_deg")
+    if total is None or unit is None:
+        return None
+    return float(total["value"] * (unit.output_ratio if stage == 1 else 1.0))
+
+
+def _without_model(answer: Answer, one_stage: bool) -> str:
+    if answer.state == "none":
+        return "No advice: nothing was estimated."
+    if answer.state in ("open", "accepted", "not judged"):
+        return "No advice: the backlash by the models that are left is not known."
+    if one_stage:
+        return (
+            "No advice: the model of this unit does not explain the response, and a drive with "
+            "one gear stage cannot be diagnosed."
+        )
+    if answer.diagnosed:
+        return "No advice: no model that is known explains this response."
+    return (
+        "No advice before a diagnosis: the plain model does not explain this response. "
+        "Run lashbench diagnose."
+    )
+
+
+def _by_limits(limited: Sequence[Stage]) -> str:
+    """The verdicts of all stages that have a limit, and what they ask for."""
+    found = {word: [s.stage for s in limited if s.verdict == word] for word in _ACTIONS}
+    told = "; ".join(f"stage {s.stage} {s.verdict}" for s in limited)
+    if found["FAIL"]:
+        return f"Adjust {_stages(found['FAIL'])}: {told}."
+    if found["UNDECIDED"]:
+        return (
+            f"Undecided: {told}. Measure again at further source levels before adjusting "
+            f"{_stages(found['UNDECIDED'])}."
+        )
+    return f"Leave {_stages(found['PASS'])} as {'it is' if len(limited) == 1 else 'they are'}: " \
+           f"{told}."  # fmt: skip
+
+
+def _stages(numbers: Sequence[int]) -> str:
+    return " and ".join(f"stage {number}" for number in numbers)
+
+
+def _by_ratio(answer: Answer) -> str:
+    ratios = [model["contribution_ratio"] for model in answer.models]
+    spans = [span_of(ratio) for ratio in ratios]
+    low, high = min(s[0] for s in spans), min(1.0, max(s[1] for s in spans))
+    span = f"{100 * low:.0f} to {100 * high:.0f} %"
+    if len(ratios) == 1:
+        share = f"{100 * ratios[0]['value']:.0f} % of the backlash sits in stage 1 (95 %: {span})"
+        share += f", by the {_by(answer)}"
+    else:
+        share = f"{span} of the backlash sits in stage 1 (95 %, over the {len(ratios)} models left)"
     if low > _HALF:
         return f"Adjust stage 1 first: {share}."
     if high < _HALF:
         return f"Adjust stage 2 first: {share}."
-    return f"Neither stage stands out: {share}. Measure at more levels before adjusting one."
+    if len(ratios) == 1:
+        return f"Neither stage stands out: {share}. Measure at more levels before adjusting one."
+    names = ", ".join(model_name(model["causes"]) for model in answer.models)
+    return (
+        f"Undecided, adjust no stage yet: {share}. The models left are {names}; a further "
+        "measurement has to decide between them."
+    )
 
 
-def limit_lines(document: Mapping[str, Any], unit: Unit) -> list[str]:
-    """b1 and b2 beside their limits, one line each.
-
-    A unit file may set ``b1_deg`` and ``b2_deg`` under ``[limits]``. Without
-    them the whole backlash in that stage is the greatest value there can be.
-    """
-    b_t = unit.backlash.b_t_deg
-    most = {"b1_deg": b_t * unit.output_ratio, "b2_deg": b_t}
-    lines = []
-    for stage, name in enumerate(list(most)[: unit.stages], start=1):
-        value, std = document[name]["value"], document[name]["std"] or 0.0
-        limit = getattr(unit.limits, name)
-        said = f"b{stage} = {value:.4f} +- {std:.4f} deg"
-        if limit is None:
-            lines.append(f"{said}; no limit set, all of it would be {most[name]:.4f} deg")
-        else:
-            lines.append(f"{said}; limit {limit:.4f} deg: {_verdict(value, std, limit)}")
-    return lines
+def _by(answer: Answer) -> str:
+    if answer.state == "not judged":
+        return f"{answer.source} yet"
+    return f"model {answer.source}" if answer.models[0]["causes"] else answer.source
 
 
-def stage_actions(document: Mapping[str, Any], unit: Unit) -> list[str]:
-    """What to do about each stage that has a limit: leave, adjust or replace, measure again."""
-    actions = []
-    for stage in range(1, unit.stages + 1):
-        name = f"b{stage}_deg"
-        limit = getattr(unit.limits, name)
-        if limit is None:
-            continue
-        value, std = document[name]["value"], document[name]["std"] or 0.0
-        actions.append(f"Stage {stage}: {_ACTIONS[_verdict(value, std, limit)]}")
-    if not actions:
-        return [
-            "No limits are set; b1_deg and b2_deg under [limits] of the unit file would say "
-            "whether to adjust, replace or leave a stage."
-        ]
-    return actions
-
-
-def _interval(ratio: Mapping[str, Any]) -> tuple[float, float]:
-    std = ratio["std"] or 0.0
-    return max(0.0, ratio["value"] - 2.0 * std), min(1.0, ratio["value"] + 2.0 * std)
-
-
-_WITHIN, _ABOVE, _OPEN = "WITHIN", "ABOVE", "NOT DECIDED, too close for its error"
-_ACTIONS = {
-    _WITHIN: "leave it; its backlash is within the limit.",
-    _ABOVE: (
+_ACTIONS: Mapping[StageVerdict, str] = {
+    "PASS": "leave it.",
+    "FAIL": (
         "adjust its mesh (centre distance or preload) and measure again; replace the gear pair "
         "where nothing is left to adjust, or where the play came with wear."
     ),
-    _OPEN: "measure again at further source levels; its backlash is too near the limit to decide.",
+    "UNDECIDED": "measure again at further source levels before adjusting it.",
 }
-
-
-def _verdict(value: float, std: float, limit: float) -> str:
-    if value + _SIGMA * std <= limit:
-        return _WITHIN
-    if value - _SIGMA * std > limit:
-        return _ABOVE
-    return _OPEN

@@ -114,16 +114,19 @@ def _of_diagnosis(diagnosis: Mapping[str, Any]) -> Answer:
     if word == "unexplained":
         source = f"{PLAIN} refuted, and no known cause explains the response: none"
         return Answer("refuted", source, {}, diagnosed=True)
-    models = tuple(diagnosis.get("models") or ())
+    models = tuple(
+        {"causes": one["causes"], "probability": one["probability"], **_numbers(one)}
+        for one in diagnosis.get("models") or ()
+    )
     if word == "ambiguous":
         names = _either([model_name(model["causes"]) for model in models])
         source = f"undecided between {names}: none" if models else "undecided: none"
         return Answer("open", source, {}, models, diagnosed=True)
-    causes = [cause["effect"] for cause in diagnosis["causes"]]
+    causes = [cause["effect"] for cause in diagnosis.get("causes") or ()]
     source = f"extended by {' and '.join(causes)}" if causes else f"{PLAIN}, consistent"
-    ratio = diagnosis["contribution_ratio"]["extended"]
+    ratio = (diagnosis.get("contribution_ratio") or {}).get("extended")
     numbers = _numbers({**diagnosis, "contribution_ratio": ratio})
-    if not models:
+    if numbers and not models:
         models = ({"causes": causes, "probability": None, **numbers},)
     return Answer("accepted", source, numbers, models, diagnosed=True)
 
@@ -138,4 +141,6 @@ def _either(names: Sequence[str]) -> str:
 
 
 def _numbers(document: Mapping[str, Any]) -> dict[str, Number]:
-    return {name: document[name] for name in QUANTITIES if document.get(name) is not None}
+    """Those that are there; a value that is no number is null in a document."""
+    told = {name: document.get(name) for name in QUANTITIES}
+    return {name: one for name, one in told.items() if one and one.get("value") is not None}

@@ -18,7 +18,7 @@ from sim.unit import Unit
 
 __all__ = ["Backlash", "Uncertain", "backlash_of_places", "backlash_of_sizes", "summarise"]
 
-_REACH, _STEPS = 5.0, 201
+_REACH, _STEPS = 7.0, 211
 """Standard deviations on either side over which a normal distribution is laid out, and points."""
 
 
@@ -55,6 +55,25 @@ class Backlash:
             "b2_deg": self.b2_deg.to_json(),
             "b_t_deg": self.b_t_deg.to_json(),
         }
+
+    def lines(self, indent: str) -> list[str]:
+        """The four numbers in words for a person, a line each."""
+        rows = [
+            ("contribution ratio of stage 1", self.contribution_ratio, 3, ""),
+            ("backlash of stage 1, b1", self.b1_deg, 4, "deg"),
+            ("backlash of stage 2, b2", self.b2_deg, 4, "deg"),
+            ("total backlash, b_t", self.b_t_deg, 4, "deg"),
+        ]
+        lines = []
+        for name, number, digits, unit in rows:
+            line = (
+                f"{indent}{name:<31} {number.value:8.{digits}f} +- {number.std:.{digits}f} {unit}"
+            )
+            if number.interval95 is not None:
+                low, high = number.interval95
+                line += f"  (95 %: {low:.{digits}f} to {high:.{digits}f})"
+            lines.append(line.rstrip())
+        return lines
 
 
 def backlash_of_places(

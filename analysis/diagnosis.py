@@ -25,6 +25,7 @@ from analysis.diagnosis_document import Cause, Diagnosis, Size
 from analysis.executor import Executor
 from analysis.harmonics import compare_harmonics
 from analysis.misfit import describe_departures, find_departures
+from analysis.models import models_left
 from analysis.next_measurement import NextMeasurement, propose_measurement
 from analysis.observation import Observation, observe
 from analysis.progress import Progress, part_of
@@ -181,6 +182,8 @@ def _diagnose(
     elif verdict.word == "consistent":
         unseen = bound_causes(unit, few, atlas)
     proposal = _proposal(unit, verdict, observation, seed, executor, progress)
+    # Chance of its own: sizing what is left beside the answer does not change the answer.
+    models = models_left(verdict, best, base if named else best, observation, rng.spawn(1)[0])
     if progress is not None:
         progress(1.0, "done")
     return Diagnosis(
@@ -196,6 +199,7 @@ def _diagnose(
         next_measurement=proposal,
         observation=observation,
         unseen=unseen,
+        models=models,
         cut_short=searched.given_up or (searched.spared and verdict.word == "unexplained"),
     )
 

@@ -13,11 +13,13 @@ import numpy as np
 
 from analysis.harmonics import Harmonic, describe_harmonics
 from analysis.misfit import Departure
+from analysis.models import Model, backlash_document, backlash_lines
 from analysis.next_measurement import CLEAR_SIGMA, NextMeasurement
 from analysis.observation import Observation
 from analysis.swept import sweep_document, sweep_lines
 from analysis.unseen import Unseen, head_unseen, list_unseen
 from analysis.verdict import Judged, Verdict
+from analysis.verdict_words import how_sure
 from sim.catalogue import CATALOGUE
 
 __all__ = ["Cause", "Diagnosis", "Size"]
@@ -56,6 +58,7 @@ class Diagnosis:
     `shape`, `left_shape`: both in words. `harmonics`: where nothing explains it, those measured
     beside those of the set that stands first. `unseen`: how large each
     cause may be all the same where nothing is missing, or each other one beside what is named.
+    `models`: every model that may be true with its backlash, the accepted or likeliest first.
     `cut_short`: whether a search that found no explanation did not try every set that was worth
     it, for what it may simulate. `simulated_s`: seconds of motion that were simulated for it.
     """
@@ -73,6 +76,7 @@ class Diagnosis:
     observation: Observation
     harmonics: tuple[Harmonic, ...] = ()
     unseen: tuple[Unseen, ...] = ()
+    models: tuple[Model, ...] = ()
     cut_short: bool = False
     warnings: tuple[str, ...] = ()
     elapsed_s: float = 0.0
@@ -128,10 +132,10 @@ class Diagnosis:
     def to_json(self) -> dict[str, Any]:
         """The document of ``diagnose --json``."""
         sigma, db = self.held_out_sigma, self.held_out_db
-        proposal = self.next_measurement
+        proposal, word = self.next_measurement, self.verdict.word
         return {
             "unit": self.unit,
-            "verdict": self.verdict.word,
+            "verdict": word,
             "causes": [
                 {
                     "effect": cause.effect,
@@ -168,10 +172,7 @@ class Diagnosis:
             "baseline": {"held_out_rms_sigma": sigma[0], "held_out_rms_db": db[0]},
             "extended": {"held_out_rms_sigma": sigma[1], "held_out_rms_db": db[1]},
             "gain": {"held_out_rms_ratio": sigma[1] / sigma[0]},
-            "contribution_ratio": {
-                "baseline": _uncertain(self.ratio_baseline),
-                "extended": _uncertain(self.ratio_extended),
-            },
+            **backlash_document(self.models, word, self.ratio_baseline, self.ratio_extended),
             "residual": [one.to_json() for one in self.departures],
             "residual_after": [one.to_json() for one in self.left],
             "shape": self.shape,
@@ -207,6 +208,7 @@ class Diagnosis:
     def summary(self) -> list[str]:
         """Lines of text for a person."""
         lines = [f"{self.unit}: {self.verdict.word}. {_sentence(self)}"]
+        lines += [f"  {text}" for text in how_sure(self.to_json())]
         for cause in self.causes:
             effect = CATALOGUE[cause.effect]
             sizes = ", ".join(_worded(size) for size in cause.sizes)
@@ -214,12 +216,7 @@ class Diagnosis:
             lines.append(f"    {effect.meaning} On the bench: {effect.bench_cause}.")
             lines.append(f"    To make sure: {effect.check}.")
         lines += [f"  {text}" for text in sweep_lines(self._swept())]
-        base, extended = self.ratio_baseline, self.ratio_extended
-        lines.append(f"  contribution ratio, plain model      {base[0]:.3f} +- {base[1]:.3f}")
-        if self.causes:
-            lines.append(
-                f"  contribution ratio, extended model   {extended[0]:.3f} +- {extended[1]:.3f}"
-            )
+        lines += [f"  {text}" for text in backlash_lines(self.models, self.verdict.word)]
         sigma, db = self.held_out_sigma, self.held_out_db
         lines.append(
             f"  on levels not fitted, plain model    {sigma[0]:.2f} sigma, {db[0]:.2f} dB rms"
@@ -364,10 +361,6 @@ def _proposed(proposal: NextMeasurement) -> str:
     left = [f"{name} ({sigma:.1f})" for name, sigma in proposal.others if sigma < CLEAR_SIGMA]
     untold = f", though hardly from {' or '.join(left)}" if left else ""
     return f"to tell {one} from {' and '.join(told)}{untold}, in {minutes}:"
-
-
-def _uncertain(pair: tuple[float, float]) -> dict[str, float]:
-    return {"value": pair[0], "std": pair[1]}
 
 
 def _worded(size: Size) -> str:

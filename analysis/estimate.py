@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from analysis.answer import CALL_FOR_DIAGNOSIS
 from analysis.arithmetic import on_one_core
-from analysis.backlash import Uncertain, backlash_of_places
+from analysis.backlash import Backlash, Uncertain, backlash_of_places
 from analysis.ensemble import Machine
 from analysis.executor import Executor
 from analysis.fit import Posterior, fit_posterior
@@ -78,19 +78,9 @@ class Estimate:
 
     def summary(self) -> list[str]:
         """Lines of text for a person."""
-        rows = [
-            ("contribution ratio of stage 1", self.contribution_ratio, 3, ""),
-            ("backlash of stage 1, b1", self.b1_deg, 4, "deg"),
-            ("backlash of stage 2, b2", self.b2_deg, 4, "deg"),
-            ("total backlash, b_t", self.b_t_deg, 4, "deg"),
-        ]
-        lines = [f"{self.unit}: backlash by stage"]
-        for name, number, digits, unit in rows:
-            line = f"  {name:<31} {number.value:8.{digits}f} +- {number.std:.{digits}f} {unit}"
-            if number.interval95 is not None:
-                low, high = number.interval95
-                line += f"  (95 %: {low:.{digits}f} to {high:.{digits}f})"
-            lines.append(line.rstrip())
+        told = Backlash(self.contribution_ratio, self.b1_deg, self.b2_deg, self.b_t_deg)
+        head = ", by the plain model, which does not fit" if self.refuted else ""
+        lines = [f"{self.unit}: backlash by stage{head}", *told.lines("  ")]
         lines += [f"  {text}" for text in sweep_lines(self.sweeps)]
         if self.curve is not None:
             lines.append(self.curve.summary())

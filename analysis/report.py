@@ -15,13 +15,15 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from analysis import report_sections as sections
-from analysis.advice import limit_lines, stage_actions, stage_to_adjust
+from analysis.advice import Advice, advise
+from analysis.answer import Answer, accept_model
 from analysis.diagnosis import Diagnosis
 from analysis.markup import Markup, data_block, element, joined
 from analysis.report_data import Origin, report_data
-from analysis.report_figures import bode_svg, diagnosis_svgs, estimate_svg
+from analysis.report_figures import backlash_svg, bode_svg, diagnosis_svgs
 from analysis.report_style import STYLE
 from analysis.resonance import extract
+from analysis.verdict_words import verdict_words
 from daq.errors import AnalysisError, ConfigurationError
 from daq.formats.atomic import write_text
 from daq.frf import FrequencyResponse
@@ -97,13 +99,14 @@ def write_report(
         made or datetime.now(UTC),
     )
     pictures = diagnosis_svgs(diagnosis) if isinstance(diagnosis, Diagnosis) else ()
-    limits = [] if estimate is None else limit_lines(estimate, unit)
+    answer = accept_model(data["estimate"], data["diagnosis"])
+    advice = advise(answer, unit)
     body = joined(
-        sections.summary_section(data, _actions(data, unit)),
+        sections.summary_section(data, _actions(data, unit, answer, advice)),
         sections.facts_section(data),
         sections.features_section(data, bode_svg(response, features)),
-        sections.estimate_section(
-            data, limits, None if estimate is None else estimate_svg(estimate)
+        sections.backlash_section(
+            data, answer, advice, backlash_svg(answer.contribution_ratio, data["estimate"])
         ),
         sections.diagnosis_section(data, pictures),
         sections.provenance_section(data),
@@ -139,39 +142,31 @@ def stored_origin(store: Store, measurement: int) -> Origin:
     )
 
 
-def _actions(data: Mapping[str, Any], unit: Unit) -> list[str]:
+def _actions(data: Mapping[str, Any], unit: Unit, answer: Answer, advice: Advice) -> list[str]:
     """What to do, most important first."""
-    estimate, diagnosis = data["estimate"], data["diagnosis"]
-    lines: list[str] = []
-    if estimate is not None:
-        lines = [stage_to_adjust(estimate), *stage_actions(estimate, unit)]
+    diagnosis = data["diagnosis"]
+    lines = [] if diagnosis is None else _chain_first(diagnosis)
+    lines += [] if answer.state == "none" else [advice.headline]
+    if answer.models:
+        lines += [stage.line for stage in advice.stages if stage.verdict is not None]
+        if all(getattr(unit.limits, f"b{n}_deg") is None for n in range(1, unit.stages + 1)):
+            lines.append(
+                "No limits are set; b1_deg and b2_deg under [limits] of the unit file would say "
+                "whether a stage passes."
+            )
     if diagnosis is not None:
-        lines += _diagnosed_actions(diagnosis)
+        lines += verdict_words(diagnosis)
     lines += _doubts(data, unit)
     return lines or ["No estimate was made; see below for what was measured."]
 
 
-def _diagnosed_actions(diagnosis: Mapping[str, Any]) -> list[str]:
-    word, causes = diagnosis["verdict"], diagnosis["causes"]
-    names = " and ".join(cause["effect"] for cause in causes)
-    if word == "consistent":
-        return ["The unit's model explains the response; nothing else needs to be looked for."]
-    if word == "unexplained":
-        return ["Something is missing that no known cause explains: trust r with care."]
-    ratio = diagnosis["contribution_ratio"]["extended"]
-    said = f"{names} explains the response"
-    if word == "ambiguous":
-        said = f"{names} may explain the response, and others are not ruled out"
-    if ratio["value"] is not None:
-        said += f"; with it r is {ratio['value']:.2f} ± {ratio['std'] or 0.0:.2f}"
-    if any(cause.get("site") == "chain" for cause in causes):
-        right = (
-            "see whether the measuring chain is"
-            if word == "ambiguous"
-            else "put the measuring chain"
-        )
-        said += f"; {right} right before touching a gear"
-    return [f"{said}."]
+def _chain_first(diagnosis: Mapping[str, Any]) -> list[str]:
+    """What a fault of the measuring chain asks for."""
+    if not any(cause.get("site") == "chain" for cause in diagnosis["causes"]):
+        return []
+    if diagnosis["verdict"] == "ambiguous":
+        return ["Before touching a gear, see whether the measuring chain is right."]
+    return ["Before touching a gear, put the measuring chain right."]
 
 
 def _doubts(data: Mapping[str, Any], unit: Unit) -> list[str]:

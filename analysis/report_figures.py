@@ -15,6 +15,7 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
+from analysis.advice import span_of
 from analysis.diagnosis import Diagnosis
 from analysis.diagnosis_figures import probability_figure, residual_figure
 from analysis.markup import Markup
@@ -22,7 +23,7 @@ from analysis.resonance import LevelFeatures
 from analysis.response_figure import draw_response
 from daq.frf import FrequencyResponse
 
-__all__ = ["bode_svg", "diagnosis_svgs", "estimate_svg", "figure_svg"]
+__all__ = ["backlash_svg", "bode_svg", "diagnosis_svgs", "figure_svg"]
 
 _BLUE, _GREY, _RED = "#0072b2", "#999999", "#d55e00"
 _NAMED = re.compile(r'(\bid="|\bhref="#|url\(#)')
@@ -39,24 +40,40 @@ def bode_svg(response: FrequencyResponse, features: Sequence[LevelFeatures]) -> 
     return figure_svg(figure, "bode", "Gain and phase over frequency at every source level")
 
 
-def estimate_svg(estimate: Mapping[str, Any]) -> Markup:
-    """The contribution ratio with its interval and, if there is one, the error index."""
-    ratio, curve = estimate["contribution_ratio"], estimate.get("error_index")
-    height = 2.7 if curve else 1.2
-    figure = Figure(figsize=(7.6, height), layout="constrained")
-    bar = figure.subplots(2, 1, sharex=True, height_ratios=(1, 4)) if curve else [figure.subplots()]
-    low, high = ratio.get("interval95") or (ratio["value"], ratio["value"])
-    bar[0].plot([low, high], [0, 0], color=_BLUE, linewidth=6, alpha=0.3, solid_capstyle="butt")
-    bar[0].plot(ratio["value"], 0, marker="o", color=_BLUE)
-    bar[0].axvline(0.5, color=_GREY, linewidth=0.8)
-    bar[0].set_yticks([])
-    bar[0].set_ylabel("r, 95 %", rotation=0, ha="right", va="center")
-    bar[0].set_xlim(-0.02, 1.02)
+def backlash_svg(
+    ratio: Mapping[str, Any] | None, estimate: Mapping[str, Any] | None
+) -> Markup | None:
+    """The contribution ratio with its interval and the error index, as far as there are any.
+
+    Parameters
+    ----------
+    ratio
+        That of the model in force; None if no model is.
+    estimate
+        Document of ``estimate --json``, for its error index.
+    """
+    curve = None if estimate is None else estimate.get("error_index")
+    if ratio is None and not curve:
+        return None
+    heights = [*([1.0] if ratio is not None else []), *([4.0] if curve else [])]
+    figure = Figure(figsize=(7.6, 0.7 + 0.45 * sum(heights)), layout="constrained")
+    axes = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights, squeeze=False)[:, 0]
+    if ratio is not None:
+        low, high = span_of(ratio)
+        axes[0].plot(
+            [low, high], [0, 0], color=_BLUE, linewidth=6, alpha=0.3, solid_capstyle="butt"
+        )
+        axes[0].plot(ratio["value"], 0, marker="o", color=_BLUE)
+        axes[0].axvline(0.5, color=_GREY, linewidth=0.8)
+        axes[0].set_yticks([])
+        axes[0].set_ylabel("r, 95 %", rotation=0, ha="right", va="center")
     if curve:
-        _draw_index(bar[1], curve)
-        bar[1].axvspan(low, high, color=_BLUE, alpha=0.12, linewidth=0)
-    bar[-1].set_xlabel("contribution ratio r: 0 all in stage 2, 1 all in stage 1")
-    return figure_svg(figure, "estimate", "Contribution ratio with its 95 % interval; error index")
+        _draw_index(axes[-1], curve)
+        if ratio is not None:
+            axes[-1].axvspan(low, high, color=_BLUE, alpha=0.12, linewidth=0)
+    axes[0].set_xlim(-0.02, 1.02)
+    axes[-1].set_xlabel("contribution ratio r: 0 all in stage 2, 1 all in stage 1")
+    return figure_svg(figure, "backlash", "Contribution ratio with its 95 % interval; error index")
 
 
 def _draw_index(axes: Any, curve: Mapping[str, Any]) -> None:

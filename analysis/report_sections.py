@@ -9,14 +9,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from analysis.advice import Advice
+from analysis.answer import Answer, model_name
 from analysis.features import with_error
 from analysis.markup import Markup, element, joined, table
 from analysis.swept import sweep_lines
 from analysis.unseen import describe_unseen, head_unseen
+from analysis.verdict_words import verdict_words
 
 __all__ = [
+    "backlash_section",
     "diagnosis_section",
-    "estimate_section",
     "facts_section",
     "features_section",
     "provenance_section",
@@ -25,14 +28,6 @@ __all__ = [
 
 Data = Mapping[str, Any]
 
-_VERDICTS = {
-    "consistent": "The response is what the unit's own model gives: nothing beyond tolerance is "
-    "needed to explain it.",
-    "explained": "The model alone does not give this response; with the cause below it does.",
-    "ambiguous": "More than one explanation of this response is left; the likeliest is below.",
-    "unexplained": "Something is missing from the model that no cause in the catalogue explains; "
-    "trust the ratio accordingly.",
-}
 _SITES = {"plant": "in the mechanics", "chain": "in the measuring chain"}
 _MOST_ROWS = 8
 _MOST_TEXT = 600
@@ -120,27 +115,60 @@ def features_section(data: Data, bode: Markup) -> Markup:
     )  # fmt: skip
 
 
-def estimate_section(data: Data, limits: Sequence[str], picture: Markup | None) -> Markup:
-    """How much of the backlash sits in each stage."""
-    estimate = data["estimate"]
-    if estimate is None or picture is None:
-        return _section("Backlash", element("p", _why(data, "estimate")))
+def backlash_section(data: Data, answer: Answer, advice: Advice, picture: Markup | None) -> Markup:
+    """How much of the backlash sits in each stage, by the accepted model or those that are left."""
+    estimate, diagnosis = data["estimate"], data["diagnosis"]
+    parts = [element("p", _said_by(data, answer))]
+    parts += [_backlash_table(model, len(answer.models) > 1) for model in answer.models]
+    if answer.models:
+        parts.append(_list([stage.line for stage in advice.stages]))
+    if diagnosis is not None and estimate is not None and answer.models:
+        parts.append(
+            element(
+                "p",
+                "The estimate from the plain model is in the data alone: with a diagnosis, the "
+                "ratio is learned anew from simulated machines of the models that are left.",
+                class_="small",
+            )
+        )
+    if picture is not None:
+        caption = "Curve: the error index of ARF and RF by the plain model, the paper's measure."
+        if answer.contribution_ratio is not None:
+            bar = f"Dot and bar: contribution ratio with its 95 % interval, {answer.source}."
+            caption = f"{bar} {caption}" if estimate and estimate.get("error_index") else bar
+        parts.append(element("figure", picture, element("figcaption", caption)))
+    if estimate is not None and diagnosis is None:
+        parts.append(_notes(estimate.get("warnings", [])))
+    return _section("Backlash", *parts)
+
+
+def _said_by(data: Data, answer: Answer) -> str:
+    """Which model the numbers are of, or why there are none."""
+    if answer.state == "none":
+        return str(_why(data, "estimate"))
+    if answer.state == "open":
+        return "No model is accepted yet. Each that is left tells its own backlash:"
+    if answer.models:
+        return f"Model: {answer.source}."
+    if answer.diagnosed:
+        return "No backlash is told: no model that is known explains this response."
+    return "No backlash is told: the plain model does not explain this response."
+
+
+def _backlash_table(model: Data, several: bool) -> Markup:
     names = (
         ("contribution_ratio", "contribution ratio r of stage 1", ""),
         ("b1_deg", "backlash of stage 1, b1", "deg"),
         ("b2_deg", "backlash of stage 2, b2", "deg"),
         ("b_t_deg", "total backlash, b_t", "deg"),
     )
-    rows = [(label, *_numbers(estimate[key], unit)) for key, label, unit in names]
-    return _section(
-        "Backlash",
-        table(rows, ("", "value", "standard error", "95 % interval"), row_heads=True),
-        _list(limits),
-        element("figure", picture, element("figcaption", "Dot and bar: contribution ratio with "
-                "its 95 % interval, from the whole response. Curve: the error index of ARF and "
-                "RF, the paper's measure.")),
-        _notes(estimate.get("warnings", [])),
-    )  # fmt: skip
+    rows = [(label, *_numbers(model[key], unit)) for key, label, unit in names if model.get(key)]
+    head = ("", "value", "standard error", "95 % interval")
+    told = table(rows, head, row_heads=True)
+    if not several:
+        return told
+    title = f"{model_name(model['causes'])} (probability {model['probability']:.2f})"
+    return joined(element("h3", title), told)
 
 
 def diagnosis_section(data: Data, pictures: Sequence[tuple[Markup, str]]) -> Markup:
@@ -151,7 +179,7 @@ def diagnosis_section(data: Data, pictures: Sequence[tuple[Markup, str]]) -> Mar
     word, swept = diagnosis["verdict"], sweep_lines(diagnosis.get("sweeps", ()))
     return _section(
         "Diagnosis",
-        element("p", element("b", f"{word.capitalize()}. "), _VERDICTS.get(word, "")),
+        element("p", element("b", f"{word.capitalize()}. "), " ".join(verdict_words(diagnosis))),
         _causes(diagnosis),
         [element("p", f"Taken together: {'; '.join(swept)}.")] if swept else Markup(""),
         _gain(diagnosis),
@@ -289,19 +317,17 @@ def _unit(symbol: str) -> str:
 
 
 def _gain(diagnosis: Data) -> Markup:
-    """Held-out residuals and the ratio, before and after."""
-    ratio = diagnosis["contribution_ratio"]
+    """Held-out residuals before and after."""
     rows = [
         (
             label,
             _number(diagnosis[key]["held_out_rms_sigma"], ".2f"),
             _number(diagnosis[key]["held_out_rms_db"], ".2f"),
-            with_error(ratio[key]["value"], ratio[key]["std"]),
         )
         for key, label in (("baseline", "model of the unit alone"), ("extended", "with the causes"))
         if key == "baseline" or diagnosis["causes"]
     ]
-    head = ("held-out source levels", "rms / sigma", "rms of gain / dB", "contribution ratio")
+    head = ("held-out source levels", "rms / sigma", "rms of gain / dB")
     told = Markup("")
     share = diagnosis["gain"]["held_out_rms_ratio"]
     if diagnosis["causes"] and share is not None:

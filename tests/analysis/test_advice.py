@@ -1,51 +1,203 @@
-"""What an estimate means for whoever adjusts the gears."""
+"""What an answer means for whoever adjusts the gears."""
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from analysis.advice import limit_lines, stage_to_adjust
+from analysis.advice import advise, judge_limit
+from analysis.answer import accept_model
 from sim.unit import load_unit, unit_from_mapping
 
+ADSS = load_unit("adss")
+B_T, N = ADSS.backlash.b_t_deg, ADSS.output_ratio
 
-def document(value, interval=None, std=0.05, b1=0.2, b2=0.04):
-    ratio = {"value": value, "std": std} | ({"interval95": list(interval)} if interval else {})
+
+def with_limits(b1_deg=None, b2_deg=None):
+    content = ADSS.model_dump(by_alias=True)
+    content["limits"] |= {"b1_deg": b1_deg, "b2_deg": b2_deg}
+    return unit_from_mapping(content, "test")
+
+
+def number(value, low, high):
+    return {"value": value, "std": (high - low) / 4.0, "interval95": [low, high]}
+
+
+def model(low, high, *causes, b_t=B_T):
+    """A model by the interval of its ratio."""
+    middle = 0.5 * (low + high)
     return {
-        "contribution_ratio": ratio,
-        "b1_deg": {"value": b1, "std": 0.01},
-        "b2_deg": {"value": b2, "std": 0.004},
+        "causes": list(causes),
+        "probability": 0.5,
+        "contribution_ratio": number(middle, low, high),
+        "b1_deg": number(middle * b_t * N, low * b_t * N, high * b_t * N),
+        "b2_deg": number((1 - middle) * b_t, (1 - high) * b_t, (1 - low) * b_t),
+        "b_t_deg": {"value": b_t, "std": 0.0},
+    }
+
+
+def estimated(low, high, **more):
+    return model(low, high) | {"warnings": [], "refuted": False} | more
+
+
+def diagnosed(verdict, *models):
+    accepted = models[0] if verdict in ("consistent", "explained") else {}
+    return {
+        "verdict": verdict,
+        "causes": [{"effect": name} for name in (models[0]["causes"] if models else [])],
+        "contribution_ratio": {"extended": accepted.get("contribution_ratio")},
+        **{name: accepted.get(name) for name in ("b1_deg", "b2_deg", "b_t_deg")},
+        "models": list(models),
     }
 
 
 @pytest.mark.parametrize(
-    ("value", "interval", "said"),
+    ("interval", "said"),
     [
-        (0.8, (0.6, 0.9), "Adjust stage 1 first: 80 %"),
-        (0.2, (0.1, 0.4), "Adjust stage 2 first: 20 %"),
-        (0.6, (0.45, 0.75), "Neither stage stands out"),
-        (0.4, (0.2, 0.5), "Neither stage stands out"),
-        (0.62, None, "Adjust stage 1 first"),
-        (0.58, None, "Neither stage stands out"),
+        ((0.6, 1.0), "Adjust stage 1 first: 80 % of the backlash sits in stage 1"),
+        ((0.1, 0.3), "Adjust stage 2 first: 20 % of the backlash sits in stage 1"),
+        ((0.45, 0.75), "Neither stage stands out: 60 %"),
+        ((0.3, 0.5), "Neither stage stands out: 40 %"),
     ],
 )
-def test_a_stage_is_named_only_where_the_whole_interval_is_on_its_side(value, interval, said):
-    assert stage_to_adjust(document(value, interval)).startswith(said)
+def test_a_stage_is_named_only_where_the_whole_interval_is_on_its_side(interval, said):
+    advice = advise(accept_model(estimated(*interval)), ADSS)
+    assert advice.headline.startswith(said)
+    assert "by the plain model, not judged yet" in advice.headline
 
 
-def test_without_limits_the_greatest_value_there_can_be_is_named():
-    unit = load_unit("adss")
-    lines = limit_lines(document(0.3), unit)
-    assert lines[0].endswith("no limit set, all of it would be 0.6930 deg")
-    assert lines[1].endswith("no limit set, all of it would be 0.0660 deg")
+def test_an_interval_that_is_not_stated_is_two_standard_deviations():
+    document = estimated(0.3, 0.4) | {"contribution_ratio": {"value": 0.61, "std": 0.05}}
+    assert advise(accept_model(document)).headline.startswith("Adjust stage 1 first")
+    document["contribution_ratio"] = {"value": 0.59, "std": 0.05}
+    assert advise(accept_model(document)).headline.startswith("Neither stage")
+
+
+def test_the_model_that_is_accepted_is_followed_and_not_the_estimate():
+    """The estimate of practice-06 points at stage 1, and its diagnosis at stage 2."""
+    refuted = estimated(0.53, 0.67, refuted=True)
+    before = advise(accept_model(refuted), ADSS)
+    assert before.headline.startswith("No advice before a diagnosis")
+    assert "stage 1" not in before.headline
+    explained = diagnosed("explained", model(0.16, 0.22, "payload-flexibility"))
+    after = advise(accept_model(refuted, explained), ADSS)
+    assert after.headline.startswith("Adjust stage 2 first: 19 %")
+    assert "by the extended by payload-flexibility" not in after.headline
+    assert "model extended by payload-flexibility" in after.headline
+
+
+@pytest.mark.parametrize("unit", [ADSS, with_limits(0.01, 0.01), with_limits(1.0, 1.0), None])
+@pytest.mark.parametrize(
+    ("estimate", "diagnosis"),
+    [
+        (estimated(0.6, 0.7, refuted=True), None),
+        (estimated(0.6, 0.7), diagnosed("unexplained")),
+        (None, None),
+        (None, diagnosed("ambiguous")),
+    ],
+)
+def test_without_a_model_no_stage_is_adjusted_passed_or_failed(unit, estimate, diagnosis):
+    advice = advise(accept_model(estimate, diagnosis), unit)
+    assert advice.headline.startswith("No advice")
+    assert {stage.verdict for stage in advice.stages} <= {None, "UNDECIDED"}
+    assert not any(word in advice.headline for word in ("stage 1", "stage 2", "PASS", "FAIL"))
 
 
 @pytest.mark.parametrize(
-    ("b1", "verdict"),
-    [(0.17, "WITHIN"), (0.18, "WITHIN"), (0.19, "NOT DECIDED"), (0.215, "NOT DECIDED"),
-     (0.23, "ABOVE")],
+    ("verdict", "models", "said"),
+    [
+        ("ambiguous", [(0.6, 0.7, "a"), (0.8, 0.9, "b")], "Adjust stage 1 first: 60 to 90 %"),
+        ("ambiguous", [(0.6, 0.7, "a"), (0.1, 0.2)], "Undecided, adjust no stage yet: 10 to 70 %"),
+        ("ambiguous", [(0.6, 0.7, "a"), (0.45, 0.6)], "Undecided, adjust no stage yet"),
+        # Nothing is missing, as far as is known; what is left open would say another stage.
+        ("consistent", [(0.6, 0.7), (0.1, 0.2, "a")], "Undecided, adjust no stage yet"),
+        ("consistent", [(0.6, 0.7), (0.7, 0.9, "a")], "Adjust stage 1 first"),
+    ],
+)
+def test_of_several_models_all_must_agree_on_the_stage(verdict, models, said):
+    document = diagnosed(verdict, *(model(*one) for one in models))
+    advice = advise(accept_model(None, document), ADSS)
+    assert advice.headline.startswith(said)
+    assert advice.headline.startswith("Undecided") == ("plain model" in advice.headline)
+
+
+def test_without_limits_the_greatest_value_there_can_be_is_named():
+    answer = accept_model(estimated(0.2, 0.4))
+    lines = [stage.line for stage in advise(answer, ADSS).stages]
+    assert lines[0].endswith("no limit set, all of it would be 0.6930 deg.")
+    assert lines[1].endswith("no limit set, all of it would be 0.0660 deg.")
+    # A diagnosis that finds more play in all tells a greater most.
+    worn = diagnosed("explained", model(0.2, 0.4, "total-backlash", b_t=0.1))
+    assert advise(accept_model(None, worn), ADSS).stages[1].line.endswith("would be 0.1000 deg.")
+
+
+@pytest.mark.parametrize(
+    ("span", "verdict"),
+    [
+        ((0.10, 0.19), "PASS"), ((0.10, 0.20), "PASS"), ((0.10, 0.21), "UNDECIDED"),
+        ((0.20, 0.30), "UNDECIDED"), ((0.21, 0.30), "FAIL"),
+    ],
 )  # fmt: skip
-def test_a_limit_is_passed_only_beyond_two_standard_errors(b1, verdict):
-    content = load_unit("adss").model_dump(by_alias=True)
-    content["limits"] |= {"b1_deg": 0.2, "b2_deg": 0.066}
-    unit = unit_from_mapping(content, "test")
-    first, second = limit_lines(document(0.3, b1=b1), unit)
-    assert f"limit 0.2000 deg: {verdict}" in first
-    assert "WITHIN" in second
+def test_a_limit_is_passed_or_failed_only_with_the_whole_interval(span, verdict):
+    assert judge_limit([span], 0.2) == verdict
+    assert judge_limit([span, span], 0.2) == verdict
+    assert judge_limit([span, (0.0, 0.1)], 0.2) == ("PASS" if verdict == "PASS" else "UNDECIDED")
+    assert judge_limit([], 0.2) == "UNDECIDED"
+
+
+def test_limits_decide_and_not_the_ratio():
+    """Most of it sits in stage 2, and is within its limit; stage 1 is not."""
+    answer = accept_model(estimated(0.1, 0.2))
+    assert advise(answer, ADSS).headline.startswith("Adjust stage 2 first")
+    assert advise(answer, with_limits(b2_deg=0.066)).headline == (
+        "Leave stage 2 as it is: stage 2 PASS."
+    )
+    advice = advise(answer, with_limits(0.03, 0.066))
+    assert advice.headline == "Adjust stage 1: stage 1 FAIL; stage 2 PASS."
+    assert advice.stages[1].line.endswith("limit 0.0660 deg: leave it.")
+    undecided = advise(answer, with_limits(0.1, 0.066)).headline
+    assert undecided.startswith("Undecided: stage 1 UNDECIDED; stage 2 PASS.")
+
+
+def test_limits_are_not_decided_where_the_models_left_disagree():
+    document = diagnosed("ambiguous", model(0.1, 0.2, "a"), model(0.8, 0.9))
+    advice = advise(accept_model(None, document), with_limits(0.3, 0.066))
+    assert [stage.verdict for stage in advice.stages] == ["UNDECIDED", "PASS"]
+    assert "over the models left" in advice.stages[0].line
+
+
+spans = st.tuples(st.floats(0, 1), st.floats(0, 1)).map(sorted)
+limits = st.one_of(st.none(), st.floats(0, 1))
+
+
+@given(st.lists(spans, min_size=1, max_size=3), limits, limits)
+def test_the_headline_never_contradicts_the_lines_of_the_stages(ratios, b1, b2):
+    models = [model(low, high, *"a" * n) for n, (low, high) in enumerate(ratios)]
+    document = diagnosed("explained" if len(models) == 1 else "ambiguous", *models)
+    advice = advise(accept_model(None, document), with_limits(b1, b2))
+    told = {stage.stage: stage.verdict for stage in advice.stages if stage.verdict}
+    assert set(told) == {n for n, limit in ((1, b1), (2, b2)) if limit is not None}
+    for stage, verdict in told.items():
+        assert f"stage {stage} {verdict}" in advice.headline
+        assert f"Stage {stage}: {verdict}." in advice.stages[stage - 1].line
+    asked, _, _ = advice.headline.partition(":")
+    if told:
+        for stage in (1, 2):
+            named = f"stage {stage}" in asked
+            assert not (asked.startswith("Adjust") and named) or told[stage] == "FAIL"
+            assert not (asked.startswith("Leave") and named) or told[stage] == "PASS"
+        assert asked.startswith("Adjust") == ("FAIL" in told.values())
+
+
+def test_one_gear_stage_holds_all_of_it_unless_its_model_does_not_fit():
+    answer = accept_model(
+        {
+            "contribution_ratio": {"value": 1.0, "std": 0.0},
+            "b1_deg": number(0.2, 0.15, 0.25),
+            "b2_deg": {"value": 0.0, "std": 0.0},
+            "b_t_deg": number(0.2, 0.15, 0.25),
+            "warnings": [],
+        }
+    )
+    advice = advise(answer)
+    assert advice.headline == "There is one gear stage: it holds all of the backlash."
+    assert len(advice.stages) == 1

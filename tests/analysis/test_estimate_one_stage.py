@@ -2,7 +2,8 @@
 
 import pytest
 
-from analysis.advice import limit_lines, stage_actions, stage_to_adjust
+from analysis.advice import advise
+from analysis.answer import accept_model
 from analysis.diagnosis import diagnose_response
 from analysis.estimate import estimate_features, estimate_response
 from daq.configs import config_path
@@ -29,9 +30,10 @@ def test_the_play_is_found_though_the_file_says_another(measured):
     assert found["b1_deg"] == b_t
     assert (found["b2_deg"]["value"], found["contribution_ratio"]["value"]) == (0.0, 1.0)
     assert found["contribution_ratio"]["interval95"] == [1.0, 1.0]
-    assert stage_to_adjust(found).startswith("There is one gear stage")
-    assert len(limit_lines(found, ONE)) == 1
-    assert "No limits are set" in stage_actions(found, ONE)[0]
+    advice = advise(accept_model(found), ONE)
+    assert advice.headline.startswith("There is one gear stage")
+    (stage,) = advice.stages
+    assert "no limit set" in stage.line
 
 
 def test_what_needs_two_stages_says_so(measured):

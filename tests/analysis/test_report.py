@@ -113,15 +113,63 @@ def test_the_features_and_the_estimate_stand_in_words_and_numbers(report):
 @pytest.mark.parametrize(
     ("limits", "said"),
     [
-        ((0.3, 0.1), ["Stage 1: leave it", "Stage 2: leave it"]),
-        ((0.1, 0.04), ["Stage 1: adjust its mesh", "replace the gear pair", "Stage 2: adjust"]),
-        ((0.21, 0.1), ["Stage 1: measure again", "Stage 2: leave it"]),
+        (
+            (0.3, 0.1),
+            [
+                "Leave stage 1 and stage 2 as they are",
+                "limit 0.3000 deg: leave it",
+                "Stage 2: PASS",
+            ],
+        ),
+        (
+            (0.1, 0.04),
+            ["Adjust stage 1 and stage 2: stage 1 FAIL", "replace the gear pair", "Stage 2: FAIL"],
+        ),
+        ((0.21, 0.1), ["Undecided: stage 1 UNDECIDED; stage 2 PASS", "deg: measure again"]),
     ],
 )
-def test_it_says_whether_to_adjust_replace_or_leave(report, limits, said):
+def test_limits_decide_the_headline_and_the_table_alike(report, limits, said):
     _, page = report(unit=with_limits(*limits))
     for words in said:
         assert words in page.text
+    # By the ratio alone it would be stage 2.
+    assert "Adjust stage 2 first" not in page.text
+
+
+WARNED = "the model leaves 5.4 standard deviations of the response unexplained; run diagnose "
+REFUTED = makings.ESTIMATE | {
+    "contribution_ratio": {"value": 0.9, "std": 0.02, "interval95": [0.86, 0.94]},
+    "b1_deg": {"value": 0.6237, "std": 0.0139, "interval95": [0.596, 0.651]},
+    "warnings": [WARNED + "before trusting the ratio"],
+}
+
+
+@pytest.mark.parametrize("limits", [(None, None), (0.3, 0.001)])
+def test_a_refuted_plain_model_gives_no_advice_and_no_stage_before_a_diagnosis(report, limits):
+    _, page = report(unit=with_limits(*limits), estimate=REFUTED)
+    assert "No advice before a diagnosis" in page.text
+    assert WARNED in page.text
+    for word in ("Adjust", "Leave stage", "Stage 1", "Stage 2", "0.6237", "0.900", "PASS", "FAIL"):
+        assert word not in page.text
+    # The copy for programs holds what was estimated, and that it is refuted.
+    assert page.data["estimate"]["warnings"] == REFUTED["warnings"]
+
+
+def test_with_a_diagnosis_all_numbers_are_those_of_the_model_that_it_accepts(report, explained):
+    _, page = report(estimate=REFUTED, diagnosis=explained)
+    document = explained.to_json()
+    assert document["verdict"] == "explained"
+    for name in ("b1_deg", "b2_deg"):
+        low, high = document[name]["interval95"]
+        assert f"{document[name]['value']:.4f} deg" in page.text
+        assert f"{low:.4f} to {high:.4f}" in page.text
+    ratio = document["contribution_ratio"]["extended"]
+    assert f"ratio r of stage 1 {ratio['value']:.3f}" in page.text
+    assert "Model: extended by load-inertia." in page.text
+    # Neither the estimate's ratio nor the one that the diagnosis has for the plain model.
+    assert "0.6237" not in page.text
+    assert "0.900" not in page.text
+    assert page.text.count("contribution ratio r of stage 1") == 1
 
 
 def test_the_diagnosis_has_its_causes_gain_and_pictures(report, explained):
@@ -165,7 +213,7 @@ def test_sweeps_that_were_taken_together_are_listed_and_departures_say_of_which(
 @pytest.mark.parametrize(
     ("hidden", "judged", "verdict", "said"),
     [
-        ((), [("load-inertia",)], "consistent", "nothing else needs to be looked for"),
+        ((), [("load-inertia",)], "consistent", "that nothing is hidden has probability"),
         (("load-inertia",), [("shaft-stiffness",)], "unexplained", "no known cause explains"),
         (
             ("amplifier-gain",),
@@ -201,7 +249,10 @@ def test_a_tie_is_told_with_the_sweep_that_would_break_it(report):
             return DIAGNOSIS | {"next_measurement": DIAGNOSIS["next_measurement"] | {"plan": plan}}
 
     _, page = report(diagnosis=Told())
-    assert "may explain the response, and others are not ruled out" in page.text
+    assert "load-inertia may explain the response, and others are not ruled out" in page.text
+    assert "Undecided, adjust no stage yet: 23 to 70 %" in page.text
+    for name in ("load-inertia (probability 0.55)", "shaft-stiffness (probability 0.41)"):
+        assert name in page.text
     assert "Other sets judged: shaft-stiffness (0.41, wants a size that no bench has)" in page.text
     assert "To tell load-inertia from shaft-stiffness (5.0 sigma expected)" in page.text
     assert "lashbench measure --x" in page.text

@@ -143,6 +143,8 @@ def _judge(
     console: Console,
 ) -> dict[str, Any]:
     """Estimate, diagnose, reveal and report."""
+    from analysis.advice import advise
+    from analysis.answer import accept_model
     from analysis.diagnosis import diagnose_response
     from analysis.estimate import estimate_response
     from tui.demonstration.hidden import compare, worded
@@ -158,6 +160,7 @@ def _judge(
     diagnosis = diagnose_response(response, unit, cache=cache, progress=progress)
     tell("\n".join(diagnosis.summary()))
     document = diagnosis.to_json()
+    tell("\n".join(advise(accept_model(estimate.to_json(), document), unit).lines()))
     outcome = compare(hidden, document)
     tell("\n5. What was hidden\n")
     tell("\n".join(worded(hidden, outcome, document, guess)))

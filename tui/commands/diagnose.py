@@ -5,6 +5,7 @@ Owns the options of the verb. The diagnosis is the analysis's.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -81,7 +82,8 @@ def diagnose(
             response, subject, further=others, cache=cache_folder(), executor=executor,
             progress=console.progress,
         )  # fmt: skip
-    _tell(proposing(result, unit, (response, *others)), json, console)
+    result = proposing(result, unit, (response, *others))
+    _tell(result, json, console, _advice(result, subject))
     if plots is not None:
         from analysis.diagnosis_figures import draw_diagnosis
 
@@ -101,11 +103,21 @@ def _diagnose_paper(
             console.note(f"wrote {path}")
 
 
-def _tell(result: Diagnosis | PaperDiagnosis, json: bool, console: Console) -> None:
+def _advice(result: Diagnosis, unit: Unit) -> list[str]:
+    """What the accepted model means for whoever adjusts the gears."""
+    from analysis.advice import advise
+    from analysis.answer import accept_model
+
+    return advise(accept_model(None, result.to_json()), unit).lines()
+
+
+def _tell(
+    result: Diagnosis | PaperDiagnosis, json: bool, console: Console, advice: Sequence[str] = ()
+) -> None:
     """The answer itself, before any picture of it: that may fail, and must not cost it."""
     # Who reads no more of it may still want the pictures.
     with readers_may_leave():
         if json:
             console.document(result.to_json())
         else:
-            console.data("\n".join(result.summary()))
+            console.data("\n".join([*result.summary(), *(f"  {text}" for text in advice)]))

@@ -88,7 +88,12 @@ def estimate(
         document = result.to_json()
         console.document(document | {"warnings": warnings + document["warnings"]})
     else:
-        console.data("\n".join([*result.summary(), *(f"  warning: {text}" for text in warnings)]))
+        from analysis.advice import advise
+        from analysis.answer import accept_model
+
+        advice = advise(accept_model(result.to_json()), subject)
+        told = [*(f"warning: {text}" for text in warnings), *advice.lines()]
+        console.data("\n".join([*result.summary(), *(f"  {text}" for text in told)]))
 
 
 def _unit(name_or_path: str) -> Unit:

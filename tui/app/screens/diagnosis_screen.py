@@ -16,21 +16,15 @@ from textual.widgets import ProgressBar
 
 from analysis.swept import sweep_lines
 from analysis.unseen import head_unseen, list_unseen
+from analysis.verdict_words import verdict_words
 from daq.errors import LashbenchError
 from tui.app.desk import plan_of_document
+from tui.app.screens.result_screen import answer_lines
 from tui.app.step_screen import StepScreen
 from tui.app.widgets.plain import Words
 from tui.app.words import plan_words
 
 __all__ = ["DiagnosisScreen", "diagnosis_lines"]
-
-_VERDICTS = {
-    "consistent": "The model explains the measurement: no further cause is needed.",
-    "explained": "A cause was found that explains what the model misses.",
-    "ambiguous": "A cause explains it, others are not ruled out; one more measurement may tell.",
-    "unexplained": "Nothing in the catalogue explains what the model misses.",
-}
-
 
 _DEPARTURES = 4
 """The strongest departures of the plain model that are shown."""
@@ -130,7 +124,8 @@ sweep itself. D then diagnoses both measurements together.
         if results.diagnosis is None:
             return [f"{head}: not diagnosed yet", "", "D compares it with the model: which"
                     " physical cause explains what the model misses?"]  # fmt: skip
-        lines = [head, *diagnosis_lines(results.diagnosis.to_json())]
+        document = results.diagnosis.to_json()
+        lines = [head, *self._answer(document), *diagnosis_lines(document)]
         plan = self._next_plan()
         if plan is not None:
             try:
@@ -139,12 +134,17 @@ sweep itself. D then diagnoses both measurements together.
                 lines.append(f"it cannot be made: {error}")
         return lines
 
+    def _answer(self, document: Mapping[str, Any]) -> list[str]:
+        """Advice and backlash by the model that is accepted."""
+        unit = self.desk.unit
+        return [] if unit is None else answer_lines(None, document, unit)
+
 
 def diagnosis_lines(document: Mapping[str, Any]) -> list[str]:
     """A diagnosis for people: verdict, residual, causes with a sentence each, rivals, what next."""
     before, after = document["baseline"], document["extended"]
     lines = [
-        f"VERDICT: {document['verdict'].upper()}. {_VERDICTS.get(document['verdict'], '')}",
+        f"VERDICT: {document['verdict'].upper()}. {' '.join(verdict_words(document))}",
         *sweep_lines(document.get("sweeps", ())),
         "",
         f"residual before  {_residual(before)}",
@@ -167,10 +167,6 @@ def diagnosis_lines(document: Mapping[str, Any]) -> list[str]:
             names = " + ".join(rival["causes"]) or "no cause"
             remark = f" ({rival['remark']})" if rival.get("remark") else ""
             lines.append(f" - {names}  probability {rival['probability']:.2f}{remark}")
-    ratio = document.get("contribution_ratio")
-    if ratio:
-        lines += ["", f"contribution ratio before {_value(ratio['baseline'])}, "
-                  f"after {_value(ratio['extended'])}"]  # fmt: skip
     lines += [f"warning: {text}" for text in document.get("warnings", ())]
     proposed = document.get("next_measurement")
     if proposed:

@@ -6,7 +6,7 @@ and what is there of it is shown.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,8 +23,9 @@ from tui.app.widgets.traces import traces_of_response
 
 if TYPE_CHECKING:
     from analysis.features import LevelFeatures
+    from sim.unit import Unit
 
-__all__ = ["ResultScreen"]
+__all__ = ["ResultScreen", "answer_lines"]
 
 _INDEX_WORDS = "error index in Hz over the contribution ratio of stage 1: least is likeliest"
 
@@ -37,7 +38,9 @@ class ResultScreen(StepScreen):
 Anti-resonance (ARF) and resonance (RF) stand as lines on the plot, with their errors in the
 table. The contribution ratio r is the share of the backlash that sits in stage 1, with its 95 %
 interval; b1 and b2 are the plays of the stages. The estimate simulates the unit many times and
-takes a while; the screen stays free meanwhile.
+takes a while; the screen stays free meanwhile. Where the unit's own model does not explain the
+response there is no advice before a diagnosis (step 6); after it, the numbers are those of the
+model that the diagnosis accepts.
 
 V changes between the Bode plot and the error index, the paper's measure over the ratio: the
 least index marks the likeliest ratio. E estimates once more. Ctrl+Y copies everything.
@@ -124,15 +127,15 @@ least index marks the likeliest ratio. E estimates once more. Ctrl+Y copies ever
         self.show()
 
     def _lines(self) -> list[str]:
-        from analysis.advice import limit_lines, stage_to_adjust
         from analysis.features import summary
 
         desk, results = self.desk, self.desk.results
         lines: list[str] = []
         if results.estimate is not None and desk.unit is not None:
-            lines += [stage_to_adjust(results.estimate), ratio_words(results.estimate)]
-            lines += limit_lines(results.estimate, desk.unit)
-            lines += [f"warning: {text}" for text in results.estimate.get("warnings", ())]
+            diagnosis = None if results.diagnosis is None else results.diagnosis.to_json()
+            lines += answer_lines(results.estimate, diagnosis, desk.unit)
+            if diagnosis is None:
+                lines += [f"warning: {text}" for text in results.estimate.get("warnings", ())]
         elif "result" in self.bench.analyses.progress:
             fraction, text = self.bench.analyses.progress["result"]
             lines.append(f"estimating {100 * fraction:3.0f} %  {text}")
@@ -163,9 +166,23 @@ def _brief(features: Sequence[LevelFeatures]) -> list[str]:
     return lines
 
 
-def ratio_words(document: Any) -> str:
+def answer_lines(
+    estimate: Mapping[str, Any] | None, diagnosis: Mapping[str, Any] | None, unit: Unit
+) -> list[str]:
+    """Advice, whose numbers they are, the contribution ratio, and each stage beside its limit."""
+    from analysis.advice import advise
+    from analysis.answer import accept_model
+
+    answer = accept_model(estimate, diagnosis)
+    advice = advise(answer, unit)
+    ratio = answer.contribution_ratio
+    told = [] if ratio is None else [f"{ratio_words(ratio)}; {answer.source}"]
+    stages = [stage.line for stage in advice.stages] if answer.models else []
+    return [advice.headline, *told, *stages]
+
+
+def ratio_words(ratio: Mapping[str, Any]) -> str:
     """The contribution ratio in one line."""
-    ratio = document["contribution_ratio"]
     words = f"contribution ratio r = {ratio['value']:.3f} +- {ratio['std']:.3f}"
     if ratio.get("interval95"):
         low, high = ratio["interval95"]
