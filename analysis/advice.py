@@ -196,7 +196,7 @@ def _by_ratio(answer: Answer) -> str:
         return f"Adjust stage 1 first: {share}."
     if high < _HALF:
         return f"Adjust stage 2 first: {share}."
-    if len(ratios) == 1:
+    if all(least <= _HALF <= most for least, most in spans):
         return f"Neither stage stands out: {share}. Measure at more levels before adjusting one."
     names = ", ".join(model_name(model["causes"]) for model in answer.models)
     return (

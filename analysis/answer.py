@@ -119,7 +119,7 @@ def _of_diagnosis(diagnosis: Mapping[str, Any]) -> Answer:
         for one in diagnosis.get("models") or ()
     )
     if word == "ambiguous":
-        names = _either([model_name(model["causes"]) for model in models])
+        names = _and([model_name(model["causes"]) for model in models])
         source = f"undecided between {names}: none" if models else "undecided: none"
         return Answer("open", source, {}, models, diagnosed=True)
     causes = [cause["effect"] for cause in diagnosis.get("causes") or ()]
@@ -136,8 +136,8 @@ def model_name(causes: Sequence[str]) -> str:
     return " with ".join(causes) or PLAIN
 
 
-def _either(names: Sequence[str]) -> str:
-    return " or ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
+def _and(names: Sequence[str]) -> str:
+    return " and ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
 
 
 def _numbers(document: Mapping[str, Any]) -> dict[str, Number]:

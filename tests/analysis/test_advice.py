@@ -111,6 +111,8 @@ def test_without_a_model_no_stage_is_adjusted_passed_or_failed(unit, estimate, d
         # Nothing is missing, as far as is known; what is left open would say another stage.
         ("consistent", [(0.6, 0.7), (0.1, 0.2, "a")], "Undecided, adjust no stage yet"),
         ("consistent", [(0.6, 0.7), (0.7, 0.9, "a")], "Adjust stage 1 first"),
+        # Which of them is true makes no difference here.
+        ("consistent", [(0.4, 0.6), (0.45, 0.7, "a")], "Neither stage stands out: 40 to 70 %"),
     ],
 )
 def test_of_several_models_all_must_agree_on_the_stage(verdict, models, said):

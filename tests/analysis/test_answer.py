@@ -73,7 +73,7 @@ def test_no_number_is_told_where_a_diagnosis_accepts_no_model(estimate):
         estimate, diagnosed("ambiguous", model("load-inertia", ratio=0.2), model(ratio=0.7))
     )
     assert (left.state, left.contribution_ratio, left.b1_deg) == ("open", None, None)
-    assert left.source == "undecided between load-inertia or plain model: none"
+    assert left.source == "undecided between load-inertia and plain model: none"
     assert len(left.models) == 2
 
 
