@@ -37,6 +37,7 @@ from analysis.sizing import size_candidate, widen_if_open
 from analysis.stated_error import error_doubts
 from analysis.surely_off import hold_against_datasheet
 from analysis.swept import check_together, unit_doubts
+from analysis.thinning import thin_all
 from analysis.unseen import Unseen
 from analysis.verdict import Judged, Verdict, judge_candidates
 from daq.errors import AnalysisError
@@ -96,7 +97,7 @@ def diagnose_response(
     """
     responses: tuple[FrequencyResponse, ...] = (response, *further)
     check_together(responses)
-    responses = tuple(map(settled, responses))
+    responses, doubts = thin_all(tuple(map(settled, responses)))
     if unit.stages == 1:
         raise AnalysisError(
             f"unit {unit.name} has one gear stage, and the search shares the backlash out between "
@@ -113,7 +114,12 @@ def diagnose_response(
             found = replace(found, harmonics=harmonics)
     return replace(
         found,
-        warnings=(*unit_doubts(responses, unit), *error_doubts(responses), *_warnings(found)),
+        warnings=(
+            *doubts,
+            *unit_doubts(responses, unit),
+            *error_doubts(responses),
+            *_warnings(found),
+        ),
         elapsed_s=time.perf_counter() - started,
         simulated_s=effort.simulated_s,
     )

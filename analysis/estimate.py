@@ -29,6 +29,7 @@ from analysis.progress import Progress
 from analysis.settled import settled
 from analysis.stated_error import error_doubts
 from analysis.swept import check_together, sweep_document, sweep_lines
+from analysis.thinning import thin_all
 from daq.errors import InputError
 from daq.frf import FrequencyResponse
 from sim.effort import counting
@@ -132,14 +133,14 @@ def estimate_response(
     """
     responses: tuple[FrequencyResponse, ...] = (response, *further)
     check_together(responses)
-    responses = tuple(map(settled, responses))
+    responses, doubts = thin_all(tuple(map(settled, responses)))
     observation, axes = observe(*responses), free_axes(unit, total_backlash_unknown)
     with counting() as effort:
         posterior = fit_posterior(
             unit, observation, axes, seed=seed, cache=cache, executor=executor, progress=progress
         )
     curve = index_curve_of_response(responses[0], observation, posterior.draws)
-    warnings = error_doubts(responses)
+    warnings = doubts + error_doubts(responses)
     misfit = _robust_rms(posterior)
     if misfit > _WIDE_RESIDUAL:
         warnings.append(

@@ -18,19 +18,27 @@ from analysis.damping import measure_half_power
 from analysis.features import Feature, LevelFeatures, Method, summary, to_json
 from analysis.linear import LinearReading, Start, read_both, read_one
 from analysis.peak import read_peak, shape_error
-from analysis.samples import Samples, level_samples
-from daq.errors import AnalysisError
+from analysis.progress import Progress
+from analysis.samples import MOST_POINTS, Samples, level_samples
+from daq.errors import AnalysisError, InputError
 from daq.frf import FrequencyResponse
 
 __all__ = ["Feature", "LevelFeatures", "Method", "extract", "summary", "to_json"]
 
 NOTABLE_SCATTER = 1.25
 """Residuals beyond this many stated errors are worth a flag."""
+MOST_LEVELS = 1000
+"""Source levels of a response; a file with more holds no levels that anybody set."""
+_MOST_ROWS, _LEAST_GROUPS = 60_000, 256
+"""Points of all levels together that are read one by one, and of one level at least."""
+_SAME_LEVEL = 1e-9
 NAMES = {-1: "arf", 1: "rf"}
 """How flags call a feature, by the sign of its extremum."""
 
 
-def extract(response: FrequencyResponse) -> tuple[LevelFeatures, ...]:
+def extract(
+    response: FrequencyResponse, progress: Progress | None = None
+) -> tuple[LevelFeatures, ...]:
     """Read ARF, RF and damping at every source level.
 
     Parameters
@@ -38,33 +46,67 @@ def extract(response: FrequencyResponse) -> tuple[LevelFeatures, ...]:
     response
         Measured or simulated. `gain_std_db` and `phase_std_deg` are used where
         given and estimated from the scatter where not; without phase the gain
-        alone is read. Rows flagged as spoilt are left out.
+        alone is read. Rows flagged as spoilt are left out. Of a level with more points
+        than an analyser takes neighbours are averaged, and a flag says so.
+    progress
+        Told the share done after every level.
 
     Returns
     -------
     One record per level, in ascending level; rows that name no level come last
     as one level. A level whose data carry no feature has None and a flag.
+
+    Raises
+    ------
+    InputError
+        If there are more source levels than any sweep has.
     """
     # Readings may span any range that a float holds; what overflows on the way
     # comes out as not finite and is flagged, so the warnings would say it twice.
     with np.errstate(all="ignore"):
-        return tuple(_read_level(level, part) for level, part in _levels(response))
+        levels = _levels(response)
+        most = int(np.clip(_MOST_ROWS // max(len(levels), 1), _LEAST_GROUPS, MOST_POINTS))
+        found = []
+        for number, (level, part) in enumerate(levels, start=1):
+            found.append(_read_level(level, part, most))
+            if progress is not None:
+                progress(number / len(levels), f"reading {level:g} V")
+    return tuple(found)
 
 
 def _levels(response: FrequencyResponse) -> list[tuple[float, FrequencyResponse]]:
-    found: list[tuple[float, FrequencyResponse]] = []
-    for level in response.levels_vpk[np.isfinite(response.levels_vpk)]:
-        if not found or not np.isclose(level, found[-1][0], rtol=1e-9, atol=0.0):
-            found.append((float(level), response.at_level(float(level))))
+    """The response at each level, its rows in ascending frequency; nameless rows last."""
     nameless = ~np.isfinite(response.source_vpk)
+    named = np.flatnonzero(~nameless)
+    # By level, then frequency: each level is a stretch.
+    order = named[np.lexsort((response.frequency_hz[named], response.source_vpk[named]))]
+    level = response.source_vpk[order]
+    found = []
+    start = 0
+    while start < len(level):
+        reach = level[start] + _SAME_LEVEL * abs(level[start])
+        end = int(np.searchsorted(level, reach, side="right"))
+        part = order[start:end]
+        part = part[np.argsort(response.frequency_hz[part], kind="stable")]
+        found.append((float(level[start]), response.take(part)))
+        _refuse_levels(len(found), response)
+        start = end
     if nameless.any():
         found.append((math.nan, response.take(nameless)))
     return found
 
 
-def _read_level(source_vpk: float, level: FrequencyResponse) -> LevelFeatures:
+def _refuse_levels(count: int, response: FrequencyResponse) -> None:
+    if count > MOST_LEVELS:
+        raise InputError(
+            f"the response holds more than {MOST_LEVELS} source levels in {len(response)} rows; "
+            "see whether source_vpk is the level that was set, and not one that was measured"
+        )
+
+
+def _read_level(source_vpk: float, level: FrequencyResponse, most: int) -> LevelFeatures:
     try:
-        samples = level_samples(level)
+        samples = level_samples(level, most)
     except AnalysisError as error:
         return LevelFeatures(source_vpk, None, None, None, None, (f"level: {error}",))
     return _Reader(samples, *find_candidates(samples)).read(source_vpk)
@@ -77,6 +119,8 @@ class _Reader:
         self.samples = samples
         self.candidates = [c for c in (valley, hill) if c.index is not None]
         self.flags = [f"{NAMES[c.sign]}: {c.reason}" for c in (valley, hill) if c.index is None]
+        if samples.grouped > 1:
+            self.flags.append(f"level: read from means of {samples.grouped} neighbouring points")
         if not samples.noise_known:
             self.flags.append("level: no standard errors given; estimated from the scatter")
         if not np.isfinite(samples.phase_std).any():

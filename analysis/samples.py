@@ -15,7 +15,10 @@ from analysis.noise import Vector, evened, neighbour_noise
 from daq.errors import AnalysisError
 from daq.frf import DB_PER_NEPER, FrequencyResponse, PointFlag
 
-__all__ = ["Samples", "level_samples"]
+__all__ = ["MOST_POINTS", "Samples", "level_samples"]
+
+MOST_POINTS = 2048
+"""Points of a level that are read one by one: an analyser has 801."""
 
 FLOOR_NEPER = 1e-3 / DB_PER_NEPER
 """Least standard error that is believed: files carry gains to about this."""
@@ -43,6 +46,8 @@ class Samples:
     noise_known
         False if the errors are an estimate from the readings' own scatter, so
         that only their relative size is to be trusted.
+    grouped
+        How many neighbouring frequencies one sample is the mean of.
     """
 
     frequency_hz: Vector
@@ -51,6 +56,7 @@ class Samples:
     std: Vector
     phase_std: Vector
     noise_known: bool
+    grouped: int = 1
 
     def __len__(self) -> int:
         return len(self.frequency_hz)
@@ -71,15 +77,17 @@ class Samples:
             self.std[low:high],
             self.phase_std[low:high],
             self.noise_known,
+            self.grouped,
         )
 
 
-def level_samples(level: FrequencyResponse) -> Samples:
+def level_samples(level: FrequencyResponse, most: int = MOST_POINTS) -> Samples:
     """Usable samples of a response at one source level.
 
     Rows flagged as spoilt are left out, as are rows without a finite frequency
     above 0 Hz or a finite gain above 0. Repeats at one frequency are averaged in
-    the logarithm. A standard error that is not given is estimated: from the
+    the logarithm, and more than `most` frequencies are averaged in groups of neighbours, which
+    keeps what they say together. A standard error that is not given is estimated: from the
     repeats if there are enough, else from how far each reading lies from the
     cubic through its four neighbours. Errors across the gain that are not given
     equal those along it: an averaged phasor has circular noise.
@@ -107,7 +115,7 @@ def level_samples(level: FrequencyResponse) -> Samples:
         phase_std=np.where(level.phase_known, _believed(np.radians(level.phase_std_deg)), np.inf),
         noise_known=False,
     )
-    return _with_noise(_merged(rows))
+    return _with_noise(_grouped(_merged(rows), most))
 
 
 def _believed(std: Vector) -> Vector:
@@ -138,6 +146,28 @@ def _merged(rows: Samples) -> Samples:
         std=std,
         phase_std=np.sqrt(np.bincount(group, rows.phase_std**2)) / count,
         noise_known=False,
+    )
+
+
+def _grouped(samples: Samples, most: int) -> Samples:
+    """Means of so many neighbours that no more than `most` samples are left."""
+    size = -(-len(samples) // most)
+    if size == 1:
+        return samples
+    starts = np.arange(0, len(samples), size)
+    count = np.diff(np.append(starts, len(samples)))
+
+    def mean(values: Vector) -> Vector:
+        return np.asarray(np.add.reduceat(values, starts) / count)
+
+    return Samples(
+        frequency_hz=mean(samples.frequency_hz),
+        log_gain=mean(samples.log_gain),
+        phase=np.arctan2(mean(np.sin(samples.phase)), mean(np.cos(samples.phase))),
+        std=np.sqrt(mean(samples.std**2) / count),
+        phase_std=np.sqrt(mean(samples.phase_std**2) / count),
+        noise_known=samples.noise_known,
+        grouped=size,
     )
 
 

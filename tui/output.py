@@ -12,6 +12,7 @@ import logging
 import math
 import os
 import sys
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -36,7 +37,11 @@ class _Live:
     lines: int = 0
     pace: Pace = field(default_factory=Pace)
     narrator: Narrator | None = None
+    told_s: float | None = None
 
+
+_TELLING_S = 15.0
+"""How often long work says how far it is where it cannot draw in place."""
 
 _PATIENCE_S = 2.0
 """How long is waited for a terminal to take what is left, when nothing drives any more."""
@@ -119,7 +124,7 @@ class Console:
         return not self.quiet and sys.stderr.isatty()
 
     def progress(self, fraction: float, text: str = "", remaining_s: float | None = None) -> None:
-        """Show how far the work is, in place; only where somebody watches a terminal.
+        """Show how far the work is, in place; where stderr is no terminal, a line now and then.
 
         Parameters
         ----------
@@ -129,14 +134,23 @@ class Console:
             Time left; estimated from the pace so far, if left out.
         """
         _LOG.debug("%3.0f %% %s", 100.0 * fraction, text)
-        if not self.watched:
-            return
         fraction = min(max(fraction, 0.0), 1.0)
+        if not self.watched:
+            self._tell_now_and_then(f"{100 * fraction:3.0f} %  {text}")
+            return
         if remaining_s is None:
             remaining_s = self._live.pace.remaining_s(fraction)
         left = "" if remaining_s is None else f"{duration(remaining_s)} left  "
         line = f"{100 * fraction:3.0f} %  {left}{visible_line(text)}"
         self._narrate(f"\r\x1b[K{line[:78]}", fleeting=True)
+
+    def _tell_now_and_then(self, line: str) -> None:
+        now_s = time.monotonic()
+        if self._live.told_s is None:
+            self._live.told_s = now_s
+        if not self.quiet and now_s - self._live.told_s >= _TELLING_S:
+            self._live.told_s = now_s
+            self._narrate(f"{line}\n")
 
     def picture(self, lines: Sequence[str]) -> None:
         """Draw lines in place of those drawn before; only where they fit on a terminal."""

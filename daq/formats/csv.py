@@ -23,9 +23,11 @@ fall on one.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -65,6 +67,10 @@ _REPEATED = (
     "repeated",
     "take one out, or write '# repeated_points = true' above the header if both were measured",
 )
+_PLAIN = re.compile(r"[0-9+\-.eE, \r]*\Z")
+"""Characters of which Python makes no number but one that `_NUMBER` is, too."""
+_CHUNK = 1 << 18
+"""Characters that are taken apart at once."""
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\Z")
 
 
@@ -74,7 +80,7 @@ class _Table:
 
     path: Path
     comments: dict[str, Any]
-    lines: tuple[int, ...]
+    lines: NDArray[np.int64]
     columns: NDArray[np.float64]
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
@@ -150,7 +156,7 @@ def write(response: FrequencyResponse, path: Path) -> None:
     except TypeError as error:
         raise InputError(f"{path}: the provenance cannot be written ({error})") from error
     lines.append(",".join(COLUMNS))
-    table = _Table(path, comments, tuple(len(lines) + 1 + row for row in range(len(kept))), columns)
+    table = _Table(path, comments, len(lines) + 1 + np.arange(len(kept)), columns)
     # What would be refused when it is read is not written.
     _check_values(table)
     _check_order(table, kept.direction)
@@ -197,25 +203,38 @@ def _comments(kept: FrequencyResponse, spoilt: FrequencyResponse) -> dict[str, A
 
 
 def _parse(path: Path) -> _Table:
-    lines = enumerate(_text(path).split("\n"), start=1)
+    chunks = _chunks(_text(path))
     comments: dict[str, Any] = {}
-    header = ""
-    for number, line in lines:
-        line = line.strip()
-        if line.startswith("#"):
-            _add_comment(comments, line[1:].strip(), f"{path}, line {number}")
-        elif line:
-            header = line
-            break
+    header, number, rest = "", 0, []
+    while not header and (lines := next(chunks, None)) is not None:
+        for place, line in enumerate(map(str.strip, lines)):
+            number += 1
+            if line.startswith("#"):
+                _add_comment(comments, line[1:].strip(), f"{path}, line {number}")
+            elif line:
+                header, rest = line, lines[place + 1 :]
+                break
     _check_header(path, header)
-    numbers, rows = [], []
-    for number, line in lines:
-        if line.strip():
-            rows.append(_row(line, f"{path}, line {number}"))
-            numbers.append(number)
-    if not rows:
+    numbers, parts = [], []
+    for lines in chain([rest], chunks):
+        kept = [(number + k, line) for k, line in enumerate(lines, start=1) if line.strip()]
+        number += len(lines)
+        if kept:
+            numbers.append(np.array([at for at, _ in kept]))
+            parts.append(_rows(kept, path))
+    if not parts:
         raise FileFormatError(f"{path}: has a header but no rows; give a whole file")
-    return _Table(path, comments, tuple(numbers), np.array(rows, dtype=float))
+    return _Table(path, comments, np.concatenate(numbers), np.concatenate(parts))
+
+
+def _chunks(text: str) -> Iterator[list[str]]:
+    """The lines of a text, some thousands at a time."""
+    start = 0
+    while start <= len(text):
+        end = text.find("\n", start + _CHUNK)
+        end = len(text) if end < 0 else end
+        yield text[start:end].split("\n")
+        start = end + 1
 
 
 def _text(path: Path) -> str:
@@ -275,6 +294,31 @@ def _check_header(path: Path, header: str) -> None:
     raise FileFormatError(
         f"{path}: {'; '.join(faults) or 'columns repeated or out of order'}; {wanted}"
     )
+
+
+def _rows(kept: list[tuple[int, str]], path: Path) -> NDArray[np.float64]:
+    """Values (lines, columns) of numbered lines: at once where all are plain, else line by line."""
+    values = _plain_rows([line for _, line in kept])
+    if values is None:
+        values = np.array([_row(line, f"{path}, line {at}") for at, line in kept], dtype=float)
+    return values
+
+
+def _plain_rows(lines: list[str]) -> NDArray[np.float64] | None:
+    """The values of lines that hold five numbers each, or nothing where that may be; else None."""
+    if any(line.count(",") != len(COLUMNS) - 1 for line in lines):
+        return None
+    text = ",".join(lines)
+    if not _PLAIN.fullmatch(text):
+        return None
+    try:
+        flat = [float(cell) if cell else math.nan for cell in text.split(",")]
+    except ValueError:
+        return None
+    values = np.array(flat).reshape(len(lines), len(COLUMNS))
+    full = [name not in _MAY_BE_EMPTY for name in COLUMNS]
+    sound = not np.any(np.isinf(values)) and not np.any(np.isnan(values[:, full]))
+    return values if sound else None
 
 
 def _row(line: str, place: str) -> list[float]:
@@ -388,8 +432,10 @@ def _check_order(table: _Table, direction: str | None) -> None:
 
 
 def _levels(table: _Table) -> Iterator[tuple[float, NDArray[np.intp]]]:
-    for level in np.unique(table["source_vpk"]):
-        yield float(level), np.flatnonzero(table["source_vpk"] == level)
+    levels, place = np.unique(table["source_vpk"], return_inverse=True)
+    order = np.argsort(place, kind="stable")
+    parts = np.split(order, np.flatnonzero(np.diff(place[order])) + 1)
+    yield from zip(levels.tolist(), parts, strict=True)
 
 
 def _refuse(table: _Table, row: int | np.intp, fault: str) -> NoReturn:

@@ -28,7 +28,7 @@ def extract(file: Path, /, *, json: Json = False, console: Injected) -> None:
     from analysis.resonance import extract as features_of
     from analysis.resonance import summary, to_json
 
-    features = features_of(response)
+    features = features_of(response, console.progress)
     if json:
         console.document(to_json(features))
     else:

@@ -118,6 +118,9 @@ def _observation(file: Path | None, options: PlanOptions, recipe: str | None) ->
     if options.given or recipe is not None:
         raise InputError(f"{file}: give either a response or the options of a sweep, not both")
     from analysis.observation import observe
+    from analysis.settled import settled
+    from analysis.thinning import thin_all
     from daq.formats import read_response
 
-    return observe(read_response(file))
+    (response,), _ = thin_all([settled(read_response(file))])
+    return observe(response)
