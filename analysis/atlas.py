@@ -191,7 +191,7 @@ def write_atlas(file: Path, atlas: Atlas) -> None:
     """Keep an atlas; a cache that cannot be written costs time later and nothing else."""
     names = {f"{'+'.join(key)}|{field}": getattr(one, field)
              for key, one in atlas.items() for field in Population.__slots__}  # fmt: skip
-    with keeping(file) as part, part.open("wb") as stream:
+    with keeping(file) as stream:
         np.savez_compressed(stream, **names)
 
 

@@ -35,8 +35,8 @@ def draw_diagnosis(diagnosis: Diagnosis, folder: Path) -> list[Path]:
         ("probabilities", probability_figure(diagnosis)),
     ):
         path = folder / f"{file_stem(diagnosis.unit)}-diagnosis-{name}.png"
-        with replacing(path) as partial:
-            figure.savefig(partial, dpi=130)
+        with replacing(path) as stream:
+            figure.savefig(stream, format="png", dpi=130)
         written.append(path)
     return written
 

@@ -99,7 +99,7 @@ def _shipped() -> Folder | None:
 
 def _keep(file: Path, readings: Readings) -> None:
     """Keep runs; a cache that cannot be written costs time later and nothing else."""
-    with keeping(file) as part, part.open("wb") as stream:
+    with keeping(file) as stream:
         write_runs(stream, readings)
 
 

@@ -30,8 +30,8 @@ def draw(diagnosis: PaperDiagnosis, directory: Path) -> list[Path]:
     """Write the figure of one unit as PNG into a directory, made if missing."""
     directory.mkdir(parents=True, exist_ok=True)
     path = directory / f"{file_stem(diagnosis.unit)}-paper-diagnosis.png"
-    with replacing(path) as partial:
-        paper_diagnosis_figure([diagnosis]).savefig(partial, dpi=130)
+    with replacing(path) as stream:
+        paper_diagnosis_figure([diagnosis]).savefig(stream, format="png", dpi=130)
     return [path]
 
 

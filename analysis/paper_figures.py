@@ -63,8 +63,8 @@ def draw(result: Reproduction, directory: Path) -> list[Path]:
     paths = []
     for name, make in figures.items():
         paths.append(directory / f"{name}.png")
-        with rc_context(_STYLE), replacing(paths[-1]) as partial:
-            make(result).savefig(partial)
+        with rc_context(_STYLE), replacing(paths[-1]) as stream:
+            make(result).savefig(stream, format="png")
     return paths
 
 

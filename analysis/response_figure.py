@@ -62,8 +62,10 @@ def save_response_figure(
     response: FrequencyResponse, features: Sequence[LevelFeatures], path: Path
 ) -> None:
     """Write `draw_response` as a picture; the suffix names its kind."""
-    with replacing(path) as partial:
-        draw_response(response, features).savefig(partial, dpi=130)
+    with replacing(path) as stream:
+        draw_response(response, features).savefig(
+            stream, format=path.suffix.removeprefix(".") or "png", dpi=130
+        )
 
 
 def _draw_level(

@@ -21,6 +21,7 @@ from sqlalchemy.pool import QueuePool
 
 from daq.bounded_text import parse_json
 from daq.errors import FileFormatError, InputError, LashbenchError, MeasurementError
+from daq.store_beside import check_beside
 from daq.store_schema import SCHEMA_VERSION, lay_over, migrate, schema_version
 
 __all__ = ["engine_of", "log_of", "open_engine", "telling_faults"]
@@ -48,6 +49,7 @@ def open_engine(path: Path, *, create: bool, read_only: bool) -> sa.Engine:
         If the file is not a history, is damaged, or is newer than this program.
     """
     exists = _check_place(path, create=create, read_only=read_only)
+    check_beside(_behind_links(path))
     mode = _mode(path, exists, read_only)
     engine = engine_of(path, mode=mode)
     try:

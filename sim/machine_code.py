@@ -133,5 +133,5 @@ def _read(file: Path) -> bytes | None:
 
 def _keep(file: Path, program: bytes) -> None:
     """Keep what was compiled; a folder that cannot be written costs time later and nothing else."""
-    with keeping(file) as part:
-        part.write_bytes(_MARK(program).digest() + program)
+    with keeping(file) as stream:
+        stream.write(_MARK(program).digest() + program)

@@ -1,11 +1,15 @@
 """The log file, where everything goes that no operator should have to see.
 
-Owns the handler that writes it, and that there is one only.
+Owns the handler that writes it, and that there is one only. It writes into a regular file of this
+user, not through a link.
 """
 
 from __future__ import annotations
 
+import io
 import logging
+import os
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from logging.handlers import RotatingFileHandler
@@ -55,7 +59,7 @@ def logging_to_file(level: str = "info") -> Iterator[Path | None]:
         return
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handler = RotatingFileHandler(path, maxBytes=_BYTES, backupCount=1, encoding="utf-8")
+        handler = _OwnFile(path, maxBytes=_BYTES, backupCount=1, encoding="utf-8")
     except OSError:
         yield None
         return
@@ -72,3 +76,21 @@ def logging_to_file(level: str = "info") -> Iterator[Path | None]:
         logger.removeHandler(handler)
         warned.removeHandler(handler)
         handler.close()
+
+
+class _OwnFile(RotatingFileHandler):
+    """A handler that opens no file but one of this user, and follows no link to it."""
+
+    def _open(self) -> io.TextIOWrapper:
+        return open(self.baseFilename, "a", encoding=self.encoding, opener=_own)  # noqa: SIM115
+
+
+def _own(name: str, flags: int) -> int:
+    flags |= getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+    handle = os.open(name, flags, 0o600)
+    found = os.fstat(handle)
+    owner = os.getuid() if hasattr(os, "getuid") else found.st_uid
+    if stat.S_ISREG(found.st_mode) and found.st_nlink == 1 and found.st_uid == owner:
+        return handle
+    os.close(handle)
+    raise OSError(f"{name} is no log of lashbench")

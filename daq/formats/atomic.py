@@ -11,7 +11,9 @@ import os
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from io import BytesIO
 from pathlib import Path
+from typing import BinaryIO
 
 from daq.errors import InputError, LashbenchError
 
@@ -19,11 +21,11 @@ __all__ = ["checked_target", "file_stem", "keeping", "replacing", "write_text"]
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """Give a name to write to; it becomes `path` when the block ends well.
+def replacing(path: Path) -> Iterator[BinaryIO]:
+    """Give a new file to write to; it becomes `path` when the block ends well.
 
-    The temporary name lies in the same directory and has the same suffix. On
-    any failure it is removed and `path` is as it was.
+    It lies in the same directory under a name that was free, and is never opened by
+    that name again. On any failure it is removed and `path` is as it was.
 
     Raises
     ------
@@ -33,11 +35,12 @@ def replacing(path: Path) -> Iterator[Path]:
         If the disk refuses the data.
     """
     target = checked_target(path)
-    token = secrets.token_hex(4)
-    partial = target.with_name(f".{target.stem[:64]}.{token}.partial{target.suffix}")
+    partial = _partial(target)
     try:
-        yield partial
-        _flush(partial)
+        with partial.open("xb") as stream:
+            yield stream
+            stream.flush()
+            os.fsync(stream.fileno())
         os.replace(partial, target)
         _flush(target.parent)
     except PermissionError as error:
@@ -45,22 +48,28 @@ def replacing(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise LashbenchError(f"{path}: could not be written ({error.strerror or error})") from error
     finally:
-        with suppress(FileNotFoundError):
+        with suppress(OSError):
             partial.unlink()
 
 
 @contextmanager
-def keeping(path: Path) -> Iterator[Path]:
-    """Give a name to write to what can be made again; it becomes `path` when the block ends well.
+def keeping(path: Path) -> Iterator[BinaryIO]:
+    """Give a file to write to what can be made again; it becomes `path` when the block ends well.
 
     Where that fails nothing is left, and nothing is said: it costs time later.
     """
-    partial = path.with_suffix(f".{os.getpid()}.part")
+    partial = _partial(path)
     with suppress(OSError):
-        path.parent.mkdir(parents=True, exist_ok=True)
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    try:
+        stream: BinaryIO = partial.open("xb")
+    except OSError:
+        yield BytesIO()
+        return
     with suppress(OSError):
         try:
-            yield partial
+            with stream:
+                yield stream
             os.replace(partial, path)
         finally:
             partial.unlink(missing_ok=True)
@@ -68,8 +77,8 @@ def keeping(path: Path) -> Iterator[Path]:
 
 def write_text(path: Path, text: str) -> None:
     """Write a UTF-8 text file whole or not at all; raises as `replacing` does."""
-    with replacing(path) as partial:
-        partial.write_text(text, encoding="utf-8", newline="")
+    with replacing(path) as stream:
+        stream.write(text.encode("utf-8"))
 
 
 def file_stem(name: str) -> str:
@@ -84,9 +93,12 @@ def checked_target(path: Path) -> Path:
     Raises
     ------
     InputError
-        If its directory does not exist, or something that is not a file is there.
+        If its directory does not exist, something that is not a file is there, or a link
+        that another user made, who would choose what is overwritten.
     """
     try:
+        if path.is_symlink() and hasattr(os, "getuid") and not _is_own(path):
+            raise InputError(f"{path}: is a link that another user made; give the file itself")
         target = path.resolve()
         if target.exists() and not target.is_file():
             what = "a directory" if target.is_dir() else "not a regular file"
@@ -98,6 +110,15 @@ def checked_target(path: Path) -> Path:
     if not os.access(target.parent, os.W_OK):
         raise InputError(f"{path}: the directory {target.parent} may not be written")
     return target
+
+
+def _is_own(link: Path) -> bool:
+    return link.lstat().st_uid in (0, os.getuid())
+
+
+def _partial(target: Path) -> Path:
+    """A name beside a file that is short, whatever the file's own is."""
+    return target.with_name(f".lashbench-{secrets.token_hex(8)}.partial")
 
 
 def _flush(path: Path) -> None:

@@ -65,8 +65,8 @@ def write(response: FrequencyResponse, path: Path) -> None:
     arrays, document = taken_apart(response, path)
     shown = {"gain_db": (response.gain_db, "dB"), "phase_deg": (response.phase_deg, "deg")}
     # In memory first: the library does not survive a disk that refuses its data.
-    stream = BytesIO()
-    with h5py.File(stream, "w") as file:
+    content = BytesIO()
+    with h5py.File(content, "w") as file:
         file.attrs.update({"NX_class": "NXroot", "default": "entry"})
         # A data set of its own: attributes are limited to 64 KiB.
         file.create_dataset("document", data=np.frombuffer(document.encode("ascii"), np.uint8))
@@ -77,8 +77,8 @@ def write(response: FrequencyResponse, path: Path) -> None:
             group.create_dataset(name, data=values).attrs["units"] = ARRAYS[name][1]
         for name, (column, unit) in shown.items():
             group.create_dataset(name, data=column).attrs["units"] = unit
-    with replacing(path) as partial:
-        partial.write_bytes(stream.getvalue())
+    with replacing(path) as stream:
+        stream.write(content.getvalue())
 
 
 def _document(file: h5py.File, path: Path) -> str:

@@ -73,8 +73,8 @@ def write(response: FrequencyResponse, path: Path) -> None:
     buffer = BytesIO()
     savemat(buffer, {**arrays, "document": document}, oned_as="column")
     content = buffer.getvalue()
-    with replacing(path) as partial:
-        partial.write_bytes(_head(content) + content[_TEXT_BYTES:])
+    with replacing(path) as stream:
+        stream.write(_head(content) + content[_TEXT_BYTES:])
 
 
 def _head(content: bytes) -> bytes:

@@ -102,3 +102,14 @@ def test_what_libraries_warn_of_is_for_the_log_alone(tmp_path):
         )  # fmt: skip
         assert "overflow" not in ended.stderr
     assert "overflow encountered" in log_path().read_text()
+
+
+@pytest.mark.parametrize("kind", ["symlink_to", "hardlink_to"])
+def test_a_log_is_not_written_through_a_link(kind, tmp_path, capsys):
+    theirs = tmp_path / "colleague.txt"
+    theirs.write_text("results")
+    log_path().parent.mkdir(parents=True)
+    getattr(log_path(), kind)(theirs)
+    assert main(["--log-level", "info", "completion", "bash"]) == 0
+    assert "cannot be written" in capsys.readouterr().err
+    assert theirs.read_text() == "results"
