@@ -5,6 +5,8 @@ and draws nothing on a terminal.
 """
 
 __all__ = [
+    "advice",
+    "answer",
     "diagnosis",
     "estimate",
     "paper",

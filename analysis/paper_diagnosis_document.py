@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.backlash import backlash_of_places
 from analysis.paper_belief import Belief, Judged, index_of
 from analysis.paper_evidence import Agreement
 from analysis.paper_pairs import CHAIN, DISSIPATION, LOADS, VISCOUS
@@ -81,11 +82,28 @@ def _section(belief: Belief) -> dict[str, Any]:
             "extended": _ratio(best),
             "all_sets": dict(zip(("value", "std"), belief.ratio(), strict=True)),
         },
+        **_stages(belief),
         "residual": residual(plain),
         "residual_after": residual(best),
         "error_index": _index_section(belief),
         "damping_alone": _damping_alone(belief),
     }
+
+
+def _stages(belief: Belief) -> dict[str, Any]:
+    """The backlash by stage of the accepted set, null where none is accepted."""
+    names = ("b1_deg", "b2_deg", "b_t_deg")
+    if belief.word not in ("consistent", "explained"):
+        return dict.fromkeys(names)
+    accepted = belief.baseline if belief.word == "consistent" else belief.best
+    agreement, hypothesis = accepted.agreement, accepted.agreement.hypothesis
+    unit = hypothesis.unit
+    total = np.full(len(agreement.places), unit.backlash.b_t_deg)
+    for at, (_, parameter) in enumerate(hypothesis.parameters):
+        if parameter.name == "b_t_deg":
+            total = np.array([hypothesis.values(place)[at] for place in agreement.places])
+    told = backlash_of_places(unit, agreement.places[:, 0], total, agreement.weight).to_json()
+    return {name: told[name] for name in names}
 
 
 def parameters(agreement: Agreement) -> dict[str, dict[str, dict[str, Any]]]:

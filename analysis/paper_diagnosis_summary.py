@@ -12,6 +12,7 @@ import numpy as np
 from analysis.paper_belief import Belief, Judged, index_of
 from analysis.paper_diagnosis_document import parameters, residual
 from analysis.paper_pairs import CHAIN, DISSIPATION, LOADS, VISCOUS
+from analysis.verdict_words import hidden_words
 from sim.catalogue import CATALOGUE
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ def summarise(diagnosis: PaperDiagnosis) -> list[str]:
     ]
     for name, belief in diagnosis.beliefs.items():
         lines += ["", f"{_TITLES[name]}: {belief.word}. {_sentence(belief)}"]
+        lines.append(f"  {hidden_words(belief.baseline.probability)}")
         lines += _wrong(belief) + _index(belief) + _damping(belief) + _sets(belief)
     lines += ["", "the plain model, swept otherwise (error index of a single run, Hz)"]
     for name, agreement in diagnosis.procedures.items():

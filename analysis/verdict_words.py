@@ -9,7 +9,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-__all__ = ["how_sure", "likelihood_words", "nothing_hidden", "open_questions", "verdict_words"]
+__all__ = [
+    "hidden_words",
+    "how_sure",
+    "likelihood_words",
+    "nothing_hidden",
+    "open_questions",
+    "verdict_words",
+]
 
 _SCALE = (
     (0.99, "virtually certain"),
@@ -47,6 +54,11 @@ def nothing_hidden(document: Mapping[str, Any]) -> str:
     probability = _of_nothing(document)
     if probability is None:
         return "The probability that nothing is hidden is not known."
+    return hidden_words(probability)
+
+
+def hidden_words(probability: float) -> str:
+    """The probability that nothing is hidden, as a number and in words."""
     return (
         f"Among the sets judged, that nothing is hidden has probability {probability:.2f}: "
         f"{likelihood_words(probability)}."

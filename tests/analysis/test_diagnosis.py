@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 from analysis import atlas
+from analysis.advice import advise
+from analysis.answer import accept_model
 from analysis.causes import every_single_cause
 from analysis.diagnosis import diagnose_response
 from analysis.diagnosis_figures import draw_diagnosis, residual_figure
@@ -154,10 +156,26 @@ def judge_practice(number, response, cache, folder):
             assert named[effect][name]["value"] == pytest.approx(value, rel=0.15)
     ratio = document["contribution_ratio"]["extended"]
     assert abs(ratio["value"] - truth["contribution_ratio"]) < 0.06
+    assert_backlash_is_that_of_the_accepted_model(document, truth, unit)
     assert document["extended"]["held_out_rms_sigma"] < 1.3
     assert "\n".join(found.summary())
     for path in draw_diagnosis(found, folder):
         assert path.read_bytes().startswith(b"\x89PNG")
+
+
+def assert_backlash_is_that_of_the_accepted_model(document, truth, unit):
+    """Each number within four of its error bars, and no advice on the wrong stage."""
+    ratio = truth["contribution_ratio"]
+    b_t = truth["effects"].get("total-backlash", {}).get("b_t_deg", unit.backlash.b_t_deg)
+    told = {"b1_deg": ratio * b_t * unit.output_ratio, "b2_deg": (1 - ratio) * b_t, "b_t_deg": b_t}
+    accepted = document["verdict"] != "ambiguous"
+    for name, value in told.items():
+        assert (document[name] is not None) == accepted
+        for model in document["models"][:1]:
+            assert abs(model[name]["value"] - value) <= max(4.0 * model[name]["std"], 1e-12)
+    headline = advise(accept_model(None, document), unit).headline
+    wrong = 2 if ratio > 0.5 else 1
+    assert not headline.startswith(f"Adjust stage {wrong}")
 
 
 @pytest.fixture(scope="session")

@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from analysis.advice import advise
+from analysis.answer import accept_model
 from analysis.ensemble import Machine
 from analysis.estimate import Estimate, estimate_features, estimate_response
 from analysis.library import run_families
@@ -146,6 +148,7 @@ def test_a_level_at_which_friction_holds_the_servo_does_no_harm(cache):
     assert within(found.contribution_ratio, 0.6, 4.0)
     assert found.contribution_ratio.std < 1.5 * known.contribution_ratio.std
     assert not found.warnings
+    assert not found.refuted
 
 
 def test_without_phase_and_errors_it_still_answers_and_is_not_surer(cache):
@@ -192,6 +195,25 @@ def test_practice_sets_with_nothing_hidden(name, truth):
     assert low < truth < high
     assert found.contribution_ratio.std < 0.06
     assert not found.warnings
+
+
+@pytest.mark.parametrize(
+    "number",
+    # Both were advised on the wrong stage; `make blind` runs five more.
+    [
+        "04",
+        "06",
+        *(pytest.param(n, marks=pytest.mark.study) for n in ("02", "03", "05", "07", "08")),
+    ],
+)
+def test_practice_sets_that_hide_something_get_no_advice_before_a_diagnosis(number):
+    response = read_response(PRACTICE / f"practice-{number}.csv")
+    unit = load_unit(response.unit)
+    document = estimate_response(response, unit).to_json()
+    assert document["refuted"] is True
+    advice = advise(accept_model(document), unit)
+    assert advice.lines()[0].startswith("No advice before a diagnosis")
+    assert "tage 1" not in " ".join(advice.lines())
 
 
 @pytest.mark.parametrize(

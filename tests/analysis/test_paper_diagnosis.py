@@ -158,6 +158,9 @@ def test_document_follows_the_contract_and_is_whole(tmp_path: Path) -> None:
         for model in ("baseline", "extended"):
             assert set(section[model]) >= {"held_out_rms_sigma", "held_out_rms_db"}
             assert set(section["contribution_ratio"][model]) == {"value", "std"}
+        accepted = section["verdict"] in ("consistent", "explained")
+        for name in ("b1_deg", "b2_deg", "b_t_deg"):
+            assert (section[name] is not None) == accepted
         for entry in (*section["residual"], *section["residual_after"]):
             assert set(entry) >= {"band_hz", "source_vpk", "quantity", "mean", "sigma"}
         index = section["error_index"]
