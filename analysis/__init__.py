@@ -4,6 +4,9 @@ The third floor. It turns frequency responses into statements with error bars
 and draws nothing on a terminal.
 """
 
+__distribution__ = "lashbench"
+"""Another distribution may bring a package of this name; `tui.entry` tells them apart."""
+
 __all__ = [
     "advice",
     "answer",

@@ -4,6 +4,9 @@ The lowest of the four floors. It knows nothing of physics, judgement or
 screens: a simulated analyser is met through a transport, as a real one is.
 """
 
+__distribution__ = "lashbench"
+"""Another distribution may bring a package of this name; `tui.entry` tells them apart."""
+
 __all__ = [
     "adaptive",
     "analyser",

@@ -84,10 +84,16 @@ class Analyser(Protocol):
     """
 
     on_wait: Callable[[], None] | None
-    """Called at least five times a second in every wait except those of `make_safe`.
+    """Called at least five times a second in every wait except those of `make_safe`, and
+    immediately before every command that makes the source drive.
 
     May raise, which ends the wait and comes out of the method that waited: this
     is how a session interrupts a point that takes long. None does nothing.
+    """
+    on_exchange: Callable[[float], None] | None
+    """Told before each exchange except those of `make_safe` how long it may take, s.
+
+    A watchdog hears from it that the session lives; it must not raise. None does nothing.
     """
 
     def identify(self) -> Identity:

@@ -15,6 +15,10 @@ from daq.errors import InputError
 
 __all__ = ["child_command", "child_environment"]
 
+_LOADERS = ("LD_PRELOAD", "LD_AUDIT", "DYLD_INSERT_LIBRARIES")
+"""Variables that load other code into every program."""
+_LIBRARIES = ("numpy", "sqlalchemy")
+"""Where these are, there is all that `daq` needs."""
 _START = Path(__file__).resolve().with_name("child_start.py")
 
 
@@ -34,17 +38,30 @@ def child_command(module: str, *arguments: str) -> list[str]:
     if not sys.executable:
         raise InputError("this Python does not know where its own program is; start it by its path")
     # As -I, but for a user's own site-packages where this process has its packages from there.
-    alone = [] if site.ENABLE_USER_SITE else ["-s"]
-    return [sys.executable, "-E", "-P", *alone, str(_START), module, *arguments]
+    flags = [] if site.ENABLE_USER_SITE else ["-s"]
+    flags += ["-B"] if sys.dont_write_bytecode else []
+    places = os.pathsep.join(_places_of_libraries())
+    return [sys.executable, "-E", "-P", *flags, str(_START), places, module, *arguments]
 
 
 def child_environment(**more: str) -> dict[str, str]:
-    """The environment of such a child: that of this process without Python's own variables.
+    """The environment of such a child: that of this process without what loads other code.
 
     Parameters
     ----------
     more
         Variables to set beside.
     """
-    kept = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+    kept = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in _LOADERS and not name.startswith("PYTHON")
+    }
     return kept | more
+
+
+def _places_of_libraries() -> list[str]:
+    """Folders of libraries that this process has from where a child would not look, if any."""
+    files = (getattr(sys.modules.get(name), "__file__", None) for name in _LIBRARIES)
+    places = (str(Path(file).resolve().parents[1]) for file in files if file)
+    return list(dict.fromkeys(places))

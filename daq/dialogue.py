@@ -34,6 +34,8 @@ _QUEUE_READS = 12
 
 _RECOVERY_S = 2.0
 """Bound of each step of a recovery: what follows it may be making the source safe."""
+_RECOVERY_IN_ALL_S = 20.0
+"""Announced for all its steps."""
 
 _LOOK_S = 0.1
 """Longest pause without a look at whether anybody wants it to end."""
@@ -70,6 +72,8 @@ class Dialogue:
         self.trusted = False
         self.on_wait: Callable[[], None] | None = None
         """Called between the polls of a wait; may raise to end it."""
+        self.on_exchange: Callable[[float], None] | None = None
+        """Told before each exchange how long it may take at most, s; must not raise."""
         self.lock = threading.RLock()
         """Held for each exchange; whoever needs several in a row may hold it longer."""
         self._nonce = 0
@@ -78,12 +82,15 @@ class Dialogue:
 
     def send(self, line: str) -> None:
         """Send a command that is not answered."""
-        self._guarded(lambda: self.transport.write(line, Deadline.after(self.reply_s)))
+        self._guarded(
+            lambda: self.transport.write(line, Deadline.after(self.reply_s)), self.reply_s
+        )
 
     def ask(self, line: str, within_s: float | None = None) -> str:
         """Send a query and read its reply."""
-        deadline = Deadline.after(self.reply_s if within_s is None else within_s)
-        return self._guarded(lambda: ask(self.transport, line, deadline))
+        bound_s = self.reply_s if within_s is None else within_s
+        deadline = Deadline.after(bound_s)
+        return self._guarded(lambda: ask(self.transport, line, deadline), bound_s)
 
     def ask_integer(self, line: str, within_s: float | None = None) -> int:
         """Send a query that is answered by an integer."""
@@ -96,11 +103,15 @@ class Dialogue:
     def ask_reals(self, line: str) -> NDArray[np.float64]:
         """Send a query that is answered by a block of big-endian doubles, shape (n,)."""
         deadline = Deadline.after(self.block_s)
-        return self._guarded(lambda: decode_reals(ask_block(self.transport, line, deadline)))
+        return self._guarded(
+            lambda: decode_reals(ask_block(self.transport, line, deadline)), self.block_s
+        )
 
     def poll(self) -> int | None:
         """Serial poll; None where the wire has none."""
-        return self._guarded(lambda: self.transport.serial_poll(Deadline.after(self.reply_s)))
+        return self._guarded(
+            lambda: self.transport.serial_poll(Deadline.after(self.reply_s)), self.reply_s
+        )
 
     def pause(self, seconds: float) -> None:
         """Let time pass, with a look at `on_wait` at least every `_LOOK_S`."""
@@ -244,7 +255,9 @@ class Dialogue:
             entries.append(entry)
         return entries
 
-    def _guarded(self, exchange: Callable[[], _Result]) -> _Result:
+    def _guarded(self, exchange: Callable[[], _Result], bound_s: float) -> _Result:
+        if self.on_exchange is not None:
+            self.on_exchange(bound_s)
         with self.lock:
             try:
                 return exchange()
@@ -266,6 +279,8 @@ class Dialogue:
 
     def failure(self, error: BenchTimeout | ProtocolError) -> LashbenchError:
         """Recover from a time-out or a damaged reply; the error to raise, with what was found."""
+        if self.on_exchange is not None:
+            self.on_exchange(_RECOVERY_IN_ALL_S)
         try:
             queue = self.recover()
         except LashbenchError as failure:

@@ -10,7 +10,8 @@
     ├── LinkError                  3  no connection, or it was lost
     │   └── ProtocolError          3  bytes came, but not those that were due
     ├── BenchTimeout               4  a wait ran past its bound
-    └── LimitError                 5  refused by a limit of bench, unit or recipe
+    ├── LimitError                 5  refused by a limit of bench, unit or recipe
+    └── Interrupted              130  ended on request before anything was driven
 
 A message is one line: what, which value, what to do. This module imports
 nothing and must never print.
@@ -23,6 +24,7 @@ __all__ = [
     "FileFormatError",
     "InputError",
     "InstrumentError",
+    "Interrupted",
     "LashbenchError",
     "LimitError",
     "LinkError",
@@ -83,3 +85,9 @@ class LimitError(LashbenchError):
     """A limit of bench, unit or recipe forbids the request; no byte was sent."""
 
     exit_code = 5
+
+
+class Interrupted(LashbenchError):
+    """An end was asked for before anything was driven."""
+
+    exit_code = 130

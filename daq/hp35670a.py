@@ -95,6 +95,15 @@ class HP35670A:
     def on_wait(self, look: Callable[[], None] | None) -> None:
         self._dialogue.on_wait = look
 
+    @property
+    def on_exchange(self) -> Callable[[float], None] | None:
+        """Told before each exchange how long it may take at most, s; must not raise."""
+        return self._dialogue.on_exchange
+
+    @on_exchange.setter
+    def on_exchange(self, told: Callable[[float], None] | None) -> None:
+        self._dialogue.on_exchange = told
+
     def identify(self) -> Identity:
         """Ask who is there, and refuse anything but a 35670A with swept sine."""
         with self._dialogue.lock:
@@ -207,7 +216,7 @@ class HP35670A:
         try:
             with dialogue.lock:
                 guard()
-                self._drive(setup, frequencies)
+                self._drive(setup, frequencies, guard)
             yield from measure(dialogue, setup, self._timing, frequencies, guard)
         except BaseException as error:
             # The first fault is the one to report; the session makes safe in any case.
@@ -220,14 +229,17 @@ class HP35670A:
         self._quiet()
         dialogue.check("end of the sweep", harmless=parks_at_zero)
 
-    def _drive(self, setup: SetUp, frequencies: Sequence[float]) -> None:
+    def _drive(self, setup: SetUp, frequencies: Sequence[float], guard: Callable[[], None]) -> None:
         """Clear the events of earlier, then set offset and, last of all, the level."""
         dialogue = self._dialogue
         for register in ("STAT:QUES:VOLT?", "STAT:DEV?", "*ESR?"):
             dialogue.ask_integer(register)
         if self._method == "point-by-point" and frequencies:
             dialogue.apply(MANUAL_FREQUENCY, frequencies[0])
+        # The last moment to learn that somebody else has the bench by now.
+        guard()
         dialogue.apply(DC_OFFSET, setup.settings.dc_offset_v)
+        guard()
         dialogue.apply(LEVEL, setup.settings.source_vpk)
         # A level moves the offset without a word where both do not fit.
         dialogue.confirm(DC_OFFSET, setup.settings.dc_offset_v)

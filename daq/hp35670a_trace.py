@@ -83,6 +83,8 @@ def prove_byte_order(axis_hz: NDArray[np.float64], start_hz: float, stop_hz: flo
 def _is_ramp(axis_hz: NDArray[np.float64], start_hz: float, stop_hz: float) -> bool:
     if len(axis_hz) < 2 or not np.all(np.isfinite(axis_hz)):
         return False
+    if not 0.0 < start_hz < stop_hz:  # as where another program left swept sine
+        return False
     # The axis may leave out its last point; with log spacing the last step is the widest.
     widest_hz = max(stop_hz - start_hz, stop_hz * math.log(stop_hz / start_hz))
     step = widest_hz / (len(axis_hz) - 1) + GRID_HZ

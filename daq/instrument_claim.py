@@ -13,6 +13,7 @@ import re
 import time
 from pathlib import Path
 
+from daq.drivers import driver_at
 from daq.errors import InputError, MeasurementError
 from daq.transports.address import PrologixSerial, PrologixTcp, VisaAddress, parse_address
 from daq.trust import distrust, open_own
@@ -35,7 +36,7 @@ def wire_name(url: str) -> str | None:
     ConfigurationError
         If it is no address.
     """
-    match parse_address(url):
+    match parse_address(driver_at(url)[1]):
         case PrologixSerial(device=device):
             return f"serial {os.path.realpath(device) if os.path.exists(device) else device}"
         case PrologixTcp(host=host, port=port):

@@ -8,16 +8,24 @@ plausible is a matter of limits handed in; this module knows no unit.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from daq.analyser import Analyser, Identity, PointSettings, SourceState, SweepPoint
 from daq.errors import MeasurementError
 from daq.frf import PointFlag
+from daq.limits import Limits, tightest
 from daq.plan import SweepPlan
 from daq.session_events import CheckLine
 
-__all__ = ["Plausibility", "check_identity", "check_source", "check_trial", "take_trial"]
+__all__ = [
+    "Plausibility",
+    "check_identity",
+    "check_source",
+    "check_trial",
+    "limits_line",
+    "take_trial",
+]
 
 _TRIAL_CYCLES = 10
 _FULL_SCALE_MARGIN = 0.8
@@ -39,6 +47,19 @@ class Plausibility:
     lowest_db: float = -80.0
     highest_db: float = 60.0
     judge: Callable[[SweepPoint], str | None] | None = None
+
+
+def limits_line(plan: SweepPlan, limits: Sequence[Limits]) -> CheckLine:
+    """Say what is asked for, within the tightest of the limits, which were checked before."""
+    bounds = tightest(limits)
+    lowest_hz, highest_hz = min(plan.frequencies_hz), max(plan.frequencies_hz)
+    return CheckLine(
+        "limits",
+        "pass",
+        f"{max(plan.levels_vpk):g} V peak of {bounds.source_vpk:g}, {lowest_hz:g} to "
+        f"{highest_hz:g} Hz within {bounds.start_hz:g} to {bounds.stop_hz:g}, "
+        f"{plan.duration_s:.0f} s of {bounds.duration_s:g}",
+    )
 
 
 def check_identity(identity: Identity, resumed: Identity | None) -> Iterator[CheckLine]:

@@ -16,15 +16,14 @@ from dataclasses import replace
 
 from daq.adaptive import AdaptiveSweep
 from daq.analyser import Analyser, PointSettings, SourceState, SweepPoint
+from daq.aside import Aside
 from daq.control import Cancelled, SessionControl
-from daq.errors import LashbenchError, MeasurementError
+from daq.errors import Interrupted, LashbenchError, MeasurementError
 from daq.frf import PointFlag
-from daq.limits import tightest
-from daq.preflight import check_identity, check_source, check_trial, take_trial
+from daq.preflight import check_identity, check_source, check_trial, limits_line, take_trial
 from daq.repeat import compare
 from daq.session_agenda import Pace
 from daq.session_events import (
-    CheckLine,
     Finished,
     GoingOn,
     LevelStarted,
@@ -34,12 +33,15 @@ from daq.session_events import (
     RunIn,
     SessionEvent,
     SourceSafe,
+    Warned,
 )
+from daq.session_history import HeldHistory
 from daq.session_instrument import HeldInstrument
 from daq.session_journal import Journal, Place
 from daq.session_request import SessionRequest
 from daq.store import Store
 from daq.store_records import MeasurementState
+from daq.watch import Watch
 
 __all__ = ["Session"]
 
@@ -47,6 +49,8 @@ _LOOK_S = 0.05
 """How long a pause sleeps before it looks at the control again."""
 _REFINED_RUN_IN = 8
 """Points of the plan driven before those that refinement asks for."""
+_JUDGING_S = 300.0
+"""Announced while it is computed, at level 0, where refinement goes on."""
 
 
 class Session:
@@ -65,6 +69,10 @@ class Session:
     reopen
         Connects to the same instrument once more, for making it safe when the
         connection was lost; None where there is no such way.
+    watch
+        Who stands by to make the source safe in the session's place; nobody if left out.
+    aside
+        Where calls of the history are made, which may never return; its own if left out.
     """
 
     def __init__(
@@ -74,15 +82,21 @@ class Session:
         request: SessionRequest,
         control: SessionControl | None = None,
         reopen: Callable[[], Analyser] | None = None,
+        watch: Watch | None = None,
+        aside: Aside | None = None,
     ) -> None:
         self.control = control or SessionControl()
-        self._instrument = HeldInstrument(analyser, self.control, reopen)
-        self._store = store
+        self.finished: Finished | None = None
+        """How it ended, also where nobody was there any more to be told."""
+        self._watch = watch or Watch()
+        self._instrument = HeldInstrument(analyser, self.control, reopen, self._watch)
+        self._store = HeldHistory(store, aside or Aside("history"), self.control, self._watch)
         self._request = request
         self._pace = Pace()
         self._in_hand: Place | None = None
         self._all_taken = False
         self._refining = False
+        self._unwritten: list[str] = []
 
     def run(self) -> Generator[SessionEvent, None, None]:
         """Measure, yielding what happens; the last record is `Finished`.
@@ -95,11 +109,16 @@ class Session:
             If a limit forbids the plan; nothing was sent and nothing stored.
         InputError
             If the measurement to resume is not there or was aborted.
+        Interrupted
+            If an end was asked for before the measurement had its place in the history.
         LashbenchError
             After `Finished`: the fault that ended the session, if one did.
         """
         self._began_s = time.monotonic()
-        self._journal = Journal(self._store, self._request)
+        try:
+            self._journal = Journal(self._store, self._request)
+        except Cancelled as cut:
+            raise Interrupted(f"{cut}; nothing was driven") from cut
         self._plan, self._agenda = self._journal.plan, self._journal.agenda
         error: Exception | None = None
         try:
@@ -110,16 +129,17 @@ class Session:
         except Cancelled:
             pass
         except Exception as fault:
-            error = fault
+            error = self._cause_of(fault)
         except BaseException:
-            # Whoever watched has left, or the program is told to end: nobody
-            # is there to yield to, and the source must be off all the same.
+            # Whoever watched has left, or the program is told to end: the source is off before.
             self._close(None)
             self._instrument.let_go()
             raise
         finished = self._close(error)
         self._instrument.let_go()
         yield SourceSafe(finished.source_state)
+        for text in self._unwritten:
+            yield Warned(text)
         yield finished
         if finished.error is not None:
             raise finished.error
@@ -134,7 +154,7 @@ class Session:
 
     def _check(self) -> Iterator[SessionEvent]:
         journal = self._journal
-        yield from journal.told([self._limits()])
+        yield from journal.told([limits_line(self._plan, self._request.limits)])
         self.control.check()
         identity = self._instrument.analyser.identify()
         yield from journal.told(
@@ -147,6 +167,8 @@ class Session:
         nothing_to_drive = self._agenda.finished and self._request.refinement is None
         if nothing_to_drive or self.control.cut is not None:
             return
+        self._watch.stand_by(self.control.check)
+        self._watch.beat()
         journal.source(SourceState.ON)
         point, trial = take_trial(
             self._instrument.analyser, self._plan, self._settings(min(self._plan.levels_vpk))
@@ -159,17 +181,6 @@ class Session:
             flags=int(point.flags),
         )
         yield from journal.told(check_trial(point, trial, self._plan, self._request.plausible))
-
-    def _limits(self) -> CheckLine:
-        bounds, plan = tightest(self._request.limits), self._plan
-        lowest_hz, highest_hz = min(plan.frequencies_hz), max(plan.frequencies_hz)
-        return CheckLine(
-            "limits",
-            "pass",
-            f"{max(plan.levels_vpk):g} V peak of {bounds.source_vpk:g}, {lowest_hz:g} to "
-            f"{highest_hz:g} Hz within {bounds.start_hz:g} to {bounds.stop_hz:g}, "
-            f"{plan.duration_s:.0f} s of {bounds.duration_s:g}",
-        )
 
     # ------------------------------------------------------------ measuring
 
@@ -196,6 +207,7 @@ class Session:
         while frequencies := adaptive.ask():
             yield frequencies
             self._refining = True
+            self._watch.beat(_JUDGING_S)
             adaptive.tell([self._agenda.stored(source_vpk, hz).point for hz in frequencies])
         self._refining = False
         self._journal.note(
@@ -213,6 +225,7 @@ class Session:
         lead = self._lead(source_vpk, run[0])
         self._journal.source(SourceState.ON)
         yield LevelStarted(source_vpk, len(run))
+        yield from self._remarks()
         points = self._instrument.analyser.sweep([*lead, *run])
         try:
             yield from self._run_in(source_vpk, lead, points)
@@ -221,6 +234,7 @@ class Session:
             for requested_hz in run:
                 self._in_hand = source_vpk, requested_hz
                 yield self._commit(self._in_hand, _next(points, requested_hz))
+                yield from self._remarks()
                 if self.control.paused or self.control.cut is not None:
                     return
             if next(points, None) is not None:
@@ -274,6 +288,8 @@ class Session:
         self._pace.held()
         self._journal.source(state)
         self._journal.note("pause", f"holding; source {state.value}")
+        if state is SourceState.CONFIRMED_OFF:
+            self._watch.rest()
         yield Paused(state)
         if state is not SourceState.CONFIRMED_OFF:
             yield self._journal.warned(
@@ -281,10 +297,19 @@ class Session:
             )
         while self.control.paused and self.control.cut is None:
             time.sleep(_LOOK_S)
+            self._watch.check()
+            if state is not SourceState.CONFIRMED_OFF:
+                self._watch.beat()
+            yield from self._remarks()
         if self.control.cut is None:
             self._instrument.listen()
             self._journal.note("go on", "after a pause")
             yield GoingOn()
+
+    def _remarks(self) -> Iterator[SessionEvent]:
+        """Pass on what happened to the watchdog."""
+        for text in self._watch.remarks():
+            yield self._journal.warned(text)
 
     def _settings(self, source_vpk: float) -> PointSettings:
         return PointSettings(
@@ -300,17 +325,24 @@ class Session:
 
     def _close(self, error: Exception | None) -> Finished:
         """Make safe before anything else can fail, then say in the store how it ended."""
+        self._store.is_closing = True
         source_state = self._make_safe()
+        if source_state is SourceState.CONFIRMED_OFF:
+            self._watch.rest()
         state, reason = self._verdict(error)
         points, flagged = self._agenda.done + self._agenda.again, 0
         try:
             found = self._journal.end(state, source_state, reason, self._in_hand)
             points, flagged = found.points, found.flagged
         except LashbenchError as fault:
-            # Without its last line the measurement stands as interrupted, and
-            # the fault that came first is the one to tell.
-            error, state = error or fault, "interrupted"
-        return Finished(
+            # Without its last line the measurement stands as interrupted, and what came first,
+            # a fault or the wish to end, is the one to tell.
+            if state == "complete" or self.control.cut is None:
+                error = error or fault
+            elif error is None:
+                self._unwritten.append(f"its end is not in the history: {fault}")
+            state = "interrupted"
+        self.finished = Finished(
             measurement=self._journal.id,
             state=state,
             source_state=source_state,
@@ -320,6 +352,16 @@ class Session:
             reason=reason,
             error=error,
         )
+        return self.finished
+
+    def _cause_of(self, fault: Exception) -> Exception:
+        """What a fault comes from: an instrument that was taken away answers anything."""
+        try:
+            self._watch.check()
+        except MeasurementError as lost:
+            lost.__cause__ = None if lost is fault else fault
+            return lost
+        return fault
 
     def _verdict(self, error: Exception | None) -> tuple[MeasurementState, str]:
         cut = self.control.cut

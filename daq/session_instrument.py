@@ -12,11 +12,14 @@ from contextlib import suppress
 
 from daq.analyser import Analyser, SourceState
 from daq.control import SessionControl
+from daq.watch import Watch
 
 __all__ = ["HeldInstrument"]
 
 _SAFE_TRIES = 10
 """How often the safe-off recipe is begun again when a key press breaks it."""
+_SAFE_S = 40.0
+"""Announced for one run of the safe-off recipe, which has bounds of its own."""
 _RECONNECT_S = 0.3
 """Pause before a dead connection is opened anew; a gateway must see first that it is gone."""
 
@@ -32,6 +35,8 @@ class HeldInstrument:
         Told of key presses that came as exceptions.
     reopen
         Connects once more; None where there is no such way.
+    watch
+        Told that the session lives, and asked whether it still has the instrument.
     """
 
     def __init__(
@@ -39,12 +44,14 @@ class HeldInstrument:
         analyser: Analyser,
         control: SessionControl,
         reopen: Callable[[], Analyser] | None,
+        watch: Watch,
     ) -> None:
         self.analyser = analyser
         """The connection in use."""
         self._given = analyser
         self._control = control
         self._reopen = reopen
+        self._watch = watch
 
     @property
     def is_new_connection(self) -> bool:
@@ -52,8 +59,9 @@ class HeldInstrument:
         return self.analyser is not self._given
 
     def listen(self) -> None:
-        """Let waits be ended by the control."""
-        self.analyser.on_wait = self._control.check
+        """Let waits be ended by the control, and by a watchdog that took the instrument."""
+        self.analyser.on_wait = self._look
+        self.analyser.on_exchange = self._watch.beat
 
     def make_safe(self) -> SourceState:
         """Run the safe-off recipe to its end, over a new connection if the old one is dead."""
@@ -72,10 +80,16 @@ class HeldInstrument:
             self.analyser.close()
             self.analyser = self._given
 
+    def _look(self) -> None:
+        self._control.check()
+        self._watch.check()
+        self._watch.beat()
+
     def _off(self) -> SourceState:
         """The recipe, begun again when a key press breaks it."""
         self.analyser.on_wait = None
         for _ in range(_SAFE_TRIES):
+            self._watch.beat(_SAFE_S)
             with suppress(KeyboardInterrupt):
                 try:
                     return self.analyser.make_safe()

@@ -13,8 +13,8 @@ from daq.errors import InputError
 from daq.limits import check_plan
 from daq.session_agenda import Agenda
 from daq.session_events import CheckLine, SessionEvent, Warned
+from daq.session_history import HeldHistory
 from daq.session_request import SessionRequest
-from daq.store import Store
 from daq.store_records import Measurement, MeasurementState
 
 __all__ = ["Journal", "Place"]
@@ -34,7 +34,7 @@ class Journal:
         If the measurement to resume is not there, or was aborted.
     """
 
-    def __init__(self, store: Store, request: SessionRequest) -> None:
+    def __init__(self, store: HeldHistory, request: SessionRequest) -> None:
         self._store = store
         self.before: Measurement | None = None
         """The measurement as an earlier session left it; None if it is new."""

@@ -4,6 +4,9 @@ The second floor. It knows how a geared servo moves and nothing about judging
 a measurement.
 """
 
+__distribution__ = "lashbench"
+"""Another distribution may bring a package of this name; `tui.entry` tells them apart."""
+
 __all__ = [
     "analyser35670a",
     "catalogue",

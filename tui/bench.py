@@ -9,14 +9,17 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from contextlib import ExitStack, closing, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self, TypeVar
 
-from daq.errors import LashbenchError
+from daq.errors import Interrupted, LashbenchError, MeasurementError
 
 if TYPE_CHECKING:
+    from daq.analyser import Analyser
+    from daq.aside import Aside
+    from daq.bench_lock import BenchLock
     from daq.control import SessionControl
-    from daq.hp35670a import HP35670A
     from daq.limits import Limits
+    from daq.session import Session
     from daq.session_events import SessionEvent
     from daq.session_request import SessionRequest
     from daq.store import Store
@@ -24,6 +27,10 @@ if TYPE_CHECKING:
     from sim.unit import Unit
 
 __all__ = ["bench_session", "connect", "drives_hardware", "unit_limits"]
+
+_LOCK_S = 60.0
+"""Bound of having the bench's lock, which waits for the watchdog of a session that was killed."""
+_Held = TypeVar("_Held")
 
 
 def drives_hardware(url: str) -> bool:
@@ -34,9 +41,11 @@ def drives_hardware(url: str) -> bool:
     ConfigurationError
         If it is no address.
     """
+    from daq.drivers import driver_at
     from daq.transports.address import HostedAddress, ReplayFile, parse_address
 
-    return not isinstance(parse_address(url), HostedAddress | ReplayFile)
+    _, address = driver_at(url)
+    return not isinstance(parse_address(address), HostedAddress | ReplayFile)
 
 
 def unit_limits(unit: Unit) -> Limits:
@@ -58,7 +67,7 @@ def connect(
     unit: Unit,
     transcript: Path | None = None,
     fault: Callable[[str], None] | None = None,
-) -> HP35670A:
+) -> Analyser:
     """Open the instrument at an address; ``sim:`` is a simulated one with the unit behind it.
 
     Parameters
@@ -71,17 +80,17 @@ def connect(
     Raises
     ------
     ConfigurationError, LinkError, InputError
-        As `daq.transports.open.open_transport`.
+        As `daq.drivers.open_analyser`.
     """
-    from daq.hp35670a import HP35670A
-    from daq.transports.open import TransportFactory, open_transport
+    from daq.drivers import open_analyser
+    from daq.transports.open import TransportFactory
 
     factories: dict[str, TransportFactory] = {}
     if url.strip().startswith("sim:"):
         from sim.loopback import open_loopback
 
         factories["sim"] = open_loopback(unit)
-    return HP35670A(open_transport(url, factories, record=transcript, fault=fault))
+    return open_analyser(url, factories, record=transcript, fault=fault)
 
 
 def bench_session(
@@ -99,50 +108,143 @@ def bench_session(
 
     Raises
     ------
+    Interrupted
+        Before the first record: if an end was asked for.
     LashbenchError
         Before the first record: if history, lock or instrument cannot be had.
         After the last: the fault that ended the session.
     """
+    from daq.aside import Aside
     from daq.bench_lock import BenchLock
+    from daq.control import Cancelled
     from daq.session import Session
     from daq.session_events import CheckLine, Opened, Warned
+    from daq.session_history import ANSWER_S
     from daq.store import Store
-    from daq.watchdog import Watchdog
 
     is_real = drives_hardware(url)
-    reopen: Callable[[], HP35670A] | None = (lambda: connect(url, unit)) if is_real else None
+    reopen: Callable[[], Analyser] | None = (lambda: connect(url, unit)) if is_real else None
     faults: list[str] = []
+    aside = Aside("history")
     with ExitStack() as stack:
-        store = stack.enter_context(Store(history, create=request.resume is None))
-        lock = stack.enter_context(BenchLock(history, instrument=url))
-        analyser = connect(url, unit, transcript, faults.append)
+        stack.callback(aside.end)
+        place = _Place(aside, history, control, stack)
+        try:
+            store = place.held(
+                lambda: Store(history, create=request.resume is None), Store.close, ANSWER_S
+            )
+            lock = place.held(
+                lambda: BenchLock(history, instrument=url), BenchLock.release, _LOCK_S
+            )
+        except Cancelled as cut:
+            raise Interrupted(f"{cut}; nothing was driven") from cut
         # The watchdog opens the instrument anew, which must be free by then.
-        watch = stack.enter_context(ExitStack())
+        watched = stack.enter_context(_Watched(url, history, lock, place) if is_real else _Alone())
+        analyser = connect(url, unit, transcript, faults.append)
         stack.callback(analyser.close)
-        session = Session(analyser, store, request, control, reopen)
+        session = Session(analyser, store, request, control, reopen, watched.watch, aside)
+        watched.session, watched.store = session, store
         with closing(session.run()) as events:
             for event in events:
-                if isinstance(event, Opened) and is_real:
-                    measurement = event.measurement
-                    watchdog = Watchdog(url, history, measurement, lock.descriptor)
-                    watch.callback(watchdog.dismiss)
-                if isinstance(event, CheckLine) and event.name == "source" and is_real:
+                if isinstance(event, Opened):
+                    watched.measures(event.measurement)
+                if isinstance(event, CheckLine) and event.name == "source":
                     # It is an analyser that may drive, and not something else that keeps silent.
-                    watch.pop_all()
-                    watch.callback(_stand_down, watchdog, store, measurement)
+                    watched.may_drive = True
                 while faults:
                     yield Warned(faults.pop(0))
                 yield event
 
 
-def _stand_down(watchdog: Watchdog, store: Store, measurement: int) -> None:
-    """Dismiss it where the source is proven off, as the history says; else leave it to its work."""
-    from daq.analyser import SourceState
+class _Place:
+    """History and lock of a session, had and let go of in bounded time."""
 
-    state = None
-    with suppress(LashbenchError):
-        state = store.measurement(measurement).source_state
-    if state is SourceState.CONFIRMED_OFF:
-        watchdog.dismiss()
-    else:
-        watchdog.leave()
+    def __init__(
+        self, aside: Aside, history: Path, control: SessionControl, stack: ExitStack
+    ) -> None:
+        self._aside = aside
+        self._history = history
+        self._control = control
+        self._stack = stack
+
+    def held(
+        self, get: Callable[[], _Held], let_go: Callable[[_Held], None], bound_s: float
+    ) -> _Held:
+        """Have something that lies on the history's file system, until the session's end."""
+        from daq.session_history import answered
+
+        got = answered(
+            self._aside, get, str(self._history), bound_s=bound_s, look=self._control.check
+        )
+        self._stack.callback(self._leave, lambda: let_go(got))
+        return got
+
+    def answered(self, call: Callable[[], _Held]) -> _Held:
+        """Ask the history something."""
+        from daq.session_history import answered
+
+        return answered(self._aside, call, str(self._history))
+
+    def _leave(self, let_go: Callable[[], None]) -> None:
+        # The system lets go of what cannot be let go of here, with the end of the process.
+        if not self._aside.is_stuck:
+            with suppress(MeasurementError):
+                self.answered(let_go)
+
+
+class _Alone:
+    """What lives and dies with the session needs nobody to stand by."""
+
+    def __init__(self) -> None:
+        self.watch: Watchdog | None = None
+        self.session: Session | None = None
+        self.store: Store | None = None
+        self.measurement = 0
+        self.may_drive = False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Nothing is left to be done."""
+
+    def measures(self, measurement: int) -> None:
+        """The measurement has its number."""
+        self.measurement = measurement
+
+
+class _Watched(_Alone):
+    """A watchdog for the length of a session, and what becomes of it at the end."""
+
+    def __init__(self, url: str, history: Path, lock: BenchLock, place: _Place) -> None:
+        from daq.watchdog import Watchdog
+
+        super().__init__()
+        self._place = place
+        self._watchdog = self.watch = Watchdog(url, history, lock.descriptor)
+
+    def measures(self, measurement: int) -> None:
+        super().measures(measurement)
+        self._watchdog.measures(measurement)
+
+    def __exit__(self, *_: object) -> None:
+        """Dismiss it where the source is proven off, as the history says; else leave it to work."""
+        from daq.analyser import SourceState
+
+        if not self.may_drive:
+            self._watchdog.dismiss()
+            return
+        finished = None if self.session is None else self.session.finished
+        is_off = finished is not None and finished.source_state is SourceState.CONFIRMED_OFF
+        said = None
+        store = self.store
+        if store is not None:
+            with suppress(LashbenchError):
+                said = self._place.answered(lambda: store.measurement(self.measurement))
+        if said is not None and said.source_state is SourceState.CONFIRMED_OFF:
+            self._watchdog.dismiss()
+        elif finished is not None and is_off:
+            text = f"the session ended, which its history did not take then: {finished.reason}"
+            self._watchdog.write_down(finished.source_state.value, text)
+        else:
+            self._watchdog.leave()

@@ -7,6 +7,14 @@ help costs none of the scientific libraries. Nothing here computes.
 
 from __future__ import annotations
 
+if __name__ == "__main__":
+    # Before anything is loaded that a file in the working directory could stand in for.
+    import sys
+
+    from tui.entry import main as begin
+
+    sys.exit(begin())
+
 import logging
 import sys
 import traceback
@@ -179,7 +187,3 @@ def _usage(error: CycloptsError) -> str:
         return text
     given = error.keyword is not None or error.argument.tokens
     return f"{error.argument.name} {'has no value' if given else 'is missing'}"
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -116,7 +116,7 @@ def session_request(
     LimitError
         If bench, unit, recipe or instrument forbids the plan; nothing was sent.
     """
-    from daq.hp35670a_setup import check_sweep
+    from daq.drivers import check_sweep
     from daq.limits import check_plan, load_bench
     from daq.recipe import load_recipe
     from daq.session_request import SessionRequest
@@ -165,7 +165,7 @@ def session_request(
         )
     check_plan(plan, limits, _longest_s(plan, refinement))
     ranges = place.drive.channel1_range_vpk, place.drive.channel2_range_vpk
-    check_sweep(plan, place.drive.slew_vpk_per_s, ranges, may_repeat=resume is not None)
+    check_sweep(instrument, plan, place.drive.slew_vpk_per_s, ranges, may_repeat=resume is not None)
     return SessionRequest(
         header=header,
         limits=limits,

@@ -20,7 +20,7 @@ from daq.transports.address import (
 )
 from daq.transports.base import Deadline, Transport
 
-__all__ = ["TransportFactory", "open_transport"]
+__all__ = ["TransportFactory", "load_transport", "open_transport"]
 
 TransportFactory = Callable[[str], Transport]
 """Opens a transport from what follows ``scheme:`` in the URL."""
@@ -96,6 +96,37 @@ def open_transport(
     except LashbenchError:
         transport.close()
         raise
+
+
+def load_transport(url: str) -> None:
+    """Import whatever opening that URL will need; nothing is opened.
+
+    Raises
+    ------
+    ConfigurationError
+        If the URL has no known form.
+    """
+    # A host's name is looked up with it.
+    import encodings.idna  # noqa: F401
+
+    match parse_address(url):
+        case VisaAddress(resource=resource) if resource.upper().endswith("::SOCKET"):
+            import daq.transports.links
+            import daq.transports.stream  # noqa: F401
+        case VisaAddress(resource=resource):
+            from daq.transports.visa import load_backend
+
+            load_backend(resource)
+        case PrologixSerial() | PrologixTcp():
+            import serial
+
+            import daq.transports.links
+            import daq.transports.prologix
+            import daq.transports.prologix_adapter  # noqa: F401
+
+            serial.Serial()
+        case _:
+            pass
 
 
 def _open_prologix(address: PrologixSerial | PrologixTcp, url: str, opening_s: float) -> Transport:

@@ -8,12 +8,13 @@ end waits there as long as bytes come (`daq.transports.stream`). It speaks no SC
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from typing import Any
 
 from daq.errors import BenchTimeout, LinkError, ProtocolError
 from daq.transports.base import KEPT_LIMIT_BYTES, Deadline, block_of, checked_line
 
-__all__ = ["VisaTransport", "open_visa"]
+__all__ = ["VisaTransport", "load_backend", "open_visa"]
 
 _LEAST_MS = 1
 """VISA takes 0 for "do not wait at all"."""
@@ -34,7 +35,7 @@ def open_visa(resource_name: str, deadline: Deadline) -> VisaTransport:
     """
     import pyvisa
 
-    backend = "@py" if resource_name.upper().startswith("TCPIP") else ""
+    backend = _backend_of(resource_name)
     try:
         manager = pyvisa.ResourceManager(backend)
         resource = manager.open_resource(
@@ -51,6 +52,19 @@ def open_visa(resource_name: str, deadline: Deadline) -> VisaTransport:
     except LinkError:
         resource.close()
         raise
+
+
+def load_backend(resource_name: str) -> None:
+    """Import what opening that resource will need, as far as it is there; nothing is opened."""
+    import pyvisa
+
+    with suppress(Exception):  # what is not there is told when it is opened
+        pyvisa.ResourceManager(_backend_of(resource_name))
+    _rpc_errors()
+
+
+def _backend_of(resource_name: str) -> str:
+    return "@py" if resource_name.upper().startswith("TCPIP") else ""
 
 
 class VisaTransport:

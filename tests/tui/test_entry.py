@@ -1,11 +1,16 @@
 """An interrupt while the program is still being loaded: one line, and the exit code of others."""
 
+import os
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from tui import cli, entry
+
+ROOT = Path(entry.__file__).parents[1]
 
 
 @pytest.mark.parametrize("module", ["tui.cli", "cyclopts", "tui.output"])
@@ -47,3 +52,75 @@ def test_streams_that_the_caller_closed(closed, code, said):
     )
     assert (run.returncode, run.stderr[: len(said)]) == (code, said)
     assert bool(run.stdout) == (code == 0)
+
+
+NAMES = ("analysis", "daq", "sim", "numpy", "cyclopts", "sqlalchemy", "json", "queue")
+CONSOLE = [str(Path(sys.executable).with_name("lashbench"))]
+MODULE = [sys.executable, "-m", "tui.cli"]
+
+
+def beside(folder, *names):
+    """Files with the names of libraries in somebody's folder, which leave a trace when run."""
+    for name in names:
+        (folder / f"{name}.py").write_text(f"open({str(folder / 'ran')!r}, 'a').write({name!r})\n")
+
+
+@pytest.mark.parametrize("command", [CONSOLE, MODULE])
+@pytest.mark.parametrize("added", [None, ".", ":/nowhere", "{cwd}"])
+def test_nothing_in_the_working_directory_is_run(tmp_path, command, added):
+    beside(tmp_path, *NAMES)
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    if added is not None:
+        environment["PYTHONPATH"] = added.format(cwd=tmp_path)
+    words = "measure --dry-run --unit adss --instrument sim: --level 2"
+    words += " --start 100 --stop 110 --points 3"
+    run = subprocess.run(
+        [*command, *words.split()], cwd=tmp_path, env=environment, capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
+    assert (run.returncode, run.stderr) == (0, "")
+    assert run.stdout.startswith("3 points")
+    assert not (tmp_path / "ran").exists()
+
+
+def test_what_pythonpath_adds_stands_in_for_nothing_that_is_installed(tmp_path):
+    beside(tmp_path, *NAMES)
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    run = subprocess.run(
+        [*CONSOLE, "--version"], cwd="/", env=environment, capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
+    assert (run.returncode, run.stderr) == (0, "")
+    assert not (tmp_path / "ran").exists()
+
+
+def test_what_python_loaded_from_the_working_directory_before_is_told(tmp_path):
+    (tmp_path / "usercustomize.py").write_text("")
+    (tmp_path / "sitecustomize.py").write_text("")
+    run = subprocess.run(
+        [*CONSOLE, "--version"], cwd=tmp_path, env={**os.environ, "PYTHONPATH": "."},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (run.returncode, run.stdout) == (2, "")
+    assert run.stderr.count("\n") == 1
+    assert f"customize was loaded from the working directory ({tmp_path})" in run.stderr
+
+
+@pytest.mark.parametrize("name", ["daq", "sim", "analysis"])
+@pytest.mark.parametrize("way", ["before", "over"])
+def test_a_package_of_another_distribution_is_told_in_one_line(tmp_path, name, way):
+    """It lies where it is found first, or its files were written over ours."""
+    root, other = tmp_path / "ours", tmp_path / "other"
+    for package in ("daq", "sim", "analysis", "tui"):
+        shutil.copytree(ROOT / package, root / package, ignore=shutil.ignore_patterns("*.code"))
+    foreign = (other if way == "before" else root) / name
+    foreign.mkdir(parents=True, exist_ok=True)
+    (foreign / "__init__.py").write_text('"""Something else of this name."""\n')
+    program = f"import sys; sys.path[:0] = [{str(other)!r}, {str(root)!r}];"
+    program += "from tui.entry import main; sys.exit(main())"
+    run = subprocess.run(
+        [sys.executable, "-c", program, "--version"], capture_output=True, text=True, check=False
+    )
+    assert (run.returncode, run.stdout) == (2, "")
+    assert run.stderr.count("\n") == 1
+    assert f"another distribution owns the package '{name}' ({foreign}" in run.stderr

@@ -203,7 +203,7 @@ class Desk:
         InputError, LimitError
             As `tui.measure_options.session_request`; nothing was sent.
         """
-        from daq.hp35670a_setup import check_sweep
+        from daq.drivers import check_sweep
         from daq.limits import check_plan
         from tui.measure_options import session_request
 
@@ -222,7 +222,8 @@ class Desk:
         )  # fmt: skip
         if fresh and self.given_plan is not None and request.header is not None:
             check_plan(self.given_plan, request.limits)
-            check_sweep(self.given_plan, request.slew_vpk_per_s, request.input_range_vpk)
+            slew, ranges = request.slew_vpk_per_s, request.input_range_vpk
+            check_sweep(self.url, self.given_plan, slew, ranges)
             header = replace(request.header, plan=self.given_plan)
             if self.follows is not None:
                 header = following(header, self.follows)

@@ -1,0 +1,284 @@
+"""A session that dies, stands still or loses its watchdog: the source goes off, and it is said.
+
+Real processes on a real socket; what the source does is read from the simulated analyser itself,
+which lives here.
+"""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+from bench_server import linear_analyser, served
+from fake_analyser import known_gain
+from frozen_files import can_be_held, started
+
+from daq.analyser import SourceState
+from daq.store import Store
+
+LASHBENCH = str(Path(sys.executable).with_name("lashbench"))
+SWEEP = ["--level", "2", "--start", "130", "--stop", "170", "--points", "2500"]
+QUICK = ["--settle-cycles", "3", "--integrate-cycles", "4", "--yes"]
+SILENT_S = 60.0
+"""More than any session is silent before it is taken over, on a busy machine, too."""
+
+needs_holding = pytest.mark.skipif(not can_be_held(), reason="needs seccomp on Linux")
+
+
+def words(url, db):
+    return ["measure", "--unit", "adss", "--instrument", url, *SWEEP, *QUICK, "--db", str(db)]
+
+
+def drives(instrument):
+    return abs(instrument.output_vpk) > 0.0
+
+
+def wait_for(what, seconds=SILENT_S):
+    """How long it took until something holds."""
+    began = time.monotonic()
+    while not what():
+        assert time.monotonic() - began < seconds, "it did not come about"
+        time.sleep(0.02)
+    return time.monotonic() - began
+
+
+@contextmanager
+def measuring(url, db, **options):
+    """The command line in a process of its own."""
+    process = subprocess.Popen(
+        [LASHBENCH, *words(url, db)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        **options,
+    )  # fmt: skip
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def watchdogs_of(process):
+    children = Path(f"/proc/{process}/task/{process}/children")
+    return [int(word) for word in children.read_text(encoding="ascii").split()]
+
+
+def notes(db, kind):
+    with Store(db, read_only=True) as store:
+        return [event.text for event in store.events(1) if event.kind == kind]
+
+
+def source(db):
+    with Store(db, read_only=True) as store:
+        return store.measurement(1).source_state
+
+
+def points(db):
+    with Store(db, read_only=True) as store:
+        return len(store.points(1))
+
+
+@pytest.fixture
+def db(tmp_path):
+    return tmp_path / "bench.db"
+
+
+def test_what_lies_beside_the_users_work_does_not_stand_in_for_the_watchdog(tmp_path, db):
+    ran = tmp_path / "ran"
+    for name in ("daq", "sim", "tui"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "__init__.py").write_text(f"open({str(ran)!r}, 'a').write({name!r})")
+    for name in ("numpy", "sqlalchemy", "analysis", "json"):
+        (tmp_path / f"{name}.py").write_text(f"open({str(ran)!r}, 'a').write({name!r})")
+    instrument = linear_analyser(known_gain)
+    with served(instrument) as url, measuring(url, db, cwd=tmp_path) as process:
+        wait_for(lambda: drives(instrument))
+        process.kill()
+        assert wait_for(lambda: not drives(instrument)) < 20.0
+        wait_for(lambda: notes(db, "watchdog"))
+    assert not ran.exists(), ran.read_text()
+
+
+def test_a_watchdog_that_dies_is_replaced_and_it_is_said(db):
+    instrument = linear_analyser(known_gain)
+    with served(instrument) as url, measuring(url, db) as process:
+        wait_for(lambda: drives(instrument))
+        (first,) = watchdogs_of(process.pid)
+        os.kill(first, signal.SIGKILL)
+        wait_for(lambda: notes(db, "warning"))
+        (second,) = watchdogs_of(process.pid)
+        assert second != first
+        assert drives(instrument)
+        time.sleep(3.0)  # it loads what it needs
+        process.kill()
+        assert wait_for(lambda: not drives(instrument)) < 20.0
+        assert (
+            "warning: the watchdog ended (signal 9); another one was started"
+            in (process.communicate()[1])
+        )
+    assert notes(db, "warning") == ["the watchdog ended (signal 9); another one was started"]
+
+
+def test_without_a_sign_of_life_of_a_watchdog_nothing_is_driven(db):
+    instrument = linear_analyser(known_gain)
+    with served(instrument) as url, measuring(url, db) as process:
+        seen = set()
+        while process.poll() is None:
+            for child in watchdogs_of(process.pid) if process.poll() is None else ():
+                os.kill(child, signal.SIGKILL)
+                seen.add(child)
+            assert not drives(instrument)
+            time.sleep(0.002)
+        told = process.stderr.read()
+    assert process.returncode == 1
+    assert "the watchdog, which would switch the source off" in told
+    assert "(signal 9); nothing was driven" in told
+    assert len(seen) == 2
+
+
+def test_a_session_that_stands_still_loses_the_bench_and_learns_it(db):
+    instrument = linear_analyser(known_gain)
+    with served(instrument) as url, measuring(url, db) as process:
+        wait_for(lambda: drives(instrument))
+        os.kill(process.pid, signal.SIGSTOP)
+        assert wait_for(lambda: not drives(instrument)) < 40.0
+        wait_for(lambda: notes(db, "watchdog"))
+        assert source(db) is SourceState.CONFIRMED_OFF
+        kept = points(db)
+        os.kill(process.pid, signal.SIGCONT)
+        while process.poll() is None:
+            assert not drives(instrument)
+            time.sleep(0.002)
+        told = process.stderr.read()
+    assert process.returncode == 1
+    assert "stood still while it drove, and its watchdog took over: source confirmed-off" in told
+    assert "the watchdog took over; source confirmed-off" in notes(db, "watchdog")[0]
+    assert kept <= points(db) <= kept + 1
+
+
+def test_a_session_that_stands_still_and_holds_the_only_wire_is_ended(db):
+    instrument = linear_analyser(known_gain)
+    with (
+        served(instrument) as url,
+        one_at_a_time(url) as only,
+        measuring(only, db) as process,
+    ):
+        wait_for(lambda: drives(instrument))
+        os.kill(process.pid, signal.SIGSTOP)
+        assert wait_for(lambda: not drives(instrument)) < 60.0
+        assert process.wait(30) == -signal.SIGKILL
+        wait_for(lambda: notes(db, "watchdog"))
+    assert "kept process" in notes(db, "watchdog")[0]
+    assert source(db) is SourceState.CONFIRMED_OFF
+
+
+@contextmanager
+def one_at_a_time(url):
+    """A gateway that serves one connection, and refuses others while that one lasts."""
+    _, host, port, _ = url.split("::")
+    over = threading.Event()
+
+    def pump(one, other):
+        with suppress(OSError):
+            while data := one.recv(4096):
+                other.sendall(data)
+        for end in (one, other):
+            with suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)
+
+    def carry(client):
+        with client, socket.create_connection((host, int(port))) as behind:
+            back = threading.Thread(target=pump, args=(behind, client))
+            back.start()
+            pump(client, behind)
+            back.join()
+
+    def serve(gate):
+        busy = None
+        while not over.is_set():
+            with suppress(TimeoutError):
+                client, _ = gate.accept()
+                if busy is not None and busy.is_alive():
+                    client.close()
+                    continue
+                client.settimeout(None)
+                busy = threading.Thread(target=carry, args=(client,))
+                busy.start()
+        if busy is not None:
+            busy.join()
+
+    with socket.create_server(("127.0.0.1", 0)) as gate:
+        gate.settimeout(0.1)
+        thread = threading.Thread(target=serve, args=(gate,))
+        thread.start()
+        try:
+            yield f"TCPIP::127.0.0.1::{gate.getsockname()[1]}::SOCKET"
+        finally:
+            over.set()
+            thread.join()
+
+
+@needs_holding
+@pytest.mark.parametrize("told", [signal.SIGTERM, None])
+def test_a_history_that_stops_answering_holds_neither_source_nor_signal(tmp_path, told):
+    folder = tmp_path / "share"
+    folder.mkdir()
+    db = folder / "bench.db"
+    instrument = linear_analyser(known_gain)
+    with (
+        served(instrument) as url,
+        started(
+            [LASHBENCH, *words(url, db)], folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+            text=True,
+        ) as (process, freezer),
+    ):  # fmt: skip
+        wait_for(lambda: drives(instrument))
+        time.sleep(0.5)
+        freezer.freeze()
+        wait_for(lambda: freezer.holds)
+        if told is not None:
+            process.send_signal(told)
+        assert wait_for(lambda: not drives(instrument)) < (15.0 if told else 30.0)
+        _, said = process.communicate(timeout=60)
+        assert process.returncode == (130 if told else 1)
+        assert freezer.holds
+        assert not drives(instrument)
+        freezer.thaw()
+        wait_for(lambda: notes(db, "watchdog"))
+    assert "bench.db: does not answer within" in said
+    assert source(db) is SourceState.CONFIRMED_OFF
+    (note,) = notes(db, "watchdog")
+    assert note.startswith("the session ended, which its history did not take then")
+    assert ("interrupted by SIGTERM" if told else "does not answer") in note
+
+
+LOADED_LATER = """
+import sys
+from pathlib import Path
+from daq import watchdog_child
+url, db = sys.argv[1:]
+watchdog_child.load(url)
+before = set(sys.modules)
+state, found = watchdog_child.make_safe(url)
+watchdog_child.write_down(Path(db), 1, found, state)
+print(sorted(set(sys.modules) - before), state)
+"""
+
+
+@pytest.mark.parametrize("wire", ["tcp", "prologix_tcp", "prologix_pty"])
+def test_a_watchdog_loads_nothing_when_it_is_needed(tmp_path, wire):
+    db = tmp_path / "bench.db"
+    with served(linear_analyser(known_gain), wire) as url:
+        short = ["--level", "1", "--start", "130", "--stop", "170", "--points", "2", *QUICK]
+        place = ["--unit", "adss", "--instrument", "sim:", "--db", str(db)]
+        subprocess.run([LASHBENCH, "measure", *place, *short], check=True, capture_output=True)
+        run = subprocess.run(
+            [sys.executable, "-I", "-c", LOADED_LATER, url, str(db)],
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+    assert run.stdout == "[] confirmed-off\n", run.stderr
+    assert notes(db, "watchdog") == ["; source confirmed-off"]
