@@ -149,7 +149,8 @@ def _said_by(data: Data, answer: Answer) -> str:
     if answer.state == "open":
         return "No model is accepted yet. Each that is left tells its own backlash:"
     if answer.models:
-        return f"Model: {answer.source}."
+        beside = "; then what is not ruled out beside it" if len(answer.models) > 1 else ""
+        return f"Model: {answer.source}{beside}."
     if answer.diagnosed:
         return "No backlash is told: no model that is known explains this response."
     return "No backlash is told: the plain model does not explain this response."

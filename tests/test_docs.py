@@ -244,8 +244,12 @@ def fleet_of_one(example, folder):
         return []
     plan = SweepPlan((100.0, 110.0, 120.0), (2.5,))
     with Store(folder / "lab.db", create=True) as store:
-        for value in (0.19, 0.2, 0.21):
+        # The last one's model is refuted: its play is no wear.
+        for value in (0.19, 0.2, 0.21, 0.6):
             number = store.begin(MeasurementHeader("ADSS", "SN 7", plan, "sim:", "test"))
             store.finish(number, "complete", SourceState.CONFIRMED_OFF)
-            store.add_estimate(number, "test", {"b1_deg": {"value": value, "std": 0.01}})
+            told = {
+                name: {"value": value, "std": 0.01} for name in ("contribution_ratio", "b1_deg")
+            }
+            store.add_estimate(number, "test", told | {"refuted": value == 0.6})
     return [str(folder / "lab.db")]

@@ -1,29 +1,26 @@
 """Which unit wears? python fleet.py HISTORY: the trend of stage 1's play for every unit in it.
 
-`lashbench history --estimate all` makes the estimates that this reads.
+`lashbench history --estimate all` makes the estimates that this reads; `diagnose` in the screen
+keeps the diagnoses.
 """
 
 import sys
 from collections import defaultdict
 from datetime import datetime
 
+from analysis.answer import accept_model
 from analysis.trend import fit_trend
 from daq.store import Store
 
 rows = defaultdict(list)
 with Store(sys.argv[1], read_only=True) as store:
-    estimates = store.latest_estimates()
-    for measurement in store.measurements():
-        found = estimates.get(measurement.id)
-        if found is None or "b1_deg" not in found.document:
-            continue
-        if measurement.ended is None or found.made <= measurement.ended:
-            continue  # points were taken since
-        moment_s = datetime.fromisoformat(measurement.started).timestamp()
-        b1 = found.document["b1_deg"]
-        rows[measurement.header.unit, measurement.header.serial].append(
-            (moment_s, b1["value"], b1["std"])
-        )
+    for line in store.each_line():
+        estimate, diagnosis = (one and one.summary for one in (line.estimate, line.diagnosis))
+        # The accepted model's; None where the plain model is refuted and nothing was diagnosed.
+        b1 = accept_model(estimate, diagnosis).b1_deg
+        if b1 is not None:
+            moment_s = datetime.fromisoformat(line.started).timestamp()
+            rows[line.unit, line.serial].append((moment_s, b1["value"], b1["std"]))
 
 for (unit, serial), sessions in sorted(rows.items()):
     trend = fit_trend(*zip(*sessions, strict=True))

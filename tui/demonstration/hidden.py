@@ -82,6 +82,7 @@ def worded(
     hidden: Hidden, outcome: Outcome, document: Mapping[str, Any], guess: str | None
 ) -> Sequence[str]:
     """Lines that tell what was hidden, beside what was found and what was guessed."""
+    from analysis.answer import accept_model
     from sim.catalogue import CATALOGUE
 
     effect = CATALOGUE[hidden.effect.id]
@@ -95,13 +96,10 @@ def worded(
         if size is not None:
             line += f", found {size['value']:.4g} +- {size['std']:.2g}{symbol}"
         lines.append(line)
-    ratio = document["contribution_ratio"]
-    plain, extended = ratio["baseline"], ratio["extended"]
-    lines.append(
-        f"  contribution ratio: true {hidden.ratio:.3f}, "
-        f"plain model {plain['value']:.3f} +- {plain['std']:.3f}, "
-        f"extended model {extended['value']:.3f} +- {extended['std']:.3f}"
-    )
+    answer = accept_model(None, document)
+    ratio = answer.contribution_ratio
+    found_ratio = "" if ratio is None else f"found {ratio['value']:.3f} +- {ratio['std']:.3f}, "
+    lines.append(f"  contribution ratio: true {hidden.ratio:.3f}, {found_ratio}{answer.source}")
     if guess is not None:
         lines.append(f"  your guess, {guess}: {'right' if guess == effect.id else 'not it'}")
     return lines
