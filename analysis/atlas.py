@@ -13,6 +13,7 @@ import json
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,7 @@ from analysis.observation import Observation
 from analysis.population import Group, Population, simulate_groups
 from daq.configs import atlas_folder
 from daq.formats.atomic import keeping
+from daq.trust import own_folder, read_own
 from sim.unit import Unit
 
 __all__ = ["Atlas", "atlas_name", "coarse_stride", "make_atlas", "simulate_atlas", "write_atlas"]
@@ -92,9 +94,11 @@ def _find_or_make(
     rare: bool,
 ) -> Atlas:
     name = atlas_name(unit, coarse, rare)
-    for folder in (cache, atlas_folder()):
-        if folder is not None and (known := _read(folder / name)) is not None:
-            return known
+    cache = None if cache is None else own_folder(cache)
+    if cache is not None and (known := _read(cache / name, read_own)) is not None:
+        return known
+    if (known := _read(atlas_folder() / name, Path.read_bytes)) is not None:
+        return known
     atlas = simulate_atlas(unit, coarse, executor, progress, rare=rare)
     if cache is not None:
         write_atlas(cache / name, atlas)
@@ -195,11 +199,12 @@ def write_atlas(file: Path, atlas: Atlas) -> None:
         np.savez_compressed(stream, **names)
 
 
-def _read(file: Path) -> Atlas | None:
+def _read(file: Path, content: Callable[[Path], bytes | None]) -> Atlas | None:
     """A kept atlas, or None where there is none that can be read."""
     # Damage is told by zip, zlib and numpy, each in many ways: what it hit is made anew.
     with suppress(Exception):
-        with file.open("rb") as stream, np.load(stream, allow_pickle=False) as kept:
+        stream = BytesIO(content(file) or b"")
+        with np.load(stream, allow_pickle=False) as kept:
             fields: dict[tuple[str, ...], dict[str, NDArray]] = {}
             for name in kept.files:
                 key, _, field = name.rpartition("|")

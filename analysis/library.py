@@ -14,6 +14,7 @@ import zipfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict
+from io import BytesIO
 from pathlib import Path
 from typing import IO
 
@@ -25,6 +26,7 @@ from analysis.family import Family, Readings, read_families
 from analysis.observation import Observation
 from daq.configs import kept_runs
 from daq.formats.atomic import keeping
+from daq.trust import own_folder, read_own
 from sim.unit import Unit
 
 __all__ = ["run_families", "run_name", "write_runs"]
@@ -50,7 +52,7 @@ def run_families(
     ----------
     cache
         Folder that keeps the runs; what is found there or comes with lashbench costs no
-        simulation.
+        simulation. One that others may write is not used (`daq.trust`).
     executor
         Where they are simulated; this machine's cores if not given.
 
@@ -61,6 +63,7 @@ def run_families(
     """
     names = [run_name(unit, family, observation) for family in families]
     shapes = [(len(family), len(observation)) for family in families]
+    cache = None if cache is None else own_folder(cache)
     kept = [folder for folder in (cache, _shipped()) if folder is not None]
     known = [_find(kept, *asked) for asked in zip(names, shapes, strict=True)]
     missing = [i for i, one in enumerate(known) if one is None]
@@ -103,12 +106,22 @@ def _keep(file: Path, readings: Readings) -> None:
         write_runs(stream, readings)
 
 
+def _opened(file: Folder) -> IO[bytes]:
+    """A file of kept runs, if nobody else can have written it; those that come along are ours."""
+    if not isinstance(file, Path):
+        return file.open("rb")
+    content = read_own(file)
+    if content is None:
+        raise FileNotFoundError(file)
+    return BytesIO(content)
+
+
 def _find(folders: Sequence[Folder], name: str, shape: tuple[int, int]) -> Readings | None:
     """Kept runs, or None where there are none that can be read whole."""
     for folder in folders:
         # Damage is told by zip, zlib and numpy, each in many ways: what it hit is made anew.
         with suppress(Exception):
-            with (folder / name).open("rb") as stream, np.load(stream, allow_pickle=False) as kept:
+            with _opened(folder / name) as stream, np.load(stream, allow_pickle=False) as kept:
                 mean, variance = kept["mean"], kept["variance"]
             whole = mean.shape == variance.shape == shape and mean.dtype == complex
             if whole and np.all(np.isfinite(variance)):

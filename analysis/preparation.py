@@ -18,6 +18,7 @@ from analysis.library import run_families
 from analysis.observation import Observation
 from analysis.progress import Progress, part_of
 from daq.errors import InputError
+from daq.trust import distrust
 from sim.effort import counting
 from sim.unit import Unit
 
@@ -54,11 +55,11 @@ def prepare_sweep(
     Raises
     ------
     InputError
-        If nothing can be written into the folder.
+        If nothing can be written into the folder, or others may write there.
     AnalysisError
         If a motion grew without bound.
     """
-    _check_writable(cache)
+    _check_usable(cache)
     searched = unit.stages == 2
     with counting() as effort:
         families = every_family(free_axes(unit), observation, seed=0)
@@ -76,7 +77,7 @@ def prepare_sweep(
     return effort.simulated_s
 
 
-def _check_writable(folder: Path) -> None:
+def _check_usable(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -86,3 +87,9 @@ def _check_writable(folder: Path) -> None:
             f"{folder}: cannot be written ({error.strerror or error}); "
             "set XDG_CACHE_HOME to a folder that can"
         ) from error
+    fault = distrust(folder)
+    if fault is not None:
+        raise InputError(
+            f"{fault}, so that nothing kept in {folder} would be used; "
+            "set XDG_CACHE_HOME to a folder of yours alone"
+        )

@@ -17,7 +17,7 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
-__all__ = ["distrust", "fresh_folder", "open_own", "own_folder", "read_own"]
+__all__ = ["distrust", "fresh_folder", "open_own", "own_folder", "pass_over", "read_own"]
 
 _LOG = logging.getLogger("lashbench.trust")
 _TOLD: set[str] = set()
@@ -77,14 +77,8 @@ def open_own(file: Path, flags: int, mode: int = 0o600) -> int | None:
     return None
 
 
-def own_folder(folder: Path, what: str) -> Path:
-    """The folder, made if it is not there; one that goes with the process if others may write it.
-
-    Parameters
-    ----------
-    what
-        What is kept there, for the line that is logged, once.
-    """
+def own_folder(folder: Path) -> Path:
+    """The folder, made if it is not there; a fresh one if others may write there."""
     with suppress(OSError):
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     if not folder.exists():
@@ -92,10 +86,15 @@ def own_folder(folder: Path, what: str) -> Path:
     fault = distrust(folder)
     if fault is None:
         return folder
+    pass_over(fault)
+    return fresh_folder() / folder.name
+
+
+def pass_over(fault: str) -> None:
+    """Log, once, that what is kept at a place is not used, and why."""
     if fault not in _TOLD:
         _TOLD.add(fault)
-        _LOG.warning("%s; %s is neither read from there nor kept", fault, what)
-    return fresh_folder() / folder.name
+        _LOG.warning("%s; what is kept there is not used but made anew in this run", fault)
 
 
 @cache

@@ -8,7 +8,6 @@ from __future__ import annotations
 import ctypes
 import hashlib
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from threading import Lock
@@ -19,6 +18,7 @@ import llvmlite.binding as llvm
 from platformdirs import user_cache_path
 
 from daq.formats.atomic import keeping
+from daq.trust import own_folder, read_own
 
 __all__ = [
     "architecture",
@@ -42,7 +42,7 @@ _ALIVE: list[Any] = []
 
 
 def code_folder() -> Path:
-    """Where what was compiled is kept; XDG_CACHE_HOME moves it."""
+    """Where what was compiled is kept if no other user may write there; XDG_CACHE_HOME moves it."""
     return user_cache_path("lashbench", appauthor=False) / "code"
 
 
@@ -83,7 +83,7 @@ def compiled(name: str, sources: Sequence[Path], write: Callable[[], str]) -> An
     """
     with _LOCK:
         key = f"{name} {_target_text()} {_sources_mark(tuple(sources))}"
-        file = code_folder() / f"{_MARK(key.encode()).hexdigest()[:24]}.code"
+        file = own_folder(code_folder()) / f"{_MARK(key.encode()).hexdigest()[:24]}.code"
         program = _read(file)
         if program is None:
             program = _compile(write())
@@ -122,12 +122,14 @@ def _sources_mark(sources: tuple[Path, ...]) -> str:
 
 
 def _read(file: Path) -> bytes | None:
-    """What was kept, or None where it is not what was written: half a program would crash."""
-    with suppress(OSError):
-        kept = file.read_bytes()
-        size = _MARK().digest_size
-        if kept[:size] == _MARK(kept[size:]).digest():
-            return kept[size:]
+    """What was kept, or None where it is not what was written: half a program would crash.
+
+    Nor is it run where others could have written it.
+    """
+    kept = read_own(file)
+    size = _MARK().digest_size
+    if kept is not None and kept[:size] == _MARK(kept[size:]).digest():
+        return kept[size:]
     return None
 
 

@@ -26,7 +26,7 @@ from cyclopts import App, CycloptsError, MissingArgumentError, Parameter
 from daq.errors import InputError, LashbenchError
 from tui.commands.bench import is_terminal
 from tui.entry import INTERRUPTED
-from tui.logs import LEVELS, logging_to_file, silence
+from tui.logs import LEVELS, logging_to_file, silence, telling_what_is_passed_over
 from tui.output import Console, hush
 
 __all__ = ["VERBS", "build_app", "main"]
@@ -114,7 +114,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _guarded(words: list[str], console: Console, debug: bool) -> int:
     """Run a command; whatever it raises becomes one line and an exit code."""
     try:
-        return _run(words, console)
+        with telling_what_is_passed_over(console.note):
+            return _run(words, console)
     except BrokenPipeError:
         # Whoever read our output has seen enough.
         hush(sys.stdout)

@@ -10,7 +10,7 @@ import io
 import logging
 import os
 import stat
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
@@ -18,7 +18,7 @@ from pathlib import Path
 from daq.visible_text import visible, visible_line
 from tui.places import log_path
 
-__all__ = ["LEVELS", "logging_to_file", "silence"]
+__all__ = ["LEVELS", "logging_to_file", "silence", "telling_what_is_passed_over"]
 
 LEVELS = ("debug", "info", "warning", "error")
 """What ``--log-level`` takes, from most to least that is written."""
@@ -76,6 +76,22 @@ def logging_to_file(level: str = "info") -> Iterator[Path | None]:
         logger.removeHandler(handler)
         warned.removeHandler(handler)
         handler.close()
+
+
+@contextmanager
+def telling_what_is_passed_over(tell: Callable[[str], None]) -> Iterator[None]:
+    """Say what is not used because others could have written it, which `daq.trust` logs."""
+
+    class Teller(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            tell(f"note: {record.getMessage()}")
+
+    logger, handler = logging.getLogger("lashbench.trust"), Teller(logging.WARNING)
+    logger.addHandler(handler)
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
 
 
 class _OwnFile(RotatingFileHandler):

@@ -7,11 +7,12 @@ before it is needed.
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from daq.errors import InputError
 
-__all__ = ["cache_folder", "history_path", "log_path"]
+__all__ = ["cache_folder", "look_at_caches", "history_path", "log_path"]
 
 
 def history_path(given: Path | None, *, create: bool = False) -> Path:
@@ -56,3 +57,13 @@ def log_path() -> Path:
     from platformdirs import user_state_path
 
     return user_state_path("lashbench", appauthor=False) / "lashbench.log"
+
+
+def look_at_caches() -> None:
+    """Log at once what will not be used of the caches, for a screen that cannot be written over."""
+    from daq.trust import distrust, own_folder, pass_over
+
+    own_folder(cache_folder())
+    numba = os.environ.get("NUMBA_CACHE_DIR")
+    if numba and os.path.exists(numba) and (fault := distrust(Path(numba))) is not None:
+        pass_over(fault)

@@ -1,57 +1,65 @@
-"""What numba is told: vectors as wide as the machine's."""
+"""What numba kept where others can write is not loaded: its index is a pickle, which runs code."""
 
-from __future__ import annotations
+import os
+import pickle
+import subprocess
+import sys
+from pathlib import Path
 
-import llvmlite.binding as llvm
-import numba
-import numpy as np
 import pytest
 
-from sim import compiling
+SOURCE = """
+from sim.compiling import njit
 
-WISH = "-prefer-256-bit"
+@njit(cache=True)
+def twice(x):
+    return 2 * x
 
-
-@pytest.fixture
-def settings(monkeypatch):
-    """numba's settings as they are where nobody set anything; put back afterwards."""
-    for name, value in {"CPU_FEATURES": None, "CPU_NAME": None, "ENABLE_AVX": 1}.items():
-        monkeypatch.setattr(numba.config, name, value)
-    return numba.config
+print(twice(21))
+"""
 
 
-@pytest.mark.parametrize("wide", [True, False])
-def test_whole_vectors_are_asked_for_where_the_machine_has_them(settings, monkeypatch, wide):
-    features = llvm.FeatureMap({"sse2": True, "avx512f": wide})
-    monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: features)
-    compiling._ask_for_whole_vectors()
-    assert (f"+avx512f,+sse2,{WISH}" if wide else None) == settings.CPU_FEATURES
+class Evil:
+    """As a pickle it makes a file."""
+
+    def __init__(self, place):
+        self.place = place
+
+    def __reduce__(self):
+        return Path.touch, (self.place,)
 
 
-@pytest.mark.parametrize(
-    ("name", "value"), [("CPU_FEATURES", "+sse2"), ("CPU_NAME", "generic"), ("ENABLE_AVX", 0)]
-)
-def test_what_a_user_set_stays(settings, monkeypatch, name, value):
-    monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: llvm.FeatureMap({"avx512f": True}))
-    monkeypatch.setattr(settings, name, value)
-    compiling._ask_for_whole_vectors()
-    assert getattr(settings, name) == value
-    assert WISH not in (settings.CPU_FEATURES or "")
+def run(folder, **where):
+    kept = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    done = subprocess.run(
+        [sys.executable, "law.py"], cwd=folder, env=kept | where, capture_output=True, text=True
+    )
+    assert (done.returncode, done.stdout) == (0, "42\n"), done.stderr
+    return done.stderr
 
 
-@compiling.njit
-def _scale(source, target, by):
-    for i in range(source.shape[0]):
-        target[i] = by * source[i]
-
-
-@pytest.mark.skipif(
-    not llvm.get_host_cpu_features().get("avx512f"), reason="this machine has no wide vectors"
-)
-def test_loops_are_compiled_in_whole_vectors():
-    source, target = np.arange(100.0), np.zeros(100)
-    _scale(source, target, 3.0)
-    assert np.array_equal(target, 3.0 * source)
-    assert WISH in numba.config.CPU_FEATURES
-    (assembly,) = _scale.inspect_asm().values()
-    assert "zmm" in assembly
+@pytest.mark.parametrize("place", ["beside the source", "NUMBA_CACHE_DIR"])
+def test_an_index_of_others_is_not_loaded(tmp_path, place):
+    work = tmp_path / "work"
+    work.mkdir()
+    (work / "law.py").write_text(SOURCE)
+    where = {"XDG_CACHE_HOME": str(tmp_path / "cache")}
+    shared = work / "__pycache__"
+    shared.mkdir()
+    if place == "NUMBA_CACHE_DIR":
+        shared = tmp_path / "numba"
+        shared.mkdir()
+        where["NUMBA_CACHE_DIR"] = str(shared)
+    run(work, **where)
+    (index,) = shared.rglob("*.nbi")
+    index.write_bytes(pickle.dumps(Evil(tmp_path / "was-run")))
+    shared.chmod(0o777)
+    told = run(work, **where)
+    assert not (tmp_path / "was-run").exists()
+    assert (f"{shared} can be written by others" in told) == (place == "NUMBA_CACHE_DIR")
+    assert list((tmp_path / "cache").rglob("*.nbi"))
+    if place == "NUMBA_CACHE_DIR":
+        # What this user keeps for himself alone is loaded: so the index above would have been.
+        shared.chmod(0o755)
+        run(work, **where)
+        assert (tmp_path / "was-run").exists()

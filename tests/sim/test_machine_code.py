@@ -26,10 +26,10 @@ def written(monkeypatch, tmp_path):
     return []
 
 
-def doubled(source, written, name="double"):
+def doubled(source, written, name="double", program=PROGRAM):
     def write():
         written.append(name)
-        return PROGRAM
+        return program
 
     number = ctypes.c_double(21.0)
     place = ctypes.addressof(number)
@@ -71,3 +71,17 @@ def test_a_folder_that_cannot_be_written_costs_time_alone(written, tmp_path, mon
     assert doubled(source, written) == 42.0
     assert doubled(source, written) == 42.0
     assert len(written) == 2
+
+
+@pytest.mark.parametrize(("mode", "gives"), [(0o755, 63.0), (0o777, 42.0)])
+def test_code_that_others_could_have_put_there_is_not_run(written, tmp_path, mode, gives):
+    source, other = tmp_path / "law.py", tmp_path / "other.py"
+    source.write_text("one")
+    other.write_text("another")
+    assert doubled(source, written) == 42.0
+    (mine,) = machine_code.code_folder().glob("*.code")
+    assert doubled(other, written, program=PROGRAM.replace("2.0", "3.0")) == 63.0
+    (theirs,) = set(machine_code.code_folder().glob("*.code")) - {mine}
+    mine.write_bytes(theirs.read_bytes())
+    machine_code.code_folder().chmod(mode)
+    assert doubled(source, written) == gives

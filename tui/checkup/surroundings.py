@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from daq.trust import distrust
 from tui.checkup.finding import Finding, failed, noted, passed
 from tui.places import cache_folder, history_path, log_path
 
@@ -50,7 +51,10 @@ def check_folders() -> Iterator[Finding]:
         "log": (log_path(), "XDG_STATE_HOME", "the bench screen keeps no log"),
     }
     for name, (place, variable, loss) in places.items():
-        if (fault := _fault(place)) is None:
+        fault = _fault(place)
+        if fault is None and name == "cache" and place.exists():
+            fault = distrust(place)
+        if fault is None:
             yield passed(name, str(place))
         else:
             yield noted(name, f"{fault}: {loss}", f"set {variable} to a folder of yours")
@@ -64,4 +68,6 @@ def _fault(place: Path) -> str | None:
     if standing != place and not standing.is_dir():
         return f"{place}: {standing} is a file"
     needed = os.W_OK | (os.X_OK if standing.is_dir() else os.R_OK)
-    return None if os.access(standing, needed) else f"{place}: you cannot write to {standing}"
+    if not os.access(standing, needed):
+        return f"{place}: you cannot write to {standing}"
+    return None

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from daq.errors import InputError
 from tui.output import Injected
-from tui.places import history_path
+from tui.places import history_path, look_at_caches
 
 __all__ = ["bench", "is_terminal", "require_terminal"]
 
@@ -30,6 +30,7 @@ def bench(*, db: Path | None = None, console: Injected) -> int:
     with logging_to_file() as log:
         if log is None:
             console.note("the log file cannot be written; going on without")
+        look_at_caches()
         app = BenchApp(history_path(db, create=True), log=log)
         code = app.run()
     return code if code is not None else app.return_code or 0
