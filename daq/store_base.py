@@ -20,7 +20,7 @@ from daq import store_tables as table
 from daq.errors import FileFormatError, InputError
 from daq.store_file import WRITES, log_of, open_engine, telling_faults
 from daq.store_flush import Flusher
-from daq.store_records import LONGEST_TEXT
+from daq.store_records import LONGEST_NAME, LONGEST_TEXT
 from daq.store_rows import whole
 
 __all__ = ["StoreFile", "check_length", "inserted", "now", "shared"]
@@ -125,7 +125,6 @@ def shared(
 
 def check_length(name: str, value: str) -> None:
     """Raise an InputError if a text is longer than a history holds."""
-    if len(value) > LONGEST_TEXT:
-        raise InputError(
-            f"{name} has {len(value)} characters; a history holds up to {LONGEST_TEXT}"
-        )
+    longest = LONGEST_TEXT if name == "notes" else LONGEST_NAME
+    if len(value) > longest:
+        raise InputError(f"{name} has {len(value)} characters; a history holds up to {longest}")

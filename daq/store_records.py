@@ -17,6 +17,7 @@ from daq.plan import SweepPlan
 
 __all__ = [
     "CORRECTABLE",
+    "LONGEST_NAME",
     "LONGEST_TEXT",
     "Answer",
     "Correction",
@@ -32,8 +33,8 @@ __all__ = [
     "plan_text",
 ]
 
-LONGEST_TEXT = 65536
-"""Characters of a name, a serial number or a remark."""
+LONGEST_NAME, LONGEST_TEXT = 1000, 65536
+"""Characters of a name or a serial number, and of notes."""
 
 MeasurementState = Literal["complete", "interrupted", "aborted"]
 """How a measurement stands. One that is still running, or whose program was

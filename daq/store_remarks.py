@@ -14,7 +14,7 @@ import sqlalchemy as sa
 from daq import store_tables as table
 from daq.errors import InputError
 from daq.store_base import StoreFile, check_length, inserted, now, shared
-from daq.store_listing import count_lines, read_lines, unit_names
+from daq.store_listing import Choice, count_lines, read_lacking, read_lines, unit_names
 from daq.store_records import CORRECTABLE, Correction, HistoryLine
 from daq.store_rows import correction_of, text
 
@@ -103,19 +103,23 @@ class RemarkStore(StoreFile):
         *,
         last: int | None = None,
         with_points: bool = False,
+        exact: bool = False,
     ) -> list[HistoryLine]:
         """Measurements as a list shows them, oldest first: the gist, and what was said of each.
 
         Parameters
         ----------
         unit, serial
-            Only those of this unit (any case) and this serial number.
+            Only those of this unit and this serial number.
         last
             At most so many, the newest.
         with_points
             Leave out what has no point.
+        exact
+            Take the unit's name as it stands; else in any case.
         """
-        return list(self.each_line(unit, serial, last=last, with_points=with_points))
+        with self._reading() as connection:
+            return list(read_lines(connection, Choice(unit, serial, last, with_points, exact)))
 
     def each_line(
         self,
@@ -124,15 +128,34 @@ class RemarkStore(StoreFile):
         *,
         last: int | None = None,
         with_points: bool = False,
+        exact: bool = False,
     ) -> Iterator[HistoryLine]:
         """As `lines`, one after the other, so that any number takes the memory of one."""
         with self._reading() as connection:
-            yield from read_lines(connection, unit, serial, last, with_points)
+            yield from read_lines(connection, Choice(unit, serial, last, with_points, exact))
 
     def count(self, unit: str | None = None, serial: str | None = None) -> int:
         """How many measurements there are of a unit (any case) and a serial number."""
         with self._reading() as connection:
-            return count_lines(connection, unit, serial)
+            return count_lines(connection, Choice(unit, serial))
+
+    def lacking(
+        self,
+        unit: str | None = None,
+        serial: str | None = None,
+        *,
+        last: int | None = None,
+        edition: str | None = None,
+    ) -> list[int]:
+        """Complete measurements, among the last of `lines`, without an estimate in force.
+
+        Parameters
+        ----------
+        edition
+            Count what failed, or is of another edition than this, as none.
+        """
+        with self._reading() as connection:
+            return read_lacking(connection, Choice(unit, serial, last), edition)
 
     def unit_names(self) -> list[str]:
         """Names of all units that were measured."""

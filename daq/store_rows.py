@@ -23,6 +23,7 @@ from daq.frf import (
     error_words,
 )
 from daq.store_records import (
+    LONGEST_NAME,
     LONGEST_TEXT,
     Correction,
     Measurement,
@@ -186,12 +187,12 @@ def measurement_of(row: sa.Row[Any]) -> Measurement:
     return Measurement(
         id=whole(row.id),
         header=MeasurementHeader(
-            unit=text(row.unit),
-            serial=text(row.unit_serial),
+            unit=text(row.unit, LONGEST_NAME),
+            serial=text(row.unit_serial, LONGEST_NAME),
             plan=plan_from_text(text(row.plan, _WHOLE)),
             address=text(row.address),
             software=text(row.software),
-            operator=text(row.operator),
+            operator=text(row.operator, LONGEST_NAME),
             notes=text(row.notes),
             configurations=texts_of(row.configurations),
         ),

@@ -40,6 +40,7 @@ VERBS = {
     "measure": ("tui.commands.measure:measure", "Measure a unit on the bench."),
     "prepare": ("tui.commands.prepare:prepare", "Simulate ahead what a sweep will need."),
     "history": ("tui.commands.history:history", "List a bench's measurements and their trend."),
+    "correct": ("tui.commands.correct:correct", "Correct what was said of a measurement."),
     "export": ("tui.commands.export:export", "Write a stored measurement to a file."),
     "report": ("tui.commands.report:report", "Write a report that prints, as one HTML file."),
     "new-unit": ("tui.commands.new_unit:new_unit", "Write a unit file to fill in."),

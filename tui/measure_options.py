@@ -124,7 +124,7 @@ def session_request(
     from tui.bench import unit_limits
 
     if resume is None:
-        _check_printable(remarks)
+        check_printable(remarks)
     place = load_bench(bench)
     way = None if recipe is None else load_recipe(recipe)
     way_text = {} if recipe is None else {"recipe": _text("recipes", recipe)}
@@ -179,7 +179,7 @@ def session_request(
     )
 
 
-def _check_printable(remarks: Mapping[str, str]) -> None:
+def check_printable(remarks: Mapping[str, str]) -> None:
     """A remark is one line that can be shown and written wherever the measurement goes.
 
     Raises

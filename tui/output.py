@@ -13,7 +13,7 @@ import math
 import os
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Annotated, Any, TextIO
@@ -43,6 +43,7 @@ class _Live:
 _TELLING_S = 15.0
 """How often long work says how far it is where it cannot draw in place."""
 
+_PIECE = 1 << 16
 _PATIENCE_S = 2.0
 """How long is waited for a terminal to take what is left, when nothing drives any more."""
 
@@ -69,11 +70,20 @@ class Console:
 
     def data(self, text: str) -> None:
         """Print a line or block of the result to stdout."""
+        self._print([text])
+
+    def data_from(self, file: TextIO) -> None:
+        """Print what is left of a text file to stdout, piece by piece, and an end of line."""
+        self._print(iter(lambda: file.read(_PIECE), ""))
+
+    def _print(self, pieces: Iterable[str]) -> None:
         if sys.stdout is None:
             raise LashbenchError("there is no stdout to write the result to; leave it open")
         self._clear()
         try:
-            print(visible(text), flush=True)  # noqa: T201
+            for piece in pieces:
+                print(visible(piece), end="")  # noqa: T201
+            print(flush=True)  # noqa: T201
         except BrokenPipeError:
             raise
         except OSError as error:
@@ -218,9 +228,9 @@ def readers_may_leave() -> Iterator[None]:
         hush(sys.stdout)
 
 
-def as_json(content: Mapping[str, Any]) -> str:
-    """A JSON document; what is not a finite number becomes null."""
-    return json.dumps(_plain(content), indent=1, allow_nan=False)
+def as_json(content: Mapping[str, Any], indent: int | None = 1) -> str:
+    """A JSON document, in one line without an indent; what is not a finite number becomes null."""
+    return json.dumps(_plain(content), indent=indent, allow_nan=False)
 
 
 def _plain(value: Any) -> Any:

@@ -1,13 +1,12 @@
 """Reports on stored measurements, for the command line and the screens alike.
 
-Owns with which unit a measurement was made, and which estimate is taken: the
-one that the history holds, as long as it is of the points and of the unit in
-force. It prints nothing.
+Owns with which unit a measurement was made. Which stored estimate and diagnosis
+are taken is `tui.kept`'s part. It prints nothing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,17 +14,10 @@ from daq.errors import ConfigurationError
 
 if TYPE_CHECKING:
     from analysis.report import Diagnosed
-    from daq.store import Store
     from daq.store_records import Measurement
     from sim.unit import Unit
 
-__all__ = [
-    "estimates_in_force",
-    "keep_estimate",
-    "kept_estimate",
-    "report_measurement",
-    "unit_as_measured",
-]
+__all__ = ["report_measurement", "unit_as_measured"]
 
 
 def unit_as_measured(measurement: Measurement) -> Unit:
@@ -54,62 +46,6 @@ def unit_as_measured(measurement: Measurement) -> Unit:
     raise ConfigurationError(f"{source}: {header.unit!r} has no file in the history")
 
 
-def estimates_in_force(
-    store: Store, measurements: Iterable[Measurement]
-) -> dict[int, Mapping[str, Any]]:
-    """Documents of the estimates that are of the points in force, by measurement.
-
-    One that was made before its measurement ended may not be: points were taken
-    since. What failed is among them, as ``{"failed": reason}``.
-    """
-    known = store.latest_estimates()
-    return {
-        one.id: known[one.id].document
-        for one in measurements
-        if one.id in known and one.ended is not None and known[one.id].made > one.ended
-    }
-
-
-def keep_estimate(db: Path, measured: Measurement, document: Mapping[str, Any]) -> None:
-    """Keep what was estimated of a measurement, unless it was taken up again meanwhile.
-
-    Parameters
-    ----------
-    measured
-        The measurement as it was read before its points were.
-
-    Raises
-    ------
-    LashbenchError
-        As `daq.store.Store`.
-    """
-    from importlib.metadata import version
-
-    from daq.store import Store
-
-    with Store(db) as store:
-        # An estimate takes a while; kept now, it would pass for one of points taken since.
-        if store.measurement(measured.id).ended == measured.ended:
-            store.add_estimate(measured.id, f"lashbench {version('lashbench')}", document)
-
-
-def kept_estimate(store: Store, measurement: int, unit: Unit) -> Mapping[str, Any] | None:
-    """The estimate that a history holds of a measurement, if it still holds.
-
-    None where there is none or it failed, where points were taken since, and
-    where the measurement was made with other numbers of the unit.
-    """
-    found = store.measurement(measurement)
-    document = estimates_in_force(store, [found]).get(measurement)
-    if document is None or "contribution_ratio" not in document:
-        return None
-    try:
-        same = unit_as_measured(found) == unit
-    except ConfigurationError:
-        same = False
-    return document if same else None
-
-
 def report_measurement(
     path: Path,
     db: Path,
@@ -136,6 +72,7 @@ def report_measurement(
     """
     from analysis.report import stored_origin, write_report
     from daq.store import Store
+    from tui.kept import kept_estimate
 
     with Store(db, read_only=True) as store:
         response, origin = store.response(measurement), stored_origin(store, measurement)

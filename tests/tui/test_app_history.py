@@ -8,6 +8,7 @@ from screen import ESTIMATE, operated, quick_analyses, run
 from daq.store import Store
 from tui.app.analyses import Analyses
 from tui.cli import main
+from tui.kept import keep_estimate
 from tui.logs import logging_to_file
 from tui.places import log_path
 
@@ -23,7 +24,8 @@ def db(tmp_path):
     for seed in (1, 2):
         assert main([*words, "--instrument", f"sim:?seed={seed}"]) == 0
     with Store(path) as store:
-        store.add_estimate(1, "test", ESTIMATE)
+        measured = store.measurement(1)
+    keep_estimate(path, measured, ESTIMATE)
     return path
 
 
@@ -68,6 +70,58 @@ def test_the_trend_leaves_out_an_estimate_of_points_that_were_measured_again(db)
             assert "0.31" not in await op.sees("[7 Report]", "no session is estimated yet")
 
     run(way)
+
+
+def test_a_diagnosis_is_there_again_after_a_restart(db):
+    async def diagnosed():
+        async with operated(db, (120, 40)) as op:
+            await op.press("7", "down", "enter")
+            await op.sees("[5 Result]", "measurement 1")
+            await op.press("6", "d")
+            assert "from the history" not in await op.sees("VERDICT: AMBIGUOUS")
+
+    async def restarted():
+        async with operated(db, (120, 40)) as op:
+            await op.press("7", "down")
+            await op.sees("#1: diagnosed ambiguous: load-inertia (0.55)", "open")
+            await op.press("enter")
+            await op.sees("[5 Result]", "measurement 1")
+            await op.press("6")
+            await op.sees("from the history, made 20", "VERDICT: AMBIGUOUS", "MEASURE THIS NEXT")
+
+    run(diagnosed)
+    run(restarted)
+    words = ["measure", "--unit", "adss", "--db", str(db), "--instrument", "sim:"]
+    assert main([*words, "--resume", "1", "--remeasure", "100:200"]) == 0
+
+    async def measured_again():
+        async with operated(db, (120, 40)) as op:
+            await op.press("7", "down", "enter")
+            await op.sees("[5 Result]", "measurement 1")
+            await op.press("6")
+            await op.sees("not diagnosed yet")
+
+    run(measured_again)
+
+
+def test_a_correction_on_the_screen_is_kept_with_its_trail(db):
+    async def way():
+        async with operated(db) as op:
+            await op.press("7", "down", "c")
+            await op.sees("Correct measurement 1", "corrected by")
+            await op.types("#correct-serial", "SN 8")
+            await op.press("enter")
+            await op.sees("say who corrects it")
+            await op.types("#correct-person", "Ada")
+            await op.press("enter")
+            await op.sees("ADSS SN 8 SIM.")
+            await op.press("down", "a")
+            await op.sees("#1: serial 'SN 7' corrected to 'SN 8' by Ada")
+
+    run(way)
+    with Store(db, read_only=True) as store:
+        assert [one.new for one in store.corrections(1)] == ["SN 8"]
+        assert store.measurement(2).header.serial == "SN 7"
 
 
 def test_the_report_is_written_where_the_operator_is(db, tmp_path, monkeypatch):

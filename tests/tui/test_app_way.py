@@ -46,7 +46,7 @@ def test_all_seven_steps(tmp_path, monkeypatch, size):
             assert "4.2 standard errors" in screen
             assert "MEASURE THIS NEXT" in screen or size == (80, 24)
             await op.press("ctrl+n")
-            await op.sees("[7 Report]", "0.31+-0.05")
+            await op.sees("[7 Report]", "open", "diagnosed ambiguous: load-inertia")
             await op.press("w")
             await op.sees("REPORT:")
             assert "SIMULATED" in op.screen

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -141,7 +142,7 @@ class Task:
 def read_result(task: Task, analyses: Analyses) -> None:
     """Features first, since they are quick; then the estimate, from the history if it is there."""
     from daq.store import Store
-    from tui.reports import kept_estimate
+    from tui.kept import kept_diagnosis, kept_estimate
 
     def features() -> tuple[FrequencyResponse, Any]:
         from analysis.resonance import extract
@@ -155,18 +156,30 @@ def read_result(task: Task, analyses: Analyses) -> None:
             measured = store.measurement(task.measurement)
         if known is not None:
             return known
+        began_s = time.monotonic()
         made = analyses.estimate(task.response(), task.unit, task.progress("result"))
-        _keep_estimate(task, measured, made)
+        _keep_estimate(task, measured, made, time.monotonic() - began_s)
         return made
 
+    def diagnosis() -> Any:
+        with Store(task.db, read_only=True) as store:
+            return kept_diagnosis(store, task.measurement, task.unit)
+
     task.run("result", features)
+    task.run("stored diagnosis", diagnosis)
     task.run("result", estimate)
 
 
 def diagnose(task: Task, analyses: Analyses) -> None:
-    """What the model lacks, and why."""
-    progress = task.progress("diagnosis")
-    task.run("diagnosis", lambda: analyses.diagnose(task.responses(), task.unit, progress))
+    """What the model lacks, and why; it is kept in the history."""
+
+    def work() -> Any:
+        responses = task.responses()
+        made = analyses.diagnose(responses, task.unit, task.progress("diagnosis"))
+        _keep_diagnosis(task, responses, made.to_json())
+        return made
+
+    task.run("diagnosis", work)
 
 
 def write_report(task: Task, analyses: Analyses, diagnosis: Any, path: Path) -> None:
@@ -179,11 +192,25 @@ def write_report(task: Task, analyses: Analyses, diagnosis: Any, path: Path) -> 
     task.run("report", work)
 
 
-def _keep_estimate(task: Task, measured: Measurement, document: Mapping[str, Any]) -> None:
-    from tui.reports import keep_estimate
+def _keep_diagnosis(
+    task: Task, responses: Sequence[FrequencyResponse], document: Mapping[str, Any]
+) -> None:
+    from tui.kept import keep_diagnosis
 
     try:
-        keep_estimate(task.db, measured, document)
+        keep_diagnosis(task.db, task.measurement, responses, task.unit, document)
+    except LashbenchError as error:
+        # It is shown all the same, until the screen is left.
+        _LOG.warning("a diagnosis was not kept: %s", error)
+
+
+def _keep_estimate(
+    task: Task, measured: Measurement, document: Mapping[str, Any], elapsed_s: float
+) -> None:
+    from tui.kept import keep_estimate
+
+    try:
+        keep_estimate(task.db, measured, document, unit=task.unit, elapsed_s=elapsed_s)
     except LashbenchError as error:
         # It is shown all the same; the next look makes it once more.
         _LOG.warning("an estimate was not kept: %s", error)

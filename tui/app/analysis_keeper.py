@@ -87,6 +87,11 @@ class AnalysisKeeper:
             # The first part of two: features come before the estimate.
             desk.results.response, desk.results.features = message.result
             return
+        if message.job == "stored diagnosis":
+            # One that is made meanwhile, or was made, goes before it.
+            if desk.results.diagnosis is None and "diagnosis" not in self.progress:
+                desk.results.diagnosis = message.result
+            return
         self.progress.pop(message.job, None)
         if message.job == "result":
             desk.results.estimate = message.result

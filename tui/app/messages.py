@@ -27,7 +27,7 @@ __all__ = [
     "SourceStopped",
 ]
 
-Job = Literal["result", "diagnosis", "report"]
+Job = Literal["result", "diagnosis", "stored diagnosis", "report"]
 """What an analysis works on."""
 
 

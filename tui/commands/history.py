@@ -1,14 +1,18 @@
 """``lashbench history``: the measurements of a bench, and how a unit's backlash changes.
 
 Owns the options of the verb and the tables. Estimates that the history lacks
-are made by the analysis and kept, so that the next look is quick.
+are made by the analysis and kept, so that the next look is quick. What is not
+shown is not read.
 """
 
 from __future__ import annotations
 
+import json as json_text
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
@@ -17,26 +21,31 @@ from daq.errors import AnalysisError, ConfigurationError, InputError, LashbenchE
 from tui.executors import executor_at
 from tui.history_rows import (
     QUANTITIES,
-    estimated_groups,
+    Trends,
+    answer_words,
+    correction_words,
     measurement_row,
+    told_groups,
     trend_lines,
-    trend_rows,
 )
 from tui.layout import WIDTH, table_lines, wrapped
-from tui.options import Cluster, Json
-from tui.output import Console, Injected
+from tui.options import Cluster, Json, Whole
+from tui.output import Console, Injected, as_json
 from tui.places import cache_folder, history_path
-from tui.reports import estimates_in_force, keep_estimate, unit_as_measured
+from tui.reports import unit_as_measured
 
 if TYPE_CHECKING:
     from analysis.executor import Executor
     from daq.store import Store
-    from daq.store_records import Measurement
+    from daq.store_records import Answer, HistoryLine
 
 __all__ = ["history"]
 
 _BUDGET_S = 45.0
 """Time after which `--estimate some` begins no further estimate."""
+_SHOWN = 200
+"""Measurements that are listed for people unless they ask for more."""
+_PROGRESS_EVERY = 1000
 _BAR, _LEAST_BAR = 41, 11
 """Columns from a ratio of 0 to one of 1, and how few of them there may be beside long numbers."""
 
@@ -45,6 +54,8 @@ def history(
     *,
     db: Path | None = None,
     unit: Annotated[str | None, Parameter(name="--unit")] = None,
+    serial: str | None = None,
+    last: Whole | None = None,
     estimate: Literal["none", "some", "all"] = "some",
     cluster: Cluster = None,
     json: Json = False,
@@ -54,6 +65,8 @@ def history(
 
     Complete measurements that were not estimated since their last point are
     estimated now, which takes a while, and the result is kept in the history.
+    The numbers are those of the model that is accepted: a diagnosis decides where
+    there is one, and where the plain model does not fit and none was made, there is none.
 
     Parameters
     ----------
@@ -61,32 +74,46 @@ def history(
         File of the bench's history; yours, if left out.
     unit
         Only measurements of this unit: adss, edss, the path of a unit file, or a name.
+    serial
+        Only measurements of the specimen with this serial number.
+    last
+        How many measurements to list, the newest; 200 if left out, and all with --json.
+        Trends are of all measurements of whatever is listed.
     estimate
-        Which missing estimates to make: none, all, those that failed once more
-        among them, or some, that is to begin no more of them after 45 s.
+        Which missing estimates to make of those that are listed: none, all, those that failed
+        or are of an earlier edition once more among them, or some, that is to begin no more of
+        them after 45 s.
     """
+    from analysis.edition import EDITION
     from daq.store import Store
 
+    if last is not None and last < 1:
+        raise InputError(f"--last {last}: give 1 or more")
     db = history_path(db)
+    shown = last if last is not None or json else _SHOWN
     with Store(db, read_only=True) as store:
-        measurements = store.measurements(_unit_name(unit, store))
-        known = estimates_in_force(store, measurements)
-    done = {key for key, document in known.items() if estimate != "all" or "failed" not in document}
-    lacking = [m for m in measurements if m.state == "complete" and m.id not in done]
+        name = _unit_name(unit, store)
+        edition = EDITION if estimate == "all" else None
+        lacking = store.lacking(name, serial, last=shown, edition=edition)
+    loose: dict[int, Answer] = {}
     if estimate != "none" and lacking:
         with executor_at(cluster) as executor:
-            known |= _estimates(db, lacking, estimate == "all", executor, console)
-    rows = [
-        measurement_row(measurement, known.get(measurement.id, {})) for measurement in measurements
-    ]
-    trends = trend_rows(rows)
-    if json:
-        console.document({"measurements": rows, "trends": trends})
-    elif not rows:
-        console.data("no measurements; lashbench measure --help says how to make one")
-    else:
-        told = [part for line in trend_lines(trends) for part in wrapped(line, indent="  ")]
-        console.data("\n".join([*_measured(rows), *_estimated(rows), *told]))
+            loose = _estimates(db, lacking, estimate == "all", executor, console)
+    with Store(db, read_only=True) as store:
+        if json:
+            _write_json(store, name, serial, shown, loose, console)
+            return
+        rows = [_row(line, loose) for line in store.lines(name, serial, last=shown)]
+        if not rows:
+            console.data("no measurements; lashbench measure --help says how to make one")
+            return
+        whole = store.count(name, serial)
+        trends = Trends(rows) if whole <= len(rows) else _whole_trends(store, rows, console)
+        told = [part for line in trend_lines(trends.rows()) for part in wrapped(line, indent="  ")]
+        lines = [*_measured(rows), *_corrected(store, rows), *_estimated(rows), *told]
+    if whole > len(rows):
+        console.note(f"the last {len(rows)} of {whole} measurements; --last N lists more")
+    console.data("\n".join(lines))
 
 
 def _unit_name(unit: str | None, store: Store) -> str | None:
@@ -95,61 +122,107 @@ def _unit_name(unit: str | None, store: Store) -> str | None:
 
     if unit is None:
         return None
-    stored = {m.header.unit.lower() for m in store.measurements()}
+    stored = sorted({name.lower() for name in store.unit_names()})
     if unit.lower() in stored:
         return unit
     try:
         return load_unit(unit).name
     except ConfigurationError as error:
-        names = ", ".join(sorted(stored)) or "none"
+        names = ", ".join(stored) or "none"
         raise InputError(f"{error}; units in this history: {names}") from error
 
 
-def _estimates(
-    db: Path,
-    lacking: Sequence[Measurement],
-    every: bool,
-    executor: Executor | None,
+def _row(line: HistoryLine, loose: Mapping[int, Answer]) -> dict[str, Any]:
+    """A row, with the estimate that could not be kept if there is one."""
+    return measurement_row(replace(line, estimate=loose.get(line.id, line.estimate)))
+
+
+def _write_json(
+    store: Store,
+    unit: str | None,
+    serial: str | None,
+    last: int | None,
+    loose: Mapping[int, Answer],
     console: Console,
-) -> dict[int, Mapping[str, Any]]:
-    """Make estimates and keep them where the history may be written."""
-    began_s = time.monotonic()
-    made: dict[int, Mapping[str, Any]] = {}
-    for count, measurement in enumerate(lacking):
-        if not every and made and time.monotonic() - began_s > _BUDGET_S:
+) -> None:
+    """The document, put together on the disk: a history may be longer than the memory."""
+    trends, count, whole = Trends(), 0, store.count(unit, serial)
+    with TemporaryFile("w+", encoding="utf-8") as out:
+        out.write('{"measurements": [')
+        for line in store.each_line(unit, serial, last=last):
+            row = _row(line, loose)
+            trends.add(row)
+            if row["corrections"]:
+                row["corrections"] = [asdict(one) for one in store.corrections(line.id)]
+            else:
+                row["corrections"] = []
+            out.write(",\n" if count else "\n")
+            out.write(as_json(row, indent=None))
+            count += 1
+            if count % _PROGRESS_EVERY == 0:
+                console.progress(min(1.0, count / whole), "reading the history")
+        out.write(f'],\n"trends": {json_text.dumps(trends.rows(), allow_nan=False)}}}')
+        out.seek(0)
+        console.data_from(out)
+
+
+def _whole_trends(store: Store, rows: Sequence[Mapping[str, Any]], console: Console) -> Trends:
+    """Trends of what is listed, over all measurements of each unit and serial number."""
+    trends = Trends()
+    groups = dict.fromkeys((row["unit"], row["serial"]) for row in rows)
+    for count, (unit, serial) in enumerate(groups):
+        console.progress(count / len(groups), "reading the history")
+        for line in store.each_line(unit, serial, exact=True):
+            if line.estimate is not None or line.diagnosis is not None:
+                trends.add(measurement_row(line))
+    return trends
+
+
+def _estimates(
+    db: Path, lacking: Sequence[int], every: bool, executor: Executor | None, console: Console
+) -> dict[int, Answer]:
+    """Make estimates and keep them; those that cannot be kept, by measurement."""
+    began_s, loose = time.monotonic(), {}
+    for done, number in enumerate(lacking):
+        if not every and done and time.monotonic() - began_s > _BUDGET_S:
             console.note(
-                f"{len(lacking) - count} complete measurements are not estimated yet; run this "
+                f"{len(lacking) - done} complete measurements are not estimated yet; run this "
                 "again, or with --estimate all"
             )
             break
-        console.note(f"estimating measurement {measurement.id}")
-        made[measurement.id] = _estimate(db, measurement, executor, console)
-        try:
-            keep_estimate(db, measurement, made[measurement.id])
-        except LashbenchError as error:
-            console.note(f"the estimate is shown but not kept: {error}")
-    return made
+        console.note(f"estimating measurement {number}")
+        answer = _estimate(db, number, executor, console)
+        if answer is not None:
+            loose[number] = answer
+    return loose
 
 
-def _estimate(
-    db: Path, measurement: Measurement, executor: Executor | None, console: Console
-) -> dict[str, Any]:
+def _estimate(db: Path, number: int, executor: Executor | None, console: Console) -> Answer | None:
+    """Make an estimate and keep it; it is given back where it cannot be kept."""
     from analysis.estimate import estimate_response
     from daq.store import Store
+    from tui.kept import keep_estimate, loose_answer
 
+    began_s = time.monotonic()
+    with Store(db, read_only=True) as store:
+        measured = store.measurement(number)
+        response = store.response(number)
     try:
-        with Store(db, read_only=True) as store:
-            response = store.response(measurement.id)
-        unit = unit_as_measured(measurement)
         result = estimate_response(
-            response, unit, progress=console.progress, cache=cache_folder(), executor=executor
-        )
+            response, unit_as_measured(measured), progress=console.progress,
+            cache=cache_folder(), executor=executor,
+        )  # fmt: skip
         content: dict[str, Any] = result.to_json()
     except (AnalysisError, InputError, ValueError) as error:
         # A lost cluster is not among them: it says nothing of the data, and ends the verb.
-        console.note(f"measurement {measurement.id} gives no estimate: {error}")
-        return {"failed": str(error)}
-    return content
+        console.note(f"measurement {number} gives no estimate: {error}")
+        content = {"failed": str(error)}
+    try:
+        keep_estimate(db, measured, content, elapsed_s=time.monotonic() - began_s)
+    except LashbenchError as error:
+        console.note(f"the estimate is shown but not kept: {error}")
+        return loose_answer(content)
+    return None
 
 
 def _measured(rows: Sequence[dict[str, Any]]) -> list[str]:
@@ -171,10 +244,22 @@ def _measured(rows: Sequence[dict[str, Any]]) -> list[str]:
     )
 
 
-def _estimated(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """The estimates of each unit, the contribution ratio as a dot with its bar from 0 to 1, too."""
+def _corrected(store: Store, rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The audit trail of what is listed."""
     lines = []
-    for (unit, serial), group in estimated_groups(rows).items():
+    for row in rows:
+        for one in store.corrections(row["id"]) if row["corrections"] else ():
+            lines += wrapped(f"#{row['id']}: {correction_words(one)}", indent="  ")
+    return ["", *lines] if lines else []
+
+
+def _estimated(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """What is accepted of each unit, the contribution ratio as a dot with its bar from 0 to 1, too.
+
+    Below each measurement stands what was diagnosed and what there is to be warned of.
+    """
+    lines = []
+    for (unit, serial), group in told_groups(rows).items():
         name = f"{unit} {serial}".strip()
         numbers = [
             tuple(
@@ -189,28 +274,34 @@ def _estimated(rows: Sequence[dict[str, Any]]) -> list[str]:
         bar = min(_BAR, max(_LEAST_BAR, WIDTH - left - 1 - sum(widths) - 2 * len(widths)))
         title = f"backlash of {name}; contribution ratio r from 0 to 1; one standard error"
         lines += ["", *wrapped(title)]
-        for key, picture, texts in [
-            ("", f"0{'':{bar - 2}}1", head),
-            *(
-                (str(row["id"]), _bar(row["contribution_ratio"], bar), texts)
-                for row, texts in zip(group, numbers, strict=True)
-            ),
-        ]:
+        pictured = [(str(row["id"]), _bar(row["contribution_ratio"], bar)) for row in group]
+        said = [[], *map(answer_words, group)]
+        for (key, picture), texts, words in zip(
+            [("", f"0{'':{bar - 2}}1"), *pictured], [head, *numbers], said, strict=True
+        ):
             cells = (f"{text:<{width}}" for text, width in zip(texts, widths, strict=True))
             lines.append("  ".join((f"{key:>{left}} {picture}", *cells)).rstrip())
+            indent = " " * (left + 1)
+            for word in words:
+                lines += [indent + part for part in wrapped(word, WIDTH - len(indent), "  ")]
     return lines
 
 
 def _shown(number: Mapping[str, float] | None, digits: int) -> str:
-    return "-" if not number else f"{number['value']:.{digits}f} +- {number['std']:.{digits}f}"
+    if not number:
+        return "-"
+    return f"{number['value']:.{digits}f} +- {number['std'] or 0.0:.{digits}f}"
 
 
-def _bar(ratio: Mapping[str, float], width: int) -> str:
+def _bar(ratio: Mapping[str, float] | None, width: int) -> str:
+    if not ratio:
+        return " " * width
+
     def place(value: float) -> int:
         return round(min(max(value, 0.0), 1.0) * (width - 1))
 
     cells = ["."] * width
-    value, std = ratio["value"], ratio["std"]
+    value, std = ratio["value"], ratio["std"] or 0.0
     for cell in range(place(value - std), place(value + std) + 1):
         cells[cell] = "-"
     cells[place(value)] = "o"

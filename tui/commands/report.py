@@ -6,7 +6,10 @@ page. What stands on it is the analysis's.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,9 +23,12 @@ from tui.places import cache_folder, history_path
 
 if TYPE_CHECKING:
     from analysis.diagnosis import Diagnosis
+    from analysis.report import Diagnosed
     from analysis.report_data import Origin
     from daq.frf import FrequencyResponse
+    from daq.store_records import Measurement
     from sim.unit import Unit
+    from tui.kept import StoredDiagnosis
 
 __all__ = ["report"]
 
@@ -37,7 +43,7 @@ def report(
     unit: UnitName,
     out: Path,
     db: Path | None = None,
-    diagnose: Annotated[bool, Parameter(negative="--no-diagnose")] = True,
+    diagnose: Annotated[bool | None, Parameter(negative="--no-diagnose")] = None,
     console: Injected,
 ) -> None:
     """Write a report on one measurement as a single HTML file that prints on A4.
@@ -55,7 +61,8 @@ def report(
     db
         File of the bench's history that the identifier is looked up in; yours, if left out.
     diagnose
-        Diagnose too, which takes a minute or two; --no-diagnose leaves it out.
+        Diagnose too, which takes a minute or two, even where the history holds a diagnosis of
+        these points; --no-diagnose makes none, and shows the one of the history if there is one.
     """
     from analysis.swept import unit_doubts
     from daq.formats.atomic import checked_target
@@ -66,23 +73,29 @@ def report(
     checked_target(out)
     subject = load_unit(unit)
     remarks: dict[str, str] = {}
+    kept: _Kept | None = None
     if not _is_identifier(source, db):
         from analysis.report import file_origin
         from daq.formats import read_response
 
-        response, estimate = read_response(source), None
-        origin = file_origin(Path(source))
+        response, origin = read_response(source), file_origin(Path(source))
     else:
-        response, origin, estimate = _stored(history_path(db), source, subject)
+        kept = _stored(history_path(db), int(source), subject)
+        response, origin = kept.response, kept.origin
     for doubt in unit_doubts([response], subject):
         console.note(f"warning: {doubt}")
+    estimate = None if kept is None else kept.estimate
     if estimate is None:
-        estimate = _estimate(response, subject, remarks, console)
-    diagnosis = _diagnose(response, subject, remarks, console) if diagnose else None
-    if diagnosis is not None:
-        diagnosis = proposing(diagnosis, unit, [response])
-    if not diagnose:
+        estimate = _estimate(response, subject, remarks, kept, console)
+    diagnosis: Diagnosed | None = None
+    if kept is not None and kept.diagnosis is not None and not diagnose:
+        diagnosis = kept.diagnosis
+        remarks["diagnosis"] = f"The diagnosis is {kept.diagnosis.origin}."
+        console.note(f"the diagnosis is {kept.diagnosis.origin}; --diagnose makes it anew")
+    elif diagnose is False:
         remarks["diagnosis"] = "No diagnosis was made: it was left out on request."
+    else:
+        diagnosis = _diagnose(response, subject, unit, remarks, kept, console)
     from analysis.report import write_report
 
     write_report(
@@ -98,48 +111,90 @@ def _is_identifier(source: str, db: Path | None) -> bool:
     return db is not None or not Path(source).is_file()
 
 
-def _stored(
-    db: Path, identifier: str, unit: Unit
-) -> tuple[FrequencyResponse, Origin, Mapping[str, Any] | None]:
-    """A measurement, its origin, and the estimate that the history holds of it."""
+@dataclass(frozen=True, slots=True)
+class _Kept:
+    """A measurement as its history holds it, with the answers of today's inference."""
+
+    db: Path
+    measured: Measurement
+    response: FrequencyResponse
+    origin: Origin
+    estimate: Mapping[str, Any] | None
+    diagnosis: StoredDiagnosis | None
+
+
+def _stored(db: Path, number: int, unit: Unit) -> _Kept:
     from analysis.report import stored_origin
     from daq.store import Store
-    from tui.reports import kept_estimate
+    from tui.kept import kept_diagnosis, kept_estimate
 
-    number = int(identifier)
     with Store(db, read_only=True) as store:
-        return (
+        return _Kept(
+            db,
+            store.measurement(number),
             store.response(number),
             stored_origin(store, number),
             kept_estimate(store, number, unit),
+            kept_diagnosis(store, number, unit),
         )
 
 
 def _estimate(
-    response: FrequencyResponse, unit: Unit, remarks: dict[str, str], console: Console
+    response: FrequencyResponse,
+    unit: Unit,
+    remarks: dict[str, str],
+    kept: _Kept | None,
+    console: Console,
 ) -> dict[str, Any] | None:
     from analysis.estimate import estimate_response
+    from tui.kept import keep_estimate
 
     console.note("estimating")
+    began_s = time.monotonic()
     try:
-        return estimate_response(
+        made = estimate_response(
             response, unit, cache=cache_folder(), progress=console.progress
         ).to_json()
     except LashbenchError as error:
         remarks["estimate"] = f"No estimate could be made: {error}."
         console.note(remarks["estimate"])
         return None
+    if kept is not None:
+        with _in_spite_of_faults("estimate", console):
+            elapsed_s = time.monotonic() - began_s
+            keep_estimate(kept.db, kept.measured, made, unit=unit, elapsed_s=elapsed_s)
+    return made
 
 
 def _diagnose(
-    response: FrequencyResponse, unit: Unit, remarks: dict[str, str], console: Console
+    response: FrequencyResponse,
+    unit: Unit,
+    named: str,
+    remarks: dict[str, str],
+    kept: _Kept | None,
+    console: Console,
 ) -> Diagnosis | None:
     from analysis.diagnosis import diagnose_response
+    from tui.kept import keep_diagnosis
 
     console.note("diagnosing")
     try:
-        return diagnose_response(response, unit, cache=cache_folder(), progress=console.progress)
+        made = diagnose_response(response, unit, cache=cache_folder(), progress=console.progress)
     except LashbenchError as error:
         remarks["diagnosis"] = f"No diagnosis could be made: {error}."
         console.note(remarks["diagnosis"])
         return None
+    made = proposing(made, named, [response])
+    if kept is not None:
+        with _in_spite_of_faults("diagnosis", console):
+            keep_diagnosis(kept.db, kept.measured.id, [response], unit, made.to_json())
+    return made
+
+
+@contextmanager
+def _in_spite_of_faults(kind: str, console: Console) -> Iterator[None]:
+    """A history that cannot be written keeps nobody from a report."""
+    try:
+        yield
+    except LashbenchError as error:
+        console.note(f"the {kind} is reported but not kept: {error}")

@@ -125,7 +125,9 @@ sweep itself. D then diagnoses both measurements together.
             return [f"{head}: not diagnosed yet", "", "D compares it with the model: which"
                     " physical cause explains what the model misses?"]  # fmt: skip
         document = results.diagnosis.to_json()
-        lines = [head, *self._answer(document), *diagnosis_lines(document)]
+        origin = getattr(results.diagnosis, "origin", "")
+        lines = [f"{head}, {origin}; D makes it anew"] if origin else [head]
+        lines += [*self._answer(document), *diagnosis_lines(document)]
         plan = self._next_plan()
         if plan is not None:
             try:

@@ -6,7 +6,6 @@ here: a session gets one when its result is opened.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +15,13 @@ from textual.binding import Binding
 from textual.containers import Vertical
 
 from daq.errors import LashbenchError
+from tui.app.correction_dialog import CorrectionDialog
 from tui.app.step_screen import StepScreen
 from tui.app.widgets.bode import BodePlot
 from tui.app.widgets.panel import Panel
 from tui.app.widgets.plain import Table, Words
 from tui.app.widgets.traces import traces_of_response
-from tui.history_rows import measurement_row, trend_lines, trend_rows
-from tui.reports import estimates_in_force
+from tui.history_rows import Trends, answer_words, correction_words, measurement_row, trend_lines
 
 __all__ = ["HistoryScreen"]
 
@@ -40,7 +39,10 @@ W writes the report of the measurement in view as one HTML file that prints.
 The table lists this unit's sessions. Enter opens one: it is then the one that result,
 diagnosis and report are about. Space marks a session; with two marked, O lays one over the
 other in a plot (the first marked is drawn as a line). T goes back to the trend: the
-contribution ratio of every estimated session with its error bar. U lists all units.
+contribution ratio of every session of which a model is accepted, with its error bar. Below it
+stands what was diagnosed of the session under the cursor, and every warning. U lists all units.
+C corrects serial number, operator or notes of the session under the cursor; what stood there
+before stays in its audit trail, which A shows.
 """
     BINDINGS = [
         Binding("w", "write", "Write report", id="history.report"),
@@ -48,6 +50,8 @@ contribution ratio of every estimated session with its error bar. U lists all un
         Binding("o", "overlay", "Overlay", id="history.overlay"),
         Binding("t", "trend", "Trend", id="history.trend", show=False),
         Binding("u", "units", "All units", id="history.units", show=False),
+        Binding("c", "correct", "Correct", id="history.correct", show=False),
+        Binding("a", "audit", "Audit trail", id="history.audit", show=False),
     ]
     DEFAULT_CSS = """
     HistoryScreen #sessions { height: 8; }
@@ -63,7 +67,8 @@ contribution ratio of every estimated session with its error bar. U lists all un
         super().__init__()
         self._marked: list[int] = []
         self._rows: list[dict[str, Any]] = []
-        self._every_unit = False
+        self._every_unit = self._audit = False
+        self._trends: list[str] = []
 
     def body(self) -> ComposeResult:
         """Table, plot, words."""
@@ -162,10 +167,39 @@ contribution ratio of every estimated session with its error bar. U lists all un
         self.arrive()
         self.show()
 
+    def action_correct(self) -> None:
+        """Ask what is wrong of the session under the cursor."""
+        row = self._row_under_cursor()
+        if row is None:
+            return
+        dialog = CorrectionDialog(row["id"], row, self.desk.operator)
+
+        def take(asked: tuple[str, dict[str, str]] | None) -> None:
+            if asked is not None:
+                self._correct(row["id"], *asked)
+
+        self.app.push_screen(dialog, take)
+
+    def action_audit(self) -> None:
+        """Show the audit trail of the session under the cursor, or hide it."""
+        self._audit = not self._audit
+        self.show()
+
     def on_data_table_row_selected(self, event: Table.RowSelected) -> None:
         """Open it."""
-        measurement = next(m for m in self.bench.measurements() if str(m.id) == event.row_key.value)
+        from daq.store import Store
+
+        try:
+            with Store(self.desk.db, read_only=True) as store:
+                measurement = store.measurement(int(event.row_key.value or 0))
+        except LashbenchError as error:
+            self.bench.show_error("The measurement cannot be opened", error)
+            return
         self.bench.open_measurement(measurement)
+
+    def on_data_table_row_highlighted(self) -> None:
+        """What was said of it."""
+        self.query_one("#text", Words).update("\n".join(self._lines()))
 
     # ------------------------------------------------------------ inside
 
@@ -173,17 +207,44 @@ contribution ratio of every estimated session with its error bar. U lists all un
         from daq.store import Store
 
         desk = self.desk
-        unit = None if desk.unit is None or self._every_unit else desk.unit.name.lower()
-        measurements = [
-            m
-            for m in self.bench.measurements()
-            if m.points and unit in (None, m.header.unit.lower())
-        ][-_SHOWN:]
-        known: Mapping[int, Mapping[str, Any]] = {}
-        if measurements:
+        unit = None if desk.unit is None or self._every_unit else desk.unit.name
+        self._rows, self._trends = [], []
+        if not desk.db.exists():
+            return
+        try:
             with Store(desk.db, read_only=True) as store:
-                known = estimates_in_force(store, measurements)
-        self._rows = [measurement_row(m, known.get(m.id, {})) for m in measurements]
+                lines = store.lines(unit, last=_SHOWN, with_points=True)
+                self._rows = [measurement_row(line) for line in lines]
+        except LashbenchError as error:
+            self.bench.show_error("The history cannot be read", error)
+        self._trends = [line for line in trend_lines(Trends(self._rows).rows()) if line]
+
+    def _correct(self, measurement: int, person: str, changes: dict[str, str]) -> None:
+        from daq.store import Store
+
+        try:
+            with Store(self.desk.db) as store:
+                done = store.correct(measurement, person, changes)
+        except LashbenchError as error:
+            self.bench.show_error("Nothing was corrected", error)
+            return
+        names = ", ".join(one.field for one in done)
+        self.notify(f"corrected: {names}" if done else "nothing was to be corrected")
+        self.arrive()
+        self.show()
+
+    def _trail(self, row: dict[str, Any]) -> list[str]:
+        """The audit trail of a session."""
+        from daq.store import Store
+
+        if not row["corrections"]:
+            return [f"#{row['id']}: nothing was corrected"]
+        try:
+            with Store(self.desk.db, read_only=True) as store:
+                trail = store.corrections(row["id"])
+        except LashbenchError as error:
+            return [str(error)]
+        return [f"#{row['id']}: {correction_words(one)}" for one in trail]
 
     def _fill(self) -> None:
         table = self.query_one("#sessions", Table)
@@ -196,10 +257,11 @@ contribution ratio of every estimated session with its error bar. U lists all un
     def _cells(self, row: dict[str, Any]) -> list[str]:
         def shown(name: str, digits: int) -> str:
             number = row[name]
-            return (
-                "-" if not number else f"{number['value']:.{digits}f}+-{number['std']:.{digits}f}"
-            )
+            if number:
+                return f"{number['value']:.{digits}f}+-{number['std'] or 0.0:.{digits}f}"
+            return row["answer"]["state"] if said and name == "contribution_ratio" else "-"
 
+        said = row["estimate"] is not None or row["diagnosis"] is not None
         mark = "*" if row["id"] in self._marked else ""
         view = ">" if row["id"] == self.desk.measurement else ""
         unit = f"{row['unit']} {row['serial']}".strip() + (" SIM." if row["simulated"] else "")
@@ -216,10 +278,14 @@ contribution ratio of every estimated session with its error bar. U lists all un
         ]
 
     def _under_cursor(self) -> int | None:
+        row = self._row_under_cursor()
+        return None if row is None else int(row["id"])
+
+    def _row_under_cursor(self) -> dict[str, Any] | None:
         table = self.query_one("#sessions", Table)
         newest_first = self._rows[::-1]
         if 0 <= table.cursor_row < len(newest_first):
-            return int(newest_first[table.cursor_row]["id"])
+            return newest_first[table.cursor_row]
         return None
 
     def _draw_trend(self) -> None:
@@ -243,9 +309,14 @@ contribution ratio of every estimated session with its error bar. U lists all un
             lines.append(f"REPORT: {results.report.name} in {results.report.parent}")
         if "report" in results.faults:
             lines.append(f"NO REPORT: {results.faults['report']}")
+        row = self._row_under_cursor()
+        if row is not None and self._audit:
+            return [*lines, *self._trail(row)]
+        if row is not None:
+            lines += [f"#{row['id']}: {words}" for words in answer_words(row)]
         if not self.has_class("-overlay"):
             lines.append(_TREND_WORDS)
-        lines += [line for line in trend_lines(trend_rows(self._rows)) if line]
-        if not any(row["contribution_ratio"] for row in self._rows):
+        lines += self._trends
+        if not any(row["answer"]["state"] != "none" for row in self._rows):
             lines.append("no session is estimated yet: open one with Enter")
         return lines
