@@ -167,12 +167,12 @@ def _plain(path: Path, error: DBAPIError | sqlite3.Error) -> LashbenchError:
 
 
 def _check_place(path: Path, *, create: bool, read_only: bool) -> bool:
-    if path.is_dir():
+    if os.path.isdir(path):
         raise InputError(f"{path}: is a directory; give the file of a history")
     try:
-        if path.exists() and not path.is_file():
+        if os.path.exists(path) and not os.path.isfile(path):
             raise InputError(f"{path}: is not a regular file; give the file of a history")
-        if path.is_file() and path.stat().st_size > 0:
+        if os.path.isfile(path) and path.stat().st_size > 0:
             with path.open("rb") as file:
                 if file.read(len(_MAGIC)) != _MAGIC:
                     raise FileFormatError(f"{path}: is not a history (no SQLite file)")
@@ -184,7 +184,7 @@ def _check_place(path: Path, *, create: bool, read_only: bool) -> bool:
         raise InputError(f"{path}: may not be used ({error.strerror or error})") from error
     if not create:
         raise InputError(f"{path}: there is no history; measure first, or give its file")
-    if not path.parent.is_dir():
+    if not os.path.isdir(path.parent):
         raise InputError(f"{path}: there is no directory {path.parent}; make it first")
     return False
 
@@ -208,7 +208,7 @@ def _check_content(engine: sa.Engine, path: Path, *, create: bool, read_only: bo
     with engine.connect() as connection:
         # First: a check evaluates what the layout says.
         version = schema_version(connection, str(path))
-        if not path.exists() or path.stat().st_size <= _CHECKED_BYTES:
+        if not os.path.exists(path) or path.stat().st_size <= _CHECKED_BYTES:
             fault = connection.exec_driver_sql("PRAGMA quick_check(1)").scalar_one()
         else:
             fault = _length_fault(connection, path)
@@ -237,6 +237,6 @@ def _length_fault(connection: sa.Connection, path: Path) -> str:
         int(connection.exec_driver_sql(f"PRAGMA {name}").scalar_one())
         for name in ("page_count", "page_size")
     )
-    if not log_of(path).exists() and path.stat().st_size < pages * size:
+    if not os.path.exists(log_of(path)) and path.stat().st_size < pages * size:
         return f"{path.stat().st_size} bytes of {pages * size}"
     return "ok"

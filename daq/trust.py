@@ -81,7 +81,7 @@ def own_folder(folder: Path) -> Path:
     """The folder, made if it is not there; a fresh one if others may write there."""
     with suppress(OSError):
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    if not folder.exists():
+    if not os.path.exists(folder):
         return folder
     fault = distrust(folder)
     if fault is None:

@@ -15,6 +15,7 @@ if __name__ == "__main__":
 
     sys.exit(begin())
 
+import errno
 import logging
 import sys
 import traceback
@@ -59,6 +60,16 @@ _EPILOGUE = (
     "--log-level debug|info|warning|error (write the log file)."
 )
 _USAGE = 2
+_OF_THE_SYSTEM = {
+    errno.ENAMETOOLONG: ("give a shorter name", _USAGE),
+    errno.ENOSPC: ("make room", 1),
+    errno.EDQUOT: ("make room", 1),
+    errno.EFBIG: ("make room", 1),
+    errno.EROFS: ("give a place that can be written", _USAGE),
+    errno.EIO: ("the disk fails; look at the system's log", 1),
+}
+"""What to do, and the exit code, where the system refuses something to do with a file."""
+
 _LOG = logging.getLogger("lashbench.command")
 
 
@@ -169,6 +180,11 @@ def _verdict(error: BaseException, words: list[str]) -> tuple[str, int]:
     if isinstance(error, CycloptsError):
         verb = f"{words[0]} " if words and words[0] in VERBS else ""
         return f"{_usage(error).rstrip('. ')}; see lashbench {verb}--help", _USAGE
+    if isinstance(error, OSError) and error.errno in _OF_THE_SYSTEM:
+        # Whatever a floor below did not expect of files: the disk, or a name.
+        remedy, code = _OF_THE_SYSTEM[error.errno]
+        place = f"{error.filename}: " if error.filename else ""
+        return f"{place}{error.strerror}; {remedy}", code
     return f"internal error: {type(error).__name__}: {error}; run with --debug and report it", 1
 
 

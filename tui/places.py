@@ -31,7 +31,7 @@ def history_path(given: Path | None, *, create: bool = False) -> Path:
     from platformdirs import user_data_path
 
     if given is not None:
-        if create and not given.parent.is_dir():
+        if create and not os.path.isdir(given.parent):
             raise InputError(f"{given}: there is no directory {given.parent}; make it first")
         return given
     folder = user_data_path("lashbench", appauthor=False)

@@ -9,6 +9,7 @@ takes half of a file.
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 from pathlib import Path
 
@@ -97,7 +98,7 @@ def check_writable(path: str | Path) -> None:
 
 def _module(path: str | Path, known: dict[str, str], verb: str) -> str:
     suffix = Path(path).suffix.lower()
-    if suffix not in known and Path(path).is_dir():
+    if suffix not in known and os.path.isdir(path):
         raise InputError(f"{path}: is a directory; give a file")
     if suffix not in known:
         raise InputError(

@@ -24,6 +24,7 @@ fall on one.
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -238,7 +239,7 @@ def _chunks(text: str) -> Iterator[list[str]]:
 
 
 def _text(path: Path) -> str:
-    if path.is_dir():
+    if os.path.isdir(path):
         raise FileFormatError(f"{path}: is a directory; give a CSV file")
     try:
         content = read_bytes(path, _LIMIT_BYTES)

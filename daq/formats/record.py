@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -130,9 +131,9 @@ def checked_file(path: Path, kind: str) -> Path:
     FileFormatError
         If there is no file, it may not be read, or it is empty or absurdly large.
     """
-    if path.is_dir():
+    if os.path.isdir(path):
         raise FileFormatError(f"{path}: is a directory; give {kind}")
-    if path.exists() and not path.is_file():
+    if os.path.exists(path) and not os.path.isfile(path):
         raise FileFormatError(f"{path}: is not a regular file; give {kind}")
     try:
         with path.open("rb") as file:

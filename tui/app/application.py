@@ -8,6 +8,7 @@ under `analyses`, and a step's screen draws what the desk holds.
 from __future__ import annotations
 
 import logging
+import os
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import partial
@@ -347,7 +348,7 @@ class BenchApp(TerminalApp):
         """All measurements of the history, oldest first; none where there is no history yet."""
         from daq.store import Store
 
-        if not self.desk.db.exists():
+        if not os.path.exists(self.desk.db):
             return []
         try:
             with Store(self.desk.db, read_only=True) as store:

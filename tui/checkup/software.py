@@ -127,6 +127,6 @@ def _release(version: str) -> tuple[int, ...]:
 
 def _may_write(folder: Path) -> bool:
     """Whether files can be made in a folder, or the folder itself."""
-    while not folder.exists() and folder != folder.parent:
+    while not os.path.exists(folder) and folder != folder.parent:
         folder = folder.parent
     return folder.is_dir() and os.access(folder, os.W_OK | os.X_OK)

@@ -52,7 +52,7 @@ def check_folders() -> Iterator[Finding]:
     }
     for name, (place, variable, loss) in places.items():
         fault = _fault(place)
-        if fault is None and name == "cache" and place.exists():
+        if fault is None and name == "cache" and os.path.exists(place):
             fault = distrust(place)
         if fault is None:
             yield passed(name, str(place))
@@ -63,9 +63,9 @@ def check_folders() -> Iterator[Finding]:
 def _fault(place: Path) -> str | None:
     """Why a file or folder cannot be written, or made; None where it can."""
     standing = place
-    while not standing.exists() and standing != standing.parent:
+    while not os.path.exists(standing) and standing != standing.parent:
         standing = standing.parent
-    if standing != place and not standing.is_dir():
+    if standing != place and not os.path.isdir(standing):
         return f"{place}: {standing} is a file"
     needed = os.W_OK | (os.X_OK if standing.is_dir() else os.R_OK)
     if not os.access(standing, needed):
