@@ -11,11 +11,15 @@ from __future__ import annotations
 
 import os
 import threading
+import time
 from pathlib import Path
 
 from daq.errors import MeasurementError
 
 __all__ = ["Flusher"]
+
+_SLOW_S = 30.0
+"""A disk that takes longer for one flush is told: what is committed meanwhile is in memory only."""
 
 
 class Flusher:
@@ -32,6 +36,7 @@ class Flusher:
         self._wanted = threading.Event()
         self._closing = False
         self._fault: OSError | None = None
+        self._since_s: float | None = None
         self._thread: threading.Thread | None = None
 
     def soon(self) -> None:
@@ -40,7 +45,7 @@ class Flusher:
         Raises
         ------
         MeasurementError
-            If an earlier flush failed.
+            If an earlier flush failed, or does not return.
         """
         self._complain()
         if self._thread is None:
@@ -68,7 +73,9 @@ class Flusher:
             self._wanted.clear()
             # Read before the flush: what comes during it needs another.
             is_last = self._closing
+            self._since_s = time.monotonic()
             self._flush()
+            self._since_s = None
             if is_last:
                 return
 
@@ -89,6 +96,12 @@ class Flusher:
             os.close(handle)
 
     def _complain(self) -> None:
+        since_s = self._since_s
+        if since_s is not None and time.monotonic() - since_s > _SLOW_S:
+            raise MeasurementError(
+                f"{self._path}: the disk has not confirmed data for {_SLOW_S:g} s; what was "
+                "committed meanwhile may not outlive a power cut, look at its disk or network"
+            )
         if self._fault is not None:
             raise MeasurementError(
                 f"{self._path}: the disk refused the data ({self._fault.strerror}); what was "

@@ -6,7 +6,9 @@ does to itself (signals, disk, clock) is `fault_child`'s part.
 
 from __future__ import annotations
 
+import os
 import random
+import signal
 import socket
 import sqlite3
 import threading
@@ -18,6 +20,7 @@ from pathlib import Path
 from fault_bench import Child, Served
 from fault_cases import Case
 from fault_child import BUSY_S
+from frozen_files import Freezer
 
 from daq.store import Store
 
@@ -54,6 +57,8 @@ class Beside:
         self._delay_s = case.delay_s
         self._chance = random.Random(case.seed)
         self._over = threading.Event()
+        self.child: Child | None = None
+        self.freezer: Freezer | None = None
         acts: dict[str, Callable[[], None]] = {
             "unplugged": self._unplug,
             "intruder": self._meddle,
@@ -61,7 +66,10 @@ class Beside:
             "held-briefly": lambda: self._hold(BUSY_S * 0.3),
             "held-long": lambda: self._hold(BUSY_S * 4.0),
             "reader": self._read,
+            "frozen": self._freeze,
+            "frozen-sigterm": self._freeze,
         }
+        self._signals = case.disturbance == "frozen-sigterm"
         self._act = acts.get(case.disturbance or "")
 
     @contextmanager
@@ -81,6 +89,15 @@ class Beside:
     def _unplug(self) -> None:
         assert self._served is not None
         self._served.unplug()
+
+    def _freeze(self) -> None:
+        """Nothing in the folder answers; a signal comes a little later, or not at all."""
+        assert self.freezer is not None
+        time.sleep(self._delay_s)
+        self.freezer.freeze()
+        if self._signals and self.child is not None and not self._over.wait(0.3):
+            with suppress(OSError):
+                os.kill(self.child.pid, signal.SIGTERM)
 
     def _meddle(self) -> None:
         """Another program says this and that, over the raw wire."""

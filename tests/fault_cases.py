@@ -25,6 +25,14 @@ DISTURBANCES = {
     "kill": "kill -9 of the program",
     "kill-both": "kill -9 of the program and of its watchdog",
     "suspend": "SIGSTOP, and SIGCONT a while later",
+    "stopped": "SIGSTOP, and SIGCONT when the watchdog took over",
+    "watchdog": "kill -9 of the watchdog",
+    "birth": "`daq` and `numpy.py` in the working directory and on PYTHONPATH; kill -9",
+    "frozen": "the file system of the database does not answer any more",
+    "frozen-sigterm": "the same, and SIGTERM",
+    "lock-link": "a link to somebody's file lies in place of the lock",
+    "lock-foreign": "somebody's file lies in place of the lock",
+    "foreign-cache": "others may write into the cache folder, and did",
     "full-disk": "the disk is full (a small tmpfs; a file size limit where none can be mounted)",
     "file-limit": "a limit on the size of files (RLIMIT_FSIZE)",
     "read-only": "the database may suddenly not be written",
@@ -36,7 +44,7 @@ DISTURBANCES = {
     "unplugged": "the wire is gone for good until the next start",
     "intruder": "another program talks to the instrument in between",
 }
-NEEDS_WIRE = {"kill", "kill-both", "unplugged", "intruder"}
+NEEDS_WIRE = {"kill", "kill-both", "birth", "stopped", "watchdog", "unplugged", "intruder"}
 """What makes no sense where instrument and program are one process."""
 
 RUNS_INTO_TIME_LIMITS = ("silence", "slow-reply", "lost-power", "adapter-reset")

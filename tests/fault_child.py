@@ -13,6 +13,7 @@ import random
 import resource
 import shutil
 import signal
+import socket
 import sys
 import threading
 import time
@@ -25,6 +26,7 @@ from typing import Any
 import numpy as np
 from fake_analyser import known_gain
 from fault_cases import LEVELS_VPK, POINTS, Case
+from frozen_files import hold
 
 from daq.control import SessionControl
 from daq.errors import LashbenchError
@@ -41,12 +43,16 @@ from tui.measure_options import PlanOptions, session_request
 from tui.signals import listening
 
 BUSY_S = 1.0
+SOCKET = "freezer"
+"""Where a program hands its file system over to whoever may freeze it."""
 _SIGNALS = {
     "sigint": signal.SIGINT,
     "sigterm": signal.SIGTERM,
     "sighup": signal.SIGHUP,
     "kill": signal.SIGKILL,
+    "birth": signal.SIGKILL,
     "suspend": signal.SIGSTOP,
+    "stopped": signal.SIGSTOP,
 }
 
 
@@ -87,8 +93,9 @@ def measure(pipe: Any, url: str, db: str, resume: int, case: Case, plain: bool) 
     """Run one session; `plain` ones go without the case's disturbance."""
     shorten_waits()
     disturbance = None if plain else case.disturbance
-    pipe.send(("started", os.getpid()))
     place = Path(db)
+    surround(disturbance, place.parent)
+    pipe.send(("started", os.getpid()))
     if disturbance == "full-disk":
         small_disk(place.parent)
     trouble = Trouble(disturbance, case, place, pipe)
@@ -127,6 +134,28 @@ def measure(pipe: Any, url: str, db: str, resume: int, case: Case, plain: bool) 
     verdict["struck"] = board is not None and any(fault.struck for fault in board.faults)
     pipe.send(("ended", verdict))
     pipe.close()
+
+
+def surround(disturbance: str | None, folder: Path) -> None:
+    """What the program finds about it when it begins."""
+    if disturbance in ("frozen", "frozen-sigterm"):
+        with socket.socket(socket.AF_UNIX) as wire:
+            wire.connect(str(folder / SOCKET))
+            hold(wire)
+    elif disturbance == "birth":
+        beside = folder / "beside"
+        (beside / "daq").mkdir(parents=True)
+        for place in (beside / "daq" / "__init__.py", beside / "numpy.py"):
+            place.write_text("raise SystemExit('not the one')", encoding="ascii")
+        os.chdir(beside)
+        os.environ["PYTHONPATH"] = f".{os.pathsep}{beside}"
+    elif disturbance == "foreign-cache":
+        cache = folder / "cache" / "lashbench"
+        cache.mkdir(parents=True)
+        for place in (cache.parent, cache):
+            place.chmod(0o777)
+        (cache / "index.code").write_bytes(b"not the one")
+        os.environ["XDG_CACHE_HOME"] = str(cache.parent)
 
 
 def _told(event: PointStored) -> tuple[int, float, float, complex, int]:
@@ -209,6 +238,7 @@ class Trouble:
             "file-limit": self._limit,
             "read-only": forbid_writing,
             "kill-both": self._kill_both,
+            "watchdog": self._kill_watchdog,
         }
         if number := _SIGNALS.get(self._name):
             acts[self._name] = lambda: os.kill(os.getpid(), number)
@@ -222,9 +252,12 @@ class Trouble:
         timer.daemon = True
         timer.start()
 
-    def _kill_both(self) -> None:
+    def _kill_watchdog(self) -> None:
         for child in children_of(os.getpid()):
             os.kill(child, signal.SIGKILL)
+
+    def _kill_both(self) -> None:
+        self._kill_watchdog()
         os.kill(os.getpid(), signal.SIGKILL)
 
     def _fill(self) -> None:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 import random
 import signal
+import socket
 import tempfile
 import time
 from contextlib import ExitStack, suppress
@@ -23,6 +24,7 @@ import fault_child
 from fault_bench import Child, Programs, Served
 from fault_beside import Beside
 from fault_cases import LEVELS_VPK, POINTS, Case
+from frozen_files import Freezer, freezer_of
 
 from daq.bench_lock import BenchLock
 from daq.errors import LashbenchError
@@ -36,7 +38,11 @@ LASTING_END_S = 240.0
 """The same where the fault strikes at every reply: each is waited for, and none for ever."""
 OFF_S = 60.0
 """Bound from the end of a killed program to the source off and the bench free again."""
+DIES = ("kill", "kill-both", "birth", "stopped")
+"""Disturbances after which a program may end without a word: a stopped one may be ended by its
+watchdog, where it keeps the wire."""
 SPOILS = int(PointFlag.OVERLOAD | PointFlag.SPOILT)
+_COLLEAGUES = b"This is a colleague's.\n"
 _RESUMES = 3
 """Sessions within which a measurement must be complete once everything is mended; a starved
 machine may lose one to a time-out."""
@@ -65,6 +71,8 @@ class Outcome:
     """How much of that the program, or the instrument, was ready and got no processor."""
     off_after_s: float | None = None
     """From the end of the program to the source off; None if it was cut off from it."""
+    stopped_s: float | None = None
+    """From the stop of the program to the source off by its watchdog."""
     wrongs: list[str] = field(default_factory=list)
 
 
@@ -97,6 +105,7 @@ class Run:
         self._folder = folder
         self.instrument, self._board = fault_child.instrument_of(case.fault)
         self._served: Served | None = None
+        self._freezer: Freezer | None = None
         self.outcome = Outcome(case)
 
     def wrong(self, what: str) -> None:
@@ -113,27 +122,34 @@ class Run:
                 self._db = self._folder / "bench.db"
             self.judge_end(child)
             self.judge_points(child.measurement, child.told)
+            self._mend_lock()
             self._resume(child)
         finally:
+            if self._freezer is not None:
+                self._freezer.end()
             if self._served is not None:
                 self._served.unplug()
 
     # ------------------------------------------------------------ the disturbed session
 
     def _first(self) -> Child:
-        child = self._start(0, plain=False)
+        self._spoil_lock()
+        child = self._started_held() if "frozen" in self._kind else self._start(0, plain=False)
         bound_s = LASTING_END_S if "times=0" in (self._case.fault or "") else END_S
         watch, struck = Stopwatch(child, self._served), False
         beside = Beside(
             self._case, self._db, self._served, lambda: self._start(0, plain=True), self.wrong
         )
+        beside.child, beside.freezer = child, self._freezer
         with ExitStack() as stack:
             while child.listen(0.05):
                 if not struck and child.measurement and len(child.told) >= self._case.after:
                     struck = True
                     stack.enter_context(beside.going_on())
                 if self._case.disturbance == "suspend":
-                    self._wake(child)
+                    self._wake(child, self._chance.choice((0.1, 0.5, 2.5)))
+                if self._kind == "stopped":
+                    self._wake_late(child, watch)
                 if child.verdict is not None:
                     break
                 if watch.own_s() > bound_s:
@@ -141,20 +157,80 @@ class Run:
                     break
             self.outcome.elapsed_s, self.outcome.starved_s = watch.elapsed_s(), watch.starved_s
         child.end()
-        if child.verdict is None and self._case.disturbance not in ("kill", "kill-both"):
+        if self._freezer is not None:
+            self._freezer.thaw()
+        if child.verdict is None and self._kind not in DIES:
             self.wrong("ended without a word")
         return child
+
+    @property
+    def _kind(self) -> str:
+        return self._case.disturbance or ""
+
+    def _started_held(self) -> Child:
+        """A program whose file system can be frozen."""
+        with socket.socket(socket.AF_UNIX) as gate:
+            gate.bind(str(self._folder / fault_child.SOCKET))
+            gate.listen(1)
+            gate.settimeout(60.0)
+            child = self._start(0, plain=False)
+            wire, _ = gate.accept()
+            with wire:
+                self._freezer = freezer_of(wire, self._folder)
+        return child
+
+    def _spoil_lock(self) -> None:
+        """Something of a colleague's lies where the lock goes."""
+        self._lock = self._db.with_name(self._db.name + "-lock")
+        self._colleagues = self._folder / "colleagues.txt"
+        self._colleagues.write_bytes(_COLLEAGUES)
+        if self._kind == "lock-link":
+            self._lock.symlink_to(self._colleagues)
+        elif self._kind == "lock-foreign":
+            self._lock.write_bytes(_COLLEAGUES)
+
+    def _mend_lock(self) -> None:
+        if self._colleagues.read_bytes() != _COLLEAGUES:
+            self.wrong("a colleague's file was written over")
+        if self._kind not in ("lock-link", "lock-foreign"):
+            return
+        if self._lock.is_symlink() != (self._kind == "lock-link"):
+            self.wrong("what lay in place of the lock was replaced")
+        elif self._lock.read_bytes() != _COLLEAGUES:
+            self.wrong("what lay in place of the lock was written over")
+        if self.outcome.code != 2:
+            self.wrong(f"something in place of the lock gave {self.outcome.code}")
+        self._lock.unlink(missing_ok=True)
 
     def _start(self, resume: int, *, plain: bool) -> Child:
         url = "sim:" if self._served is None else self._served.url
         return self._programs.start(url, str(self._db), resume, self._case, plain)
 
-    def _wake(self, child: Child) -> None:
-        with suppress(OSError):
-            state = Path(f"/proc/{child.pid}/stat").read_text(encoding="ascii").split()[2]
-            if state == "T":
-                time.sleep(self._chance.choice((0.1, 0.5, 2.5)))
+    def _wake(self, child: Child, after_s: float) -> None:
+        if self._is_stopped(child):
+            time.sleep(after_s)
+            with suppress(OSError):
                 os.kill(child.pid, signal.SIGCONT)
+
+    def _wake_late(self, child: Child, watch: Stopwatch) -> None:
+        """Once the watchdog has switched the source off, which it must."""
+        if not self._is_stopped(child):
+            return
+        began, drove = time.monotonic(), self._drives()
+        while self._drives() and time.monotonic() - began < OFF_S:
+            time.sleep(0.02)
+        if self._drives() and not self.instrument.damage.dead:
+            self.wrong(f"the source still drives {OFF_S:g} s after the program was stopped")
+        self.outcome.stopped_s = time.monotonic() - began if drove else None
+        watch.leave_out(time.monotonic() - began)
+        self._wake(child, 0.5)
+
+    @staticmethod
+    def _is_stopped(child: Child) -> bool:
+        with suppress(OSError):
+            place = Path(f"/proc/{child.pid}/stat")
+            return place.read_text(encoding="ascii").rsplit(")", 1)[1].split()[0] == "T"
+        return False
 
     # ------------------------------------------------------------ judging
 
@@ -213,8 +289,10 @@ class Run:
         verdict = child.verdict
         self.outcome.fault_struck = faults or (verdict is not None and verdict["struck"])
         came = child.measurement > 0 and len(child.told) >= self._case.after
-        dies = self._case.disturbance in ("kill", "kill-both")
+        dies = self._kind in ("kill", "kill-both", "birth")
         self.outcome.disturbed = came and not (dies and verdict is not None)
+        if self._kind in ("lock-link", "lock-foreign", "foreign-cache"):
+            self.outcome.disturbed = True
 
     def judge_points(self, measurement: int, told: list[Any]) -> None:
         if not measurement:
@@ -287,6 +365,7 @@ class Stopwatch:
         self._began = time.monotonic()
         self._last = [part.starved_s() for part in self._parts]
         self._waited = [0.0] * len(self._parts)
+        self._left_out_s = 0.0
 
     def elapsed_s(self) -> float:
         """By the clock."""
@@ -304,7 +383,11 @@ class Stopwatch:
             # What ends takes its account with it.
             self._waited[number] += max(0.0, waited - self._last[number])
             self._last[number] = waited
-        return self.elapsed_s() - self.starved_s
+        return self.elapsed_s() - self.starved_s - self._left_out_s
+
+    def leave_out(self, seconds: float) -> None:
+        """Time in which the program was kept from running on purpose."""
+        self._left_out_s += seconds
 
 
 def _same(one: complex, other: complex) -> bool:

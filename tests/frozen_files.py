@@ -52,6 +52,13 @@ def can_be_held() -> bool:
 
 def run_held(channel: int, command: list[str]) -> None:
     """Become a program whose calls go through the supervisor at the other end of a socket."""
+    with socket.socket(fileno=channel) as wire:
+        hold(wire)
+    os.execvp(command[0], command)
+
+
+def hold(wire: socket.socket) -> None:
+    """From now on the calls of this thread, and of all it starts, go through the supervisor."""
     libc = ctypes.CDLL(None, use_errno=True)
     numbers = sorted(set(_CALLS[platform.machine()].values()))
     jumps = [
@@ -70,7 +77,6 @@ def run_held(channel: int, command: list[str]) -> None:
     program = struct.pack("HxxxxxxP", len(code) // 8, ctypes.addressof(text))
     if libc.prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0):
         sys.exit("prctl")
-    wire = socket.socket(fileno=channel)
     # Sent by a thread that the filter does not hold, which comes before it.
     listener: list[int] = []
     installed = threading.Event()
@@ -90,8 +96,6 @@ def run_held(channel: int, command: list[str]) -> None:
     installed.set()
     thread.join()
     os.close(found)
-    wire.close()
-    os.execvp(command[0], command)
 
 
 class Freezer:
@@ -105,6 +109,7 @@ class Freezer:
         self._held: list[int] = []
         self._lock = threading.Lock()
         self._over = False
+        self._only: tuple[str, ...] = ()
         self.thread = threading.Thread(target=self._serve, daemon=True)
         self.thread.start()
 
@@ -114,8 +119,9 @@ class Freezer:
         with self._lock:
             return len(self._held)
 
-    def freeze(self) -> None:
-        """From now on nothing in the folder answers."""
+    def freeze(self, *names: str) -> None:
+        """From now on nothing in the folder answers, or none of the calls that are named."""
+        self._only = names
         self._frozen.set()
 
     def thaw(self) -> None:
@@ -162,6 +168,8 @@ class Freezer:
 
     def _is_inside(self, process: int, number: int, arguments: tuple[int, ...]) -> bool:
         name = self._names[number]
+        if self._only and name not in self._only:
+            return False
         with suppress(OSError):
             if name in _BY_PATH:
                 with open(f"/proc/{process}/mem", "rb", buffering=0) as memory:
@@ -171,6 +179,12 @@ class Freezer:
                 path = os.readlink(f"/proc/{process}/fd/{arguments[0]}")
             return path.startswith(self._folder)
         return False
+
+
+def freezer_of(wire: socket.socket, folder: Path) -> Freezer:
+    """What freezes the files of the program at the other end, which is about to `hold`."""
+    _, rights, _, _ = wire.recvmsg(1, socket.CMSG_SPACE(4))
+    return Freezer(folder, array.array("i", rights[0][2])[0])
 
 
 @contextmanager
@@ -183,9 +197,8 @@ def started(command: list[str], folder: Path, **options):
         [sys.executable, "-c", launcher, *command], pass_fds=(far.fileno(),), **options
     )
     far.close()
-    _, rights, _, _ = near.recvmsg(1, socket.CMSG_SPACE(4))
+    freezer = freezer_of(near, folder)
     near.close()
-    freezer = Freezer(folder, array.array("i", rights[0][2])[0])
     try:
         yield process, freezer
     finally:

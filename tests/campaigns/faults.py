@@ -103,6 +103,7 @@ def table(outcomes: Sequence[Outcome], seed: int, repeated: int) -> list[str]:
     """What came of it, one row for each fault and each disturbance."""
     wires = Counter(outcome.case.wire for outcome in outcomes)
     broken = sum(bool(outcome.wrongs) for outcome in outcomes)
+    stopped = [o.stopped_s for o in outcomes if o.stopped_s is not None]
     off = [o.off_after_s for o in outcomes if o.off_after_s is not None]
     lines = [
         f"{len(outcomes)} runs, seed {seed}; "
@@ -111,7 +112,8 @@ def table(outcomes: Sequence[Outcome], seed: int, repeated: int) -> list[str]:
         f"{max(o.elapsed_s for o in outcomes):.0f} s by the clock, "
         f"{max(o.elapsed_s - o.starved_s for o in outcomes):.0f} s without the waiting for a "
         f"processor. Longest time from the end of the program "
-        f"to the source off: {max(off, default=0.0):.1f} s. Measurements that one further session "
+        f"to the source off: {max(off, default=0.0):.1f} s, from its stop: "
+        f"{max(stopped, default=0.0):.1f} s. Measurements that one further session "
         f"did not complete, two or three did: {sum(o.resumes > 1 for o in outcomes)}.",
         "",
         "| what went wrong | runs | struck | complete | ended early, by exit code | source said "

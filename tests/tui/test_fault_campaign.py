@@ -1,4 +1,4 @@
-"""Nine runs of the fault campaign; `make faults` runs hundreds."""
+"""Fourteen runs of the fault campaign; `make faults` runs hundreds."""
 
 from concurrent.futures import ThreadPoolExecutor
 from itertools import chain
@@ -31,6 +31,11 @@ KINDS = (
     ("tcp", None, "read-only"),
     ("loopback", None, "held-briefly"),
     ("tcp", None, "intruder"),
+    ("tcp", None, "birth"),
+    ("tcp", None, "watchdog"),
+    ("loopback", None, "frozen-sigterm"),
+    ("loopback", None, "lock-link"),
+    ("tcp", None, "foreign-cache"),
     ("ar488_pty", "truncated-block:phase=read-out,point=2", None),
     ("tcp", "dropped-connection:phase=sweep,point=5", None),
     ("loopback", "hardware-error:phase=sweep,point=9", None),
@@ -64,6 +69,11 @@ def test_what_was_meant_to_go_wrong_did(outcomes):
         assert struck, outcome.case
     by_kind = {(o.case.wire, o.case.fault_name, o.case.disturbance): o.code for o in outcomes}
     assert by_kind["tcp", None, "sigint"] == 130
+    assert by_kind["tcp", None, "birth"] is None
+    assert by_kind["tcp", None, "watchdog"] == 0
+    assert by_kind["loopback", None, "frozen-sigterm"] == 130
+    assert by_kind["loopback", None, "lock-link"] == 2
+    assert by_kind["tcp", None, "foreign-cache"] == 0
     assert by_kind["prologix_tcp", None, "kill"] is None
     assert by_kind["loopback", None, "full-disk"] == 1
     assert by_kind["tcp", None, "read-only"] == 2

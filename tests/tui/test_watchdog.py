@@ -123,6 +123,24 @@ def test_a_watchdog_that_dies_is_replaced_and_it_is_said(db):
     assert notes(db, "warning") == ["the watchdog ended (signal 9); another one was started"]
 
 
+@pytest.mark.slow
+def test_a_watchdog_that_stands_still_is_replaced(db):
+    instrument = linear_analyser(known_gain)
+    with served(instrument) as url, measuring(url, db) as process:
+        wait_for(lambda: drives(instrument))
+        (first,) = watchdogs_of(process.pid)
+        os.kill(first, signal.SIGSTOP)
+        wait_for(lambda: notes(db, "warning"))
+        assert first not in watchdogs_of(process.pid)
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert notes(db, "warning") == [
+        "the watchdog ended (no sign of life within 10 s); another one was started"
+    ]
+    assert source(db) is SourceState.CONFIRMED_OFF
+
+
 def test_without_a_sign_of_life_of_a_watchdog_nothing_is_driven(db):
     instrument = linear_analyser(known_gain)
     with served(instrument) as url, measuring(url, db) as process:
@@ -141,6 +159,7 @@ def test_without_a_sign_of_life_of_a_watchdog_nothing_is_driven(db):
     assert 2 <= len(seen) <= 4
 
 
+@pytest.mark.slow
 def test_a_session_that_stands_still_loses_the_bench_and_learns_it(db):
     instrument = linear_analyser(known_gain)
     with served(instrument) as url, measuring(url, db) as process:
@@ -161,6 +180,7 @@ def test_a_session_that_stands_still_loses_the_bench_and_learns_it(db):
     assert kept <= points(db) <= kept + 1
 
 
+@pytest.mark.slow
 def test_a_session_that_stands_still_and_holds_the_only_wire_is_ended(db):
     instrument = linear_analyser(known_gain)
     with (
@@ -224,6 +244,7 @@ def one_at_a_time(url):
 
 
 @needs_holding
+@pytest.mark.slow
 @pytest.mark.parametrize("told", [signal.SIGTERM, None])
 def test_a_history_that_stops_answering_holds_neither_source_nor_signal(tmp_path, told):
     folder = tmp_path / "share"
@@ -255,6 +276,31 @@ def test_a_history_that_stops_answering_holds_neither_source_nor_signal(tmp_path
     (note,) = notes(db, "watchdog")
     assert note.startswith("the session ended, which its history did not take then")
     assert ("interrupted by SIGTERM" if told else "does not answer") in note
+
+
+@needs_holding
+@pytest.mark.slow
+def test_a_disk_that_confirms_nothing_ends_it(tmp_path):
+    """Commits go on, into memory; a power cut would take them all."""
+    folder = tmp_path / "share"
+    folder.mkdir()
+    db = folder / "bench.db"
+    instrument = linear_analyser(known_gain)
+    long = [word for level in ("1.5", "1", "0.5") for word in ("--level", level)]
+    with (
+        served(instrument) as url,
+        started(
+            [LASHBENCH, *words(url, db), *long], folder,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        ) as (process, freezer),
+    ):  # fmt: skip
+        wait_for(lambda: drives(instrument))
+        freezer.freeze("fsync")
+        _, said = process.communicate(timeout=120)
+        assert not drives(instrument)
+    assert process.returncode == 1
+    assert "bench.db-wal: the disk has not confirmed data for 30 s" in said
+    assert source(db) is SourceState.CONFIRMED_OFF
 
 
 LOADED_LATER = """
