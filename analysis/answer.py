@@ -6,9 +6,10 @@ Owns the choice between the plain model and an extended one, from the documents 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, TypeGuard
 
 __all__ = ["CALL_FOR_DIAGNOSIS", "QUANTITIES", "Answer", "State", "accept_model", "model_name"]
 
@@ -92,11 +93,11 @@ def accept_model(
     """
     if diagnosis is not None and "verdict" in diagnosis:
         return _of_diagnosis(diagnosis)
-    if estimate is None or estimate.get("contribution_ratio") is None:
+    numbers = {} if estimate is None else _numbers(estimate)
+    if estimate is None or "contribution_ratio" not in numbers:
         return Answer("none", "no estimate: none", {})
     if _refuted(estimate):
         return Answer("refuted", f"{PLAIN} refuted: none", {})
-    numbers = _numbers(estimate)
     model: dict[str, Any] = {"causes": [], "probability": None, **numbers}
     return Answer("not judged", f"{PLAIN}, not judged", numbers, (model,))
 
@@ -106,7 +107,7 @@ def _refuted(estimate: Mapping[str, Any]) -> bool:
     said = estimate.get("refuted")
     if said is not None:
         return bool(said)
-    return any(CALL_FOR_DIAGNOSIS in str(text) for text in estimate.get("warnings") or ())
+    return any(CALL_FOR_DIAGNOSIS in str(text) for text in _list(estimate.get("warnings")))
 
 
 def _of_diagnosis(diagnosis: Mapping[str, Any]) -> Answer:
@@ -114,17 +115,14 @@ def _of_diagnosis(diagnosis: Mapping[str, Any]) -> Answer:
     if word == "unexplained":
         source = f"{PLAIN} refuted, and no known cause explains the response: none"
         return Answer("refuted", source, {}, diagnosed=True)
-    models = tuple(
-        {"causes": one["causes"], "probability": one["probability"], **_numbers(one)}
-        for one in diagnosis.get("models") or ()
-    )
-    if word == "ambiguous":
+    models = tuple(filter(None, (_model(one) for one in _list(diagnosis.get("models")))))
+    if word not in ("consistent", "explained"):
         names = _and([model_name(model["causes"]) for model in models])
         source = f"undecided between {names}: none" if models else "undecided: none"
         return Answer("open", source, {}, models, diagnosed=True)
-    causes = [cause["effect"] for cause in diagnosis.get("causes") or ()]
-    source = f"extended by {' and '.join(causes)}" if causes else f"{PLAIN}, consistent"
-    ratio = (diagnosis.get("contribution_ratio") or {}).get("extended")
+    causes = [name for one in _list(diagnosis.get("causes")) if (name := _field(one, "effect"))]
+    source = f"extended by {' and '.join(map(str, causes))}" if causes else f"{PLAIN}, consistent"
+    ratio = _field(diagnosis.get("contribution_ratio"), "extended")
     numbers = _numbers({**diagnosis, "contribution_ratio": ratio})
     if numbers and not models:
         models = ({"causes": causes, "probability": None, **numbers},)
@@ -140,7 +138,39 @@ def _and(names: Sequence[str]) -> str:
     return " and ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
 
 
+def _model(document: Any) -> dict[str, Any] | None:
+    """One entry of ``models``; None where it is none: a history may hold anything."""
+    if not isinstance(document, Mapping):
+        return None
+    probability = document.get("probability")
+    return {
+        "causes": [str(name) for name in _list(document.get("causes"))],
+        "probability": probability if _is_number(probability) else None,
+        **_numbers(document),
+    }
+
+
 def _numbers(document: Mapping[str, Any]) -> dict[str, Number]:
-    """Those that are there; a value that is no number is null in a document."""
+    """Those that are there and are numbers; what is not finite is null in a document."""
     told = {name: document.get(name) for name in QUANTITIES}
-    return {name: one for name, one in told.items() if one and one.get("value") is not None}
+    return {name: one for name, one in told.items() if _is_uncertain(one)}
+
+
+def _is_uncertain(one: Any) -> TypeGuard[Number]:
+    if not isinstance(one, Mapping) or not _is_number(one.get("value")):
+        return False
+    interval, std = one.get("interval95"), one.get("std")
+    stated = interval is None or (len(_list(interval)) == 2 and all(map(_is_number, interval)))
+    return stated and "std" in one and (std is None or _is_number(std))
+
+
+def _is_number(one: Any) -> bool:
+    return isinstance(one, int | float) and not isinstance(one, bool) and math.isfinite(one)
+
+
+def _list(one: Any) -> Sequence[Any]:
+    return one if isinstance(one, list | tuple) else ()
+
+
+def _field(one: Any, name: str) -> Any:
+    return one.get(name) if isinstance(one, Mapping) else None

@@ -1,8 +1,12 @@
 """Which model's numbers are told, from the documents of an estimate and of a diagnosis."""
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from analysis.advice import advise
 from analysis.answer import QUANTITIES, accept_model
+from sim.unit import load_unit
 
 WARNED = ["the model leaves 5.4 standard deviations of the response unexplained; run diagnose "
           "before trusting the ratio"]  # fmt: skip
@@ -99,3 +103,36 @@ def test_an_estimate_that_fits_is_told_as_not_judged():
 def test_nothing_estimated_is_told_as_such(estimate):
     answer = accept_model(estimate)
     assert (answer.state, answer.numbers) == ("none", {})
+
+
+anything = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=5),
+    lambda inner: (
+        st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3)
+    ),
+    max_leaves=6,
+)
+numbers = st.fixed_dictionaries(
+    {}, optional={"value": anything, "std": anything, "interval95": anything}
+)
+fields = dict.fromkeys(QUANTITIES, numbers | anything) | {
+    "warnings": anything,
+    "refuted": anything,
+    "causes": anything | st.lists(st.fixed_dictionaries({"effect": anything}), max_size=2),
+}
+parts = st.fixed_dictionaries({}, optional=fields | {"probability": anything})
+diagnoses = st.fixed_dictionaries(
+    {
+        "verdict": st.sampled_from(["consistent", "explained", "ambiguous", "unexplained"])
+        | anything
+    },
+    optional=fields | {"models": anything | st.lists(parts | anything, max_size=3)},
+)
+
+
+@given(st.none() | parts, st.none() | diagnoses)
+def test_whatever_a_history_holds_it_is_an_answer_or_none(estimate, diagnosis):
+    answer = accept_model(estimate, diagnosis)
+    advice = advise(answer, load_unit("adss"))
+    assert advice.headline
+    assert "nan" not in " ".join(advice.lines())
