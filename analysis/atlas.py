@@ -28,7 +28,15 @@ from daq.formats.atomic import keeping
 from daq.trust import own_folder, read_own
 from sim.unit import Unit
 
-__all__ = ["Atlas", "atlas_name", "coarse_stride", "make_atlas", "simulate_atlas", "write_atlas"]
+__all__ = [
+    "Atlas",
+    "are_atlases_kept",
+    "atlas_name",
+    "coarse_stride",
+    "make_atlas",
+    "simulate_atlas",
+    "write_atlas",
+]
 
 Atlas = dict[tuple[str, ...], Population]
 """Populations by the effects of their hypothesis; no effect is the baseline."""
@@ -85,6 +93,12 @@ def make_atlas(
     return {key: _side_by_side([atlas[key] for atlas in made], places) for key in made[0]}
 
 
+def are_atlases_kept(unit: Unit, coarse: Observation, cache: Path, *, rare: bool) -> list[bool]:
+    """For each plan of a thinned observation, whether its atlas would be read, not simulated."""
+    names = [atlas_name(unit, part, rare) for part, _ in coarse.by_plan()]
+    return [_known(name, cache) is not None for name in names]
+
+
 def _find_or_make(
     unit: Unit,
     coarse: Observation,
@@ -95,14 +109,18 @@ def _find_or_make(
 ) -> Atlas:
     name = atlas_name(unit, coarse, rare)
     cache = None if cache is None else own_folder(cache)
-    if cache is not None and (known := _read(cache / name, read_own)) is not None:
-        return known
-    if (known := _read(atlas_folder() / name, Path.read_bytes)) is not None:
+    if (known := _known(name, cache)) is not None:
         return known
     atlas = simulate_atlas(unit, coarse, executor, progress, rare=rare)
     if cache is not None:
         write_atlas(cache / name, atlas)
     return atlas
+
+
+def _known(name: str, cache: Path | None) -> Atlas | None:
+    """An atlas that was kept in the cache or comes with lashbench."""
+    found = None if cache is None else _read(cache / name, read_own)
+    return _read(atlas_folder() / name, Path.read_bytes) if found is None else found
 
 
 def _part_of(

@@ -29,7 +29,7 @@ from daq.formats.atomic import keeping
 from daq.trust import own_folder, read_own
 from sim.unit import Unit
 
-__all__ = ["run_families", "run_name", "write_runs"]
+__all__ = ["are_kept", "run_families", "run_name", "write_runs"]
 
 _EDITION = 2
 """Counted up whenever the engine or the layout below change what is kept."""
@@ -86,6 +86,13 @@ def run_name(unit: Unit, family: Sequence[Machine], observation: Observation) ->
     known = [_EDITION, unit.physics, observation.sweeps(), machines]
     mark = hashlib.sha256(json.dumps(known, sort_keys=True).encode()).hexdigest()[:24]
     return f"runs-{mark}.npz"
+
+
+def are_kept(unit: Unit, family: Sequence[Machine], observation: Observation, cache: Path) -> bool:
+    """Whether the runs of a family would be read, and not simulated."""
+    kept = [folder for folder in (cache, _shipped()) if folder is not None]
+    name = run_name(unit, family, observation)
+    return _find(kept, name, (len(family), len(observation))) is not None
 
 
 def write_runs(stream: IO[bytes], readings: Readings) -> None:

@@ -7,25 +7,41 @@ starts from. It judges nothing; what it makes lies where both look for it.
 
 from __future__ import annotations
 
+import errno
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 
-from analysis.atlas import coarse_stride, make_atlas
+from analysis.atlas import are_atlases_kept, coarse_stride, make_atlas
 from analysis.estimate import free_axes
 from analysis.executor import Executor
 from analysis.lattice import every_family
-from analysis.library import run_families
+from analysis.library import are_kept, run_families
 from analysis.observation import Observation
 from analysis.progress import Progress, part_of
-from daq.errors import InputError
+from daq.errors import InputError, LashbenchError
 from daq.trust import distrust
 from sim.effort import counting
 from sim.unit import Unit
 
-__all__ = ["prepare_sweep"]
+__all__ = ["Prepared", "prepare_sweep"]
 
 _AT_ONCE = 8
 """Families that are simulated before they are kept: what is interrupted loses no more."""
+
+_ROOM_BYTES = 1 << 15
+"""Less than any file that is kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """What became of a preparation, in files: those needed, found at first, and kept at the end."""
+
+    simulated_s: float
+    """Seconds of motion that had to be simulated."""
+    needed: int
+    before: int
+    kept: int
 
 
 def prepare_sweep(
@@ -35,7 +51,7 @@ def prepare_sweep(
     *,
     executor: Executor | None = None,
     progress: Progress | None = None,
-) -> float:
+) -> Prepared:
     """Simulate and keep what depends on a unit and a sweep alone.
 
     What is kept already is left as it is, so that one that was interrupted goes on.
@@ -49,11 +65,13 @@ def prepare_sweep(
 
     Returns
     -------
-    float
-        Seconds of motion that had to be simulated.
+    Prepared
+        `kept` is less than `needed` where the disk refused some.
 
     Raises
     ------
+    LashbenchError
+        If there is no room to keep anything.
     InputError
         If nothing can be written into the folder, or others may write there.
     AnalysisError
@@ -61,8 +79,16 @@ def prepare_sweep(
     """
     _check_usable(cache)
     searched = unit.stages == 2
+    families = every_family(free_axes(unit), observation, seed=0)
+    coarse = observation.thinned(coarse_stride(observation))
+
+    def kept() -> list[bool]:
+        runs = [are_kept(unit, family, observation, cache) for family in families]
+        atlases = (are_atlases_kept(unit, coarse, cache, rare=rare) for rare in (False, True))
+        return runs + (sum(atlases, []) if searched else [])
+
+    before = kept()
     with counting() as effort:
-        families = every_family(free_axes(unit), observation, seed=0)
         share = 0.5 if searched else 1.0
         for first in range(0, len(families), _AT_ONCE):
             some = families[first : first + _AT_ONCE]
@@ -70,19 +96,23 @@ def prepare_sweep(
             tell = part_of(progress, share * low, share * high, "for the estimate")
             run_families(unit, some, observation, cache=cache, executor=executor, progress=tell)
         if searched:
-            coarse = observation.thinned(coarse_stride(observation))
             for rare, low, high in ((False, 0.5, 0.85), (True, 0.85, 1.0)):
                 tell = part_of(progress, low, high, "for the diagnosis")
                 make_atlas(unit, coarse, cache, executor, tell, rare=rare)
-    return effort.simulated_s
+    return Prepared(effort.simulated_s, len(before), sum(before), sum(kept()))
 
 
 def _check_usable(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
+        with tempfile.TemporaryFile(dir=folder) as probe:
+            probe.write(bytes(_ROOM_BYTES))
     except OSError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+            raise LashbenchError(
+                f"{folder}: nothing could be kept there ({error.strerror}), and nothing was "
+                "simulated; make room"
+            ) from error
         raise InputError(
             f"{folder}: cannot be written ({error.strerror or error}); "
             "set XDG_CACHE_HOME to a folder that can"

@@ -9,6 +9,7 @@ import analysis.preparation as module
 from analysis.atlas import coarse_stride, make_atlas
 from analysis.estimate import estimate_response
 from analysis.observation import USUAL_NOISE_V, observe, unread
+from daq.configs import config_path
 from daq.formats import read_response
 from daq.plan import SweepPlan
 from sim.unit import load_unit
@@ -67,7 +68,8 @@ def test_one_that_was_interrupted_goes_on(tmp_path, monkeypatch):
     left = module.prepare_sweep(ADSS, TINY, tmp_path, progress=lambda *said: told.append(said))
     fresh = module.prepare_sweep(ADSS, TINY, tmp_path / "other")
     count = len(list((tmp_path / "other").iterdir()))
-    assert left == pytest.approx(fresh * (count - 16) / count, rel=0.2)
+    assert left.simulated_s == pytest.approx(fresh.simulated_s * (count - 16) / count, rel=0.2)
+    assert (left.before, left.kept) == (16, count)
     assert [share for share, _ in told] == sorted(share for share, _ in told)
 
 
@@ -99,3 +101,36 @@ def test_a_cache_that_cannot_be_written_is_refused_before_anything_is_simulated(
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert line.startswith(f"error: {cache}: cannot be written (")
     assert line.endswith("set XDG_CACHE_HOME to a folder that can")
+
+
+ONE_STAGE = ["prepare", "--unit", str(config_path("templates", "one-stage")), "--level", "2",
+             "--start", "130", "--stop", "150", "--points", "2", "--settle-cycles", "1",
+             "--integrate-cycles", "2", "--json"]  # fmt: skip
+
+
+def test_what_a_full_disk_did_not_keep_is_told(small_disk, monkeypatch, capsys):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(small_disk))
+    assert main(ONE_STAGE) == 0
+    out, err = capsys.readouterr()
+    files = json.loads(out)["files"]
+    kept = len(list((small_disk / "lashbench").glob("runs-*.npz")))
+    assert 0 < kept == files["kept"] < files["needed"]
+    lost = files["needed"] - kept
+    folder = small_disk / "lashbench"
+    assert f"warning: {lost} of {files['needed']} files could not be kept in {folder}" in err
+    # No room for another: nothing is gained by a second run, which says so.
+    assert main(ONE_STAGE) == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith(f"error: {folder}: nothing ")
+    assert err.count("\n") == 1
+
+
+def test_on_a_disk_without_room_nothing_is_simulated(small_disk, monkeypatch, capsys):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(small_disk))
+    (small_disk / "filler").write_bytes(bytes(60 << 10))
+    assert main(ONE_STAGE) == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "nothing could be kept there (No space left on device), and nothing was" in err
+    assert err.count("\n") == 1

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from daq.errors import InputError
+from daq.errors import InputError, LashbenchError
 from tui.executors import executor_at
 from tui.measure_options import PlanOptions, swept_plan
 from tui.options import Cluster, Json, Real, UnitName, Whole
@@ -84,25 +84,36 @@ def prepare(
 
     began, folder = time.perf_counter(), cache_folder()
     with executor_at(cluster) as executor:
-        simulated_s = prepare_sweep(
+        done = prepare_sweep(
             subject, observation, folder, executor=executor, progress=console.progress
         )
     elapsed_s = time.perf_counter() - began
+    lost = done.needed - done.kept
+    if lost and done.kept <= done.before:
+        raise LashbenchError(
+            f"{folder}: nothing of what was simulated could be kept; make room, and prepare again"
+        )
+    if lost:
+        console.note(
+            f"warning: {lost} of {done.needed} files could not be kept in {folder}, and will be "
+            "simulated again; make room, and prepare again"
+        )
     if json:
         console.document(
             {
                 "unit": subject.name,
                 "points": len(observation),
                 "kept_in": str(folder),
-                "simulated_s": simulated_s,
+                "simulated_s": done.simulated_s,
+                "files": {"needed": done.needed, "kept": done.kept},
                 "elapsed_s": elapsed_s,
             }
         )
-    elif simulated_s == 0.0:
+    elif done.simulated_s == 0.0:
         console.data(f"{subject.name}: all of it was there already")
     else:
         console.data(
-            f"{subject.name}: {simulated_s:.0f} s of motion simulated in {elapsed_s:.0f} s, "
+            f"{subject.name}: {done.simulated_s:.0f} s of motion simulated in {elapsed_s:.0f} s, "
             f"kept in {folder}"
         )
 
