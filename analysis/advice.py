@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from analysis.answer import Answer, model_name
+from sim.catalogue import CATALOGUE
 from sim.unit import Unit
 
 __all__ = ["Advice", "Stage", "StageVerdict", "advise", "judge_limit", "span_of"]
@@ -37,14 +38,19 @@ class Stage:
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """What to do, in one sentence, and each stage beside its limit."""
+    """What to do, in one sentence, and each stage beside its limit.
+
+    `before`: what to do before a gear is touched, empty where there is nothing.
+    """
 
     headline: str
     stages: tuple[Stage, ...]
+    before: str = ""
 
     def lines(self) -> list[str]:
-        """The headline, then a line for each stage of which something is known."""
-        return [self.headline, *(stage.line for stage in self.stages if stage.line)]
+        """What comes before, the headline, a line for each stage of which something is known."""
+        first = [self.before] if self.before else []
+        return [*first, self.headline, *(stage.line for stage in self.stages if stage.line)]
 
 
 def advise(answer: Answer, unit: Unit | None = None) -> Advice:
@@ -74,7 +80,7 @@ def advise(answer: Answer, unit: Unit | None = None) -> Advice:
         headline = "There is one gear stage: it holds all of the backlash."
     else:
         headline = _by_ratio(answer)
-    return Advice(headline, stages)
+    return Advice(headline, stages, _before(answer))
 
 
 def judge_limit(spans: Sequence[tuple[float, float]], limit: float) -> StageVerdict:
@@ -96,6 +102,16 @@ def span_of(number: Mapping[str, Any]) -> tuple[float, float]:
         return float(low), float(high)
     std = number["std"] or 0.0
     return max(0.0, number["value"] - _SIGMA * std), number["value"] + _SIGMA * std
+
+
+def _before(answer: Answer) -> str:
+    """What a fault of the measuring chain asks for, where the first model has one."""
+    causes = answer.models[0]["causes"] if answer.models else ()
+    if not any(name in CATALOGUE and CATALOGUE[name].site == "chain" for name in causes):
+        return ""
+    if answer.state == "open":
+        return "Before touching a gear, see whether the measuring chain is right."
+    return "Before touching a gear, put the measuring chain right."
 
 
 def _has_one_stage(answer: Answer, unit: Unit | None) -> bool:

@@ -145,7 +145,7 @@ def stored_origin(store: Store, measurement: int) -> Origin:
 def _actions(data: Mapping[str, Any], unit: Unit, answer: Answer, advice: Advice) -> list[str]:
     """What to do, most important first."""
     diagnosis = data["diagnosis"]
-    lines = [] if diagnosis is None else _chain_first(diagnosis)
+    lines = [advice.before] if advice.before else []
     lines += [] if answer.state == "none" else [advice.headline]
     if answer.models:
         lines += [stage.line for stage in advice.stages if stage.verdict is not None]
@@ -158,15 +158,6 @@ def _actions(data: Mapping[str, Any], unit: Unit, answer: Answer, advice: Advice
         lines += verdict_words(diagnosis)
     lines += _doubts(data, unit)
     return lines or ["No estimate was made; see below for what was measured."]
-
-
-def _chain_first(diagnosis: Mapping[str, Any]) -> list[str]:
-    """What a fault of the measuring chain asks for."""
-    if not any(cause.get("site") == "chain" for cause in diagnosis["causes"]):
-        return []
-    if diagnosis["verdict"] == "ambiguous":
-        return ["Before touching a gear, see whether the measuring chain is right."]
-    return ["Before touching a gear, put the measuring chain right."]
 
 
 def _doubts(data: Mapping[str, Any], unit: Unit) -> list[str]:

@@ -146,6 +146,21 @@ def test_a_limit_is_passed_or_failed_only_with_the_whole_interval(span, verdict)
     assert judge_limit([], 0.2) == "UNDECIDED"
 
 
+@pytest.mark.parametrize(
+    ("verdict", "first", "said"),
+    [
+        ("explained", "tachometer-gain", "Before touching a gear, put the measuring chain right."),
+        ("ambiguous", "tachometer-gain", "Before touching a gear, see whether the measuring"),
+        ("explained", "load-inertia", "Adjust stage 1 first"),
+    ],
+)
+def test_a_measuring_chain_that_is_off_comes_before_the_gears(verdict, first, said):
+    document = diagnosed(verdict, model(0.7, 0.8, first), model(0.7, 0.9, "load-inertia"))
+    lines = advise(accept_model(None, document), ADSS).lines()
+    assert lines[0].startswith(said)
+    assert sum(line.startswith("Adjust stage 1 first") for line in lines) == 1
+
+
 def test_limits_decide_and_not_the_ratio():
     """Most of it sits in stage 2, and is within its limit; stage 1 is not."""
     answer = accept_model(estimated(0.1, 0.2))

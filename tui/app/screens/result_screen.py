@@ -178,7 +178,8 @@ def answer_lines(
     ratio = answer.contribution_ratio
     told = [] if ratio is None else [f"{ratio_words(ratio)}; {answer.source}"]
     stages = [stage.line for stage in advice.stages] if answer.models else []
-    return [advice.headline, *told, *stages]
+    before = [advice.before] if advice.before else []
+    return [*before, advice.headline, *told, *stages]
 
 
 def ratio_words(ratio: Mapping[str, Any]) -> str:
