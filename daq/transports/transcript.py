@@ -15,9 +15,10 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TextIO, TypeVar
 
 from daq import errors
+from daq.aside import Aside, NoReturn
 from daq.bounded_text import parse_json, read_text
 from daq.errors import FileFormatError, InputError, LashbenchError, ProtocolError
 from daq.transports.base import Deadline, Transport
@@ -27,6 +28,8 @@ __all__ = ["Recorder", "Replay"]
 _LOG = logging.getLogger("lashbench.transcript")
 
 _VERSION = 1
+_ANSWER_S = 5.0
+"""Bound of one write of a transcript; the dialogue goes on without it then."""
 _LIMIT_BYTES = 256 << 20
 _RAISED = {name: getattr(errors, name) for name in errors.__all__}
 _Result = TypeVar("_Result")
@@ -58,13 +61,17 @@ class Recorder:
         self._path, self._tell = path, fault or _LOG.warning
         self.address = transport.address
         self._started_s = time.monotonic()
+        # Beside: a file system that stops answering must not hold a dialogue with a source.
+        self._aside = Aside("transcript")
         try:
-            self._file = path.open("x", encoding="ascii", newline="\n")
-        except OSError as error:
+            self._file: TextIO = self._aside.call(
+                lambda: path.open("x", encoding="ascii", newline="\n"), _ANSWER_S
+            )
+        except (OSError, NoReturn) as error:
             raise InputError(
-                f"{path}: the transcript cannot be written ({error.strerror}); give a new file"
+                f"{path}: the transcript cannot be written ({_why(error)}); give a new file"
             ) from error
-        self._acts = -1
+        self._acts, self._is_over = -1, False
         self._note({"transcript": _VERSION, "address": self.address, "started": _now()})
 
     def write(self, line: str, deadline: Deadline) -> None:
@@ -112,25 +119,40 @@ class Recorder:
         return result
 
     def _note(self, entry: dict[str, Any]) -> None:
-        if self._file.closed:  # closed while a last attempt to go safe is still under way
+        if self._is_over:  # closed while a last attempt to go safe is still under way
             return
-        stamp = {"t_s": round(time.monotonic() - self._started_s, 6)}
-        try:
-            self._file.write(json.dumps(entry | stamp) + "\n")
+        line = json.dumps(entry | {"t_s": round(time.monotonic() - self._started_s, 6)})
+
+        def write() -> None:
+            self._file.write(f"{line}\n")
             self._file.flush()
-        except OSError as error:
+
+        try:
+            self._aside.call(write, _ANSWER_S)
+        except (OSError, NoReturn) as error:
             self._close_file()
             self._tell(
-                f"{self._path}: the transcript ends after {self._acts} acts ({error.strerror}); "
+                f"{self._path}: the transcript ends after {self._acts} acts ({_why(error)}); "
                 "the measurement goes on without"
             )
         else:
             self._acts += 1
 
     def _close_file(self) -> None:
+        if self._is_over:
+            return
+        self._is_over = True
         # What is left in the buffer cannot be written either.
-        with suppress(OSError):
-            self._file.close()
+        if not self._aside.is_stuck:
+            with suppress(OSError, NoReturn):
+                self._aside.call(self._file.close, _ANSWER_S)
+        self._aside.end()
+
+
+def _why(error: OSError | NoReturn) -> str:
+    if isinstance(error, NoReturn):
+        return f"it does not answer within {_ANSWER_S:g} s"
+    return error.strerror or str(error)
 
 
 class Replay:

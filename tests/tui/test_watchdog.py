@@ -280,6 +280,34 @@ def test_a_history_that_stops_answering_holds_neither_source_nor_signal(tmp_path
 
 @needs_holding
 @pytest.mark.slow
+def test_a_transcript_that_stops_answering_ends_and_the_measurement_goes_on(tmp_path):
+    folder = tmp_path / "share"
+    folder.mkdir()
+    db = tmp_path / "bench.db"
+    instrument = linear_analyser(known_gain)
+    with (
+        served(instrument) as url,
+        started(
+            [LASHBENCH, *words(url, db), "--transcript", str(folder / "dialogue.txt")], folder,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        ) as (process, freezer),
+    ):  # fmt: skip
+        wait_for(lambda: drives(instrument))
+        freezer.freeze()
+        wait_for(lambda: freezer.holds)
+        kept = points(db)
+        wait_for(lambda: points(db) > kept + 20)
+        process.send_signal(signal.SIGTERM)
+        _, said = process.communicate(timeout=60)
+        assert freezer.holds
+    assert process.returncode == 130
+    assert "(it does not answer within 5 s); the measurement goes on without" in said
+    assert source(db) is SourceState.CONFIRMED_OFF
+    assert not drives(instrument)
+
+
+@needs_holding
+@pytest.mark.slow
 def test_a_disk_that_confirms_nothing_ends_it(tmp_path):
     """Commits go on, into memory; a power cut would take them all."""
     folder = tmp_path / "share"
