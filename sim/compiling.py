@@ -37,7 +37,7 @@ def _ask_for_whole_vectors() -> None:
 _ask_for_whole_vectors()
 
 
-def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """Numba's own decorator, whose cache lies where nobody else can write: it holds code.
 
     Its index is a pickle, which runs code as well. Where others could have written into the folder
@@ -55,7 +55,7 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
             # Other functions of this process are their owner's.
             settings.CACHE_DIR = before
 
-    return compiling
+    return compiling if function is None else compiling(function)
 
 
 @cache
