@@ -22,6 +22,7 @@ from sqlalchemy.pool import QueuePool
 from daq.bounded_text import parse_json
 from daq.errors import FileFormatError, InputError, LashbenchError, MeasurementError
 from daq.store_beside import check_beside
+from daq.store_open import OPENING, closed, is_open, opened
 from daq.store_schema import SCHEMA_VERSION, lay_over, migrate, schema_version
 
 __all__ = ["engine_of", "log_of", "open_engine", "telling_faults"]
@@ -48,16 +49,18 @@ def open_engine(path: Path, *, create: bool, read_only: bool) -> sa.Engine:
     FileFormatError
         If the file is not a history, is damaged, or is newer than this program.
     """
-    exists = _check_place(path, create=create, read_only=read_only)
-    check_beside(_behind_links(path))
-    mode = _mode(path, exists, read_only)
-    engine = engine_of(path, mode=mode)
-    try:
-        with telling_faults(path):
-            version = _check_content(engine, path, create=create, read_only=read_only)
-    except BaseException:
-        engine.dispose()
-        raise
+    with OPENING:
+        exists = _check_place(path, create=create, read_only=read_only)
+        if not is_open(str(_behind_links(path))):
+            check_beside(_behind_links(path))
+        mode = _mode(path, exists, read_only)
+        engine = engine_of(path, mode=mode)
+        try:
+            with telling_faults(path):
+                version = _check_content(engine, path, create=create, read_only=read_only)
+        except BaseException:
+            engine.dispose()
+            raise
     if version == SCHEMA_VERSION:
         return engine
     engine.dispose()
@@ -72,13 +75,17 @@ def engine_of(path: Path, mode: str, older: int | None = None) -> sa.Engine:
     older
         Version of an older layout that is to be read as if it were of this one.
     """
-    uri = f"{_behind_links(path).as_uri()}?{mode}"
+    file = _behind_links(path)
+    uri, takes_locks = f"{file.as_uri()}?{mode}", "immutable" not in mode
 
     def connect() -> sqlite3.Connection:
         # The driver's own transaction handling commits before DDL; ours begins by hand.
-        return sqlite3.connect(
+        connection = sqlite3.connect(
             uri, uri=True, timeout=_BUSY_S, isolation_level=None, check_same_thread=False
         )
+        if takes_locks:
+            opened(str(file))
+        return connection
 
     engine = sa.create_engine(
         "sqlite://", creator=connect, poolclass=QueuePool, pool_size=4, json_deserializer=parse_json
@@ -100,6 +107,11 @@ def engine_of(path: Path, mode: str, older: int | None = None) -> sa.Engine:
             lay_over(connection, older)
         # SQLite's own lower() knows the letters of ASCII only.
         connection.create_function("casefold", 1, str.casefold, deterministic=True)
+
+    @event.listens_for(engine, "close")
+    def _leave(_connection: sqlite3.Connection, _record: object) -> None:
+        if takes_locks:
+            closed(str(file))
 
     @event.listens_for(engine, "begin")
     def _begin(connection: sa.Connection) -> None:
@@ -172,6 +184,8 @@ def _check_place(path: Path, *, create: bool, read_only: bool) -> bool:
     try:
         if os.path.exists(path) and not os.path.isfile(path):
             raise InputError(f"{path}: is not a regular file; give the file of a history")
+        if is_open(os.path.realpath(path)):
+            return True
         if os.path.isfile(path) and path.stat().st_size > 0:
             with path.open("rb") as file:
                 if file.read(len(_MAGIC)) != _MAGIC:

@@ -185,7 +185,7 @@ class Watchdog(Watch):
         came = f"source {child.settled}" if child.settled else "it did not say what came of it"
         raise MeasurementError(
             f"the session stood still while it drove, and its watchdog took over: {came}; "
-            "nothing more is driven, go on with --resume"
+            "nothing more is driven"
         )
 
 
