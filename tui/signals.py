@@ -19,7 +19,7 @@ from __future__ import annotations
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -56,21 +56,35 @@ def listening(control: SessionControl, told: Callable[[str], None]) -> Iterator[
             signal.signal(number, handler)
 
 
-def ending_on_signals(loop: asyncio.AbstractEventLoop, end: Callable[[], None]) -> None:
+def ending_on_signals(
+    loop: asyncio.AbstractEventLoop, at_once: Callable[[], None], end: Callable[[], None]
+) -> None:
     """Let signals that end a program end one that draws a screen; nothing outside the main thread.
 
     Parameters
     ----------
     loop
         Of the screen, which runs.
+    at_once
+        Called by the handler itself, whatever the loop does; must wait for nothing.
     end
-        Called in it, with every such signal.
+        Called in the loop, with every such signal.
     """
     if threading.current_thread() is not threading.main_thread():
         return
+
+    def act(number: int, _frame: object) -> None:
+        at_once()
+        try:
+            loop.call_soon_threadsafe(end)
+        except RuntimeError:
+            # The loop is closed, and with it whatever drove: nothing is left to be ended in order.
+            signal.signal(number, signal.SIG_DFL)
+            signal.raise_signal(number)
+
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-        with suppress(AttributeError, NotImplementedError, RuntimeError, ValueError):
-            loop.add_signal_handler(getattr(signal, name), end)
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), act)
     if hasattr(signal, "SIGTSTP"):
         # A halted program would leave the source driving.
         signal.signal(signal.SIGTSTP, signal.SIG_IGN)

@@ -72,6 +72,25 @@ app = Driven""",
 )
 """Draws all of the screen again and again while a file is there, and another step after a while."""
 
+STUCK = PROGRAM.replace(
+    "app = Driven",
+    """
+import time
+
+class Driven(Driven):
+    def on_ready(self):
+        self.set_interval(0.05, self.hold)
+
+    def hold(self):
+        if self.desk.run.done > 2:
+            # As long as nothing else says so, the event loop stands still.
+            Path(sys.argv[1] + "-stuck").touch()
+            time.sleep(120.0)
+
+app = Driven""",
+)
+"""A screen whose event loop stands still while it measures."""
+
 REPLAY = """
 import sys
 from pathlib import Path
@@ -120,6 +139,9 @@ class OnTerminal:
     def look_away(self):
         self._looks.clear()
         self._reader.join()
+
+    def press(self, keys):
+        os.write(self._ours, keys)
 
     def go_away(self):
         self.look_away()
@@ -260,3 +282,24 @@ def test_a_terminal_that_takes_no_more_holds_no_signal_up_and_is_drawn_anew(tmp_
     terminal.program.send_signal(signal.SIGTERM)
     terminal.ends_by_signal()
     assert begun(db).source_state is SourceState.CONFIRMED_OFF
+
+
+@pytest.mark.parametrize("way", ["ctrl+x", "SIGTERM"])
+def test_the_source_is_stopped_whatever_the_event_loop_does(tmp_path, on_terminal, way):
+    db, stuck = tmp_path / "bench.db", tmp_path / "bench.db-stuck"
+    terminal = on_terminal(str(db), SLOW, program=STUCK)
+    driving(db, within_s=90.0)
+    end = time.monotonic() + 20
+    while not stuck.exists():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+    if way == "ctrl+x":
+        terminal.press(b"\x18")
+    else:
+        terminal.program.send_signal(signal.SIGTERM)
+    end = time.monotonic() + 20
+    while begun(db).source_state is not SourceState.CONFIRMED_OFF:
+        assert time.monotonic() < end, "the source is not off"
+        time.sleep(0.02)
+    assert terminal.program.poll() is None
+    assert begun(db).points < 2500

@@ -87,9 +87,10 @@ def test_a_history_of_hostile_texts_is_plain_text_on_every_screen(tmp_path, monk
 
     async def way():
         analyses = quick_analyses(
+            estimate=lambda response, unit, progress: ESTIMATE | {"warnings": [HOSTILE]},
             diagnose=lambda responses, unit, progress: Diagnosed(
                 DIAGNOSIS | {"warnings": [HOSTILE], "shape": HOSTILE}
-            )
+            ),
         )
         async with operated(db, size, analyses=analyses) as op:
             await holds(op, "RESUME")
@@ -102,7 +103,10 @@ def test_a_history_of_hostile_texts_is_plain_text_on_every_screen(tmp_path, monk
             await holds(op, "session 2 keeps them")
             op.app.screen.query_one("#sessions").focus()
             await op.press("down", "enter")
-            await holds(op, f"warning: {SHOWN}")
+            await op.sees("[5 Result]", "r = 0.310")
+            assert f"warning: {SHOWN}" in visible(op.app.screen.copy_text())
+            if size[0] > 100:
+                await holds(op, f"warning: {SHOWN}")
             await op.press("ctrl+n", "d")
             await op.sees("VERDICT")
             await holds(op, f"left by the plain model: {SHOWN}")

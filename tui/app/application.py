@@ -8,9 +8,7 @@ under `analyses`, and a step's screen draws what the desk holds.
 from __future__ import annotations
 
 import logging
-import os
 from collections.abc import Callable, Iterable
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
@@ -22,18 +20,20 @@ from textual.screen import ModalScreen, Screen
 
 from daq.analyser import SourceState
 from daq.errors import LashbenchError
-from daq.formats.atomic import write_text
 from daq.session_events import Finished, PointStored, RunIn
 from daq.visible_text import visible, visible_line
 from tui.app import bench_owner, messages
 from tui.app.analyses import Analyses
 from tui.app.analysis_keeper import AnalysisKeeper
+from tui.app.beside import Beside
+from tui.app.copied import keep_copy
 from tui.app.desk import Desk
-from tui.app.dialogs import ErrorDialog, HelpDialog, QuestionDialog
+from tui.app.dialogs import KEYS, ErrorDialog, HelpDialog, QuestionDialog
 from tui.app.run_view import RunView
 from tui.app.screens import SCREENS
 from tui.app.screens.instrument_screen import InstrumentScreen
 from tui.app.session_keeper import SessionKeeper
+from tui.app.sessions import one_session
 from tui.app.step_screen import STEPS, StepScreen
 from tui.app.style import STYLE
 from tui.app.terminal_app import TerminalApp
@@ -89,6 +89,7 @@ class BenchApp(TerminalApp):
         self.desk = Desk(db)
         self.keeper = SessionKeeper(self)
         self.analyses = AnalysisKeeper(self, analyses or Analyses())
+        self.beside = Beside(self)
         self._find = find
         self._log_file = log
         self._stale = False
@@ -146,6 +147,10 @@ class BenchApp(TerminalApp):
 
     # ------------------------------------------------------------ keys everywhere
 
+    def stop_at_once(self) -> None:
+        """End the session in hand, called by the thread that reads keys or by a signal handler."""
+        self.keeper.cut()
+
     def action_stop_source(self) -> None:
         """The one key that stops the source."""
         self.notify(self.keeper.stop_now(), severity="warning")
@@ -156,7 +161,7 @@ class BenchApp(TerminalApp):
         screen = self.screen
         if isinstance(screen, StepScreen):
             title = f"Step {screen.STEP}: {STEPS[screen.STEP - 1]}"
-            self.push_screen(HelpDialog(title, f"{screen.HELP.strip()}\n\n{_KEYS}"))
+            self.push_screen(HelpDialog(title, f"{screen.HELP.strip()}\n\n{KEYS}"))
 
     def action_copy(self) -> None:
         """Copy the step's result; it is written to a file too, for terminals that take none."""
@@ -166,13 +171,8 @@ class BenchApp(TerminalApp):
             self.notify("there is nothing to copy here yet")
             return
         self.copy_to_clipboard(text)
-        kept = ""
-        if self._log_file is not None:
-            with suppress(LashbenchError):
-                path = self._log_file.with_name("copied.txt")
-                write_text(path, text + "\n")
-                kept = f"; also in {path}"
-        self.notify(f"copied{kept}")
+        work = partial(keep_copy, self._log_file, text)
+        self.beside.do("copy", work, self.notify, "The copy was not kept")
 
     async def action_quit(self) -> None:
         """Leave; a session in hand is ended first, safe, if that is meant."""
@@ -254,6 +254,18 @@ class BenchApp(TerminalApp):
         else:
             self.redraw_now()
 
+    def on_session_preloaded(self, message: messages.SessionPreloaded) -> None:
+        """Draw what is there already."""
+        self.desk.run.preload(message.points)
+        self.redraw_now()
+
+    def on_session_refused(self, message: messages.SessionRefused) -> None:
+        """Nothing was begun; what was there of the session before is still so."""
+        self.keeper.put_back()
+        self.keeper.released()
+        self.redraw_now()
+        self.show_error("Nothing was started", message.error)
+
     def on_session_ended(self, message: messages.SessionEnded) -> None:
         """The instrument is free again; faults and a source not proven off need a decision."""
         run = self.desk.run
@@ -327,7 +339,7 @@ class BenchApp(TerminalApp):
         self.redraw_now()
 
     def on_analysis_failed(self, message: messages.AnalysisFailed) -> None:
-        """Drawn at once."""
+        """The same."""
         self.analyses.failed(message)
         self.redraw_now()
 
@@ -344,18 +356,14 @@ class BenchApp(TerminalApp):
         if isinstance(screen, InstrumentScreen) and screen.is_mounted:
             screen.listed(message)
 
-    def measurements(self) -> list[Measurement]:
-        """All measurements of the history, oldest first; none where there is no history yet."""
-        from daq.store import Store
+    def on_work_done(self, message: messages.WorkDone) -> None:
+        """Go on with what was read."""
+        self.beside.done(message)
 
-        if not os.path.exists(self.desk.db):
-            return []
-        try:
-            with Store(self.desk.db, read_only=True) as store:
-                return store.measurements()
-        except LashbenchError as error:
-            self.show_error("The history cannot be read", error)
-            return []
+    def open_session(self, measurement: int) -> None:
+        """Read a stored measurement and look at it."""
+        read = partial(one_session, self.desk.db, measurement)
+        self.beside.do("session", read, self.open_measurement, "It cannot be opened")
 
     def open_measurement(self, measurement: Measurement) -> None:
         """Look at a stored measurement: its result is the next screen."""
@@ -377,8 +385,6 @@ class BenchApp(TerminalApp):
         self.desk.reference = None
         self.analyses.view(None)
 
-    # ------------------------------------------------------------ drawing
-
     def redraw_now(self) -> None:
         """Draw the step on top."""
         self._stale = False
@@ -390,8 +396,3 @@ class BenchApp(TerminalApp):
     def _redraw(self) -> None:
         if self._stale:
             self.redraw_now()
-
-
-_KEYS = """Everywhere: Ctrl+X stops the source at once (a software stop, no emergency stop).
-Ctrl+N next step, Esc back, 1 to 7 go to a step, Ctrl+P all commands, Ctrl+Y copies what is
-shown, Ctrl+Q quits. Tab moves between fields, Enter chooses."""

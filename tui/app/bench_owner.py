@@ -21,6 +21,8 @@ from tui.app.messages import (
     InstrumentFound,
     InstrumentsListed,
     SessionEnded,
+    SessionPreloaded,
+    SessionRefused,
     SessionTold,
     SourceStopped,
 )
@@ -28,6 +30,7 @@ from tui.app.messages import (
 if TYPE_CHECKING:
     from daq.control import SessionControl
     from daq.session_request import SessionRequest
+    from daq.store_records import StoredPoint
     from sim.unit import Unit
 
 __all__ = ["find_instruments", "look_at", "run_session", "stop_source"]
@@ -72,12 +75,20 @@ def run_session(
     url: str,
     unit: Unit,
     history: Path,
-    request: SessionRequest,
+    asked: Callable[[], SessionRequest],
     control: SessionControl,
 ) -> None:
-    """Run a session to its end and tell every record of it."""
+    """Run a session to its end and tell every record of it; what is asked is read first."""
     from tui.bench import bench_session
 
+    try:
+        request = asked()
+        if request.resume is not None:
+            post(SessionPreloaded(_stored_points(history, request.resume)))
+    except Exception as fault:
+        _log(fault, "beginning a session on %s", url)
+        post(SessionRefused(fault))
+        return
     error: Exception | None = None
     try:
         with closing(bench_session(url, unit, history, request, control)) as events:
@@ -107,6 +118,13 @@ def find_instruments(post: Post) -> None:
     except Exception as error:  # back ends raise bare Exception, ValueError, OSError
         notes.append(f"VISA resources cannot be listed ({' '.join(str(error).split())})")
     post(InstrumentsListed(found, notes))
+
+
+def _stored_points(history: Path, measurement: int) -> list[StoredPoint]:
+    from daq.store import Store
+
+    with Store(history, read_only=True) as store:
+        return store.points(measurement)
 
 
 def _visa_resources() -> list[str]:

@@ -111,13 +111,18 @@ class Desk:
         ConfigurationError
             If there is none of that name or path; the one before stays.
         """
-        from daq.configs import config_names
         from sim.unit import load_unit
 
         unit = load_unit(name)
+        self.take_unit(name, unit)
+        return unit
+
+    def take_unit(self, name: str, unit: Unit) -> None:
+        """Put a unit on the desk that was read by its name or path."""
+        from daq.configs import config_names
+
         shipped = name.lower() in config_names("units")
         self._put(name.lower() if shipped else name, unit, None)
-        return unit
 
     def begin_anew(self) -> None:
         """What was to be gone on with is left; the next session is a measurement of its own."""

@@ -13,7 +13,12 @@ from textual.screen import ModalScreen
 
 from tui.app.widgets.plain import Passage, Push, Words
 
-__all__ = ["Dialog", "ErrorDialog", "HelpDialog", "QuestionDialog"]
+__all__ = ["KEYS", "Dialog", "ErrorDialog", "HelpDialog", "QuestionDialog"]
+
+KEYS = """Everywhere: Ctrl+X stops the source at once (a software stop, no emergency stop).
+Ctrl+N next step, Esc back, 1 to 7 go to a step, Ctrl+P all commands, Ctrl+Y copies what is
+shown, Ctrl+Q quits. Tab moves between fields, Enter chooses."""
+"""The keys that hold on every screen, for its help."""
 
 
 class Dialog(ModalScreen[bool | None]):

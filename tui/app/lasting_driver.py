@@ -12,11 +12,15 @@ import sys
 from typing import Any
 
 from textual.drivers.linux_driver import LinuxDriver
+from textual.events import Key
+from textual.message import Message
 
 from tui.narrator import Narrator
 from tui.output import hush
 
-__all__ = ["LastingDriver"]
+__all__ = ["STOP_KEY", "LastingDriver"]
+
+STOP_KEY = "ctrl+x"
 
 _PATIENCE_S = 2.0
 """How long is waited for a terminal to take what is left, when the screen is gone."""
@@ -58,6 +62,14 @@ class LastingDriver(LinuxDriver):
             super().run_input_thread()
         except OSError:
             self._cannot_read = True
+
+    def process_message(self, message: Message) -> None:
+        """Hand a key on; the one that stops the source reaches it first, whatever the loop does."""
+        if isinstance(message, Key) and message.key == STOP_KEY:
+            stop = getattr(self._app, "stop_at_once", None)
+            if stop is not None:
+                stop()
+        super().process_message(message)
 
     def write(self, data: str) -> None:
         """Have something written; pictures only while not too many wait."""

@@ -13,6 +13,7 @@ from textual.message import Message
 
 from daq.analyser import Identity, SourceState
 from daq.session_events import SessionEvent
+from daq.store_records import StoredPoint
 
 __all__ = [
     "AnalysisDone",
@@ -23,8 +24,11 @@ __all__ = [
     "InstrumentsListed",
     "Job",
     "SessionEnded",
+    "SessionPreloaded",
+    "SessionRefused",
     "SessionTold",
     "SourceStopped",
+    "WorkDone",
 ]
 
 Job = Literal["result", "diagnosis", "stored diagnosis", "report"]
@@ -37,6 +41,22 @@ class SessionTold(Message):
     def __init__(self, event: SessionEvent) -> None:
         super().__init__()
         self.event = event
+
+
+class SessionPreloaded(Message):
+    """The points that the measurement to go on with has already."""
+
+    def __init__(self, points: Sequence[StoredPoint]) -> None:
+        super().__init__()
+        self.points = points
+
+
+class SessionRefused(Message):
+    """A session was not begun; nothing was sent and nothing stored."""
+
+    def __init__(self, error: Exception) -> None:
+        super().__init__()
+        self.error = error
 
 
 class SessionEnded(Message):
@@ -101,3 +121,11 @@ class AnalysisFailed(Message):
     def __init__(self, job: Job, measurement: int, error: Exception) -> None:
         super().__init__()
         self.job, self.measurement, self.error = job, measurement, error
+
+
+class WorkDone(Message):
+    """What work beside the screen gave, or the error that ended it."""
+
+    def __init__(self, kind: str, result: Any, error: Exception | None) -> None:
+        super().__init__()
+        self.kind, self.result, self.error = kind, result, error

@@ -8,16 +8,15 @@ people must know it hands to the application.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from daq.errors import LashbenchError
 from tui.app import bench_owner
 from tui.app.run_view import RunView
 
 if TYPE_CHECKING:
     from daq.session_events import Finished
-    from daq.store_records import StoredPoint
     from tui.app.application import BenchApp
 
 __all__ = ["SessionKeeper"]
@@ -51,7 +50,7 @@ class SessionKeeper:
             self._work(partial(bench_owner.look_at, self._app.post_message, desk.url, desk.unit))
 
     def start(self, hold: bool, remeasure_hz: tuple[float, float] | None = None) -> bool:
-        """Begin a session; whether it was begun.
+        """Begin a session; whether it is on its way.
 
         Parameters
         ----------
@@ -66,21 +65,17 @@ class SessionKeeper:
         if desk.unit is None or not self._free("a session is under way; stop it first"):
             return False
         run = RunView(hold=hold, source=desk.run.source)
-        try:
-            request = desk.request(remeasure_hz)
-            if desk.resume is not None:
-                run.preload(self._stored_points(desk.resume))
-        except LashbenchError as error:
-            self._app.show_error("Nothing was started", error)
-            return False
+        # In this order: whoever sees a session that lives finds its own control.
         self._control = SessionControl()
         if hold:
             self._control.pause()
         run.begin()
+        # Files and the history are read by the worker, from the desk as it is now.
+        asked = partial(replace(desk).request, remeasure_hz)
         self._before, desk.run = desk.run, run
         work = partial(
             bench_owner.run_session,
-            self._app.post_message, desk.url, desk.unit, desk.db, request, self._control,
+            self._app.post_message, desk.url, desk.unit, desk.db, asked, self._control,
         )  # fmt: skip
         self._work(work)
         return True
@@ -101,6 +96,11 @@ class SessionKeeper:
         work = partial(bench_owner.stop_source, self._app.post_message, desk.url, desk.unit)
         self._work(work)
         return "switching the source off"
+
+    def cut(self) -> None:
+        """End the session in hand at once; may be called from any thread, and waits for nothing."""
+        if self._app.desk.run.live:
+            self._control.interrupt("stopped by the operator")
 
     # ------------------------------------------------------------ requests to the session
 
@@ -171,9 +171,3 @@ class SessionKeeper:
         self._app.run_worker(
             work, thread=True, group="instrument", name="instrument", exit_on_error=False
         )
-
-    def _stored_points(self, measurement: int) -> list[StoredPoint]:
-        from daq.store import Store
-
-        with Store(self._app.desk.db, read_only=True) as store:
-            return store.points(measurement)

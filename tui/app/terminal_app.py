@@ -67,6 +67,9 @@ class TerminalApp(App[int]):
         """Hand text to the terminal, as it is seen: it may be pasted at a prompt."""
         super().copy_to_clipboard(visible(text))
 
+    def stop_at_once(self) -> None:
+        """Ctrl+X or a signal, told before the event loop hears of it; must wait for nothing."""
+
     def end_at_once(self) -> None:
         """Nobody may be there to read or to press anything."""
         self.exit(INTERRUPTED, INTERRUPTED)
@@ -75,7 +78,7 @@ class TerminalApp(App[int]):
         """Listen and look; Textual calls this beside the `on_mount` of whoever derives from it."""
         if self.is_headless:
             return
-        ending_on_signals(asyncio.get_running_loop(), self.end_at_once)
+        ending_on_signals(asyncio.get_running_loop(), self.stop_at_once, self.end_at_once)
         self._looking = self.set_interval(_LOOK_S, self._look)
 
     def _look(self) -> None:

@@ -6,17 +6,26 @@ so nothing can drive the source for long before its checks have passed.
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical, VerticalScroll
 
 from daq.errors import LashbenchError
+from tui.app.desk import Desk, Results
 from tui.app.dialogs import QuestionDialog
 from tui.app.plan_dialog import PlanDialog
+from tui.app.run_view import RunView
 from tui.app.step_screen import StepScreen
 from tui.app.widgets.plain import Words
 from tui.app.words import plan_words
 from tui.measure_options import PlanOptions
+
+if TYPE_CHECKING:
+    from daq.plan import SweepPlan
 
 __all__ = ["CheckScreen"]
 
@@ -42,6 +51,16 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
     CheckScreen #lines { height: 1fr; }
     """
 
+    def __init__(self) -> None:
+        super().__init__()
+        self._planned: SweepPlan | LashbenchError | None = None
+        self._planned_for: Desk | None = None
+        self._is_fresh = False
+
+    def arrive(self) -> None:
+        """The files that a plan is of may be others by now."""
+        self._is_fresh = False
+
     def body(self) -> ComposeResult:
         """Plan above, checks below."""
         with Vertical(classes="pane"):
@@ -54,6 +73,7 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
 
     def show_body(self) -> None:
         """The plan, and every check told so far."""
+        self._work_out()
         self.query_one("#plan", Words).update(self._plan_text())
         self.query_one("#checks", Words).update("\n".join(self._lines()))
         self.query_one("#lines", VerticalScroll).scroll_end(animate=False)
@@ -89,9 +109,13 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
     def _ask(self) -> None:
         from tui.bench import drives_hardware
 
-        desk = self.desk
+        desk, plan = self.desk, self._planned
         try:
-            request_plan = desk.plan()
+            if plan is None:
+                self.notify("the plan is being read; once more, please", severity="warning")
+                return
+            if isinstance(plan, LashbenchError):
+                raise plan
             real = drives_hardware(desk.url)
         except LashbenchError as error:
             self.bench.show_error("The plan is refused", error)
@@ -101,7 +125,7 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
             return
         text = (
             f"The checks end with a trial point: {desk.url} is driven with "
-            f"{min(request_plan.levels_vpk):g} V peak at {request_plan.visited_hz[0]:g} Hz."
+            f"{min(plan.levels_vpk):g} V peak at {plan.visited_hz[0]:g} Hz."
         )
         dialog = QuestionDialog("Drive the unit?", text, "Drive", no="Leave it")
         self.app.push_screen(dialog, lambda yes: self._check() if yes else None)
@@ -116,10 +140,7 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
         if desk.run.phase in ("checking", "sweeping", "paused", "ending"):
             self.notify("a session is under way; its plan stays", severity="warning")
             return
-        try:
-            plan = desk.plan()
-        except LashbenchError:
-            plan = None
+        plan = None if isinstance(self._planned, LashbenchError) else self._planned
         self.app.push_screen(PlanDialog(plan, desk.options), self._take_plan)
 
     def _take_plan(self, options: PlanOptions | None) -> None:
@@ -133,21 +154,39 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
 
     def _apply(self, options: PlanOptions) -> None:
         desk = self.desk
-        before = desk.options, desk.given_plan, desk.resume
-        desk.options, desk.given_plan, desk.resume = options, None, None
-        try:
-            desk.request()
-        except LashbenchError as error:
-            desk.options, desk.given_plan, desk.resume = before
-            self.bench.show_error("The plan is refused; the old one stays", error)
+
+        def take(_request: object) -> None:
+            if self.bench.keeper.busy:
+                self.notify("a session is under way; its plan stays", severity="warning")
+                return
+            desk.options, desk.given_plan, desk.resume = options, None, None
+            self.show()
+
+        asked = replace(desk, options=options, given_plan=None, resume=None)
+        title = "The plan is refused; the old one stays"
+        self.bench.beside.do("plan change", asked.request, take, title)
+
+    def _work_out(self) -> None:
+        """Have the plan made of its files beside the screen, where the desk is another."""
+        desk = replace(self.desk, run=RunView(), results=Results(), reference=None)
+        if desk != self._planned_for:
+            self._planned = None
+        elif self._is_fresh:
+            return
+        self._planned_for, self._is_fresh = desk, True
+        self.bench.beside.do("plan", partial(_plan_of, desk), self._take_planned, "No plan")
+
+    def _take_planned(self, planned: SweepPlan | LashbenchError) -> None:
+        self._planned = planned
         self.show()
 
     def _plan_text(self) -> str:
-        desk = self.desk
-        try:
-            lines = plan_words(desk.plan(), desk.url)
-        except LashbenchError as error:
-            return f"REFUSED: {error}"
+        desk, plan = self.desk, self._planned
+        if plan is None:
+            return "reading the plan"
+        if isinstance(plan, LashbenchError):
+            return f"REFUSED: {plan}"
+        lines = plan_words(plan, desk.url)
         if desk.resume is not None:
             lines.append(f"going on with measurement {desk.resume}: only missing points are taken")
             lines.append("P: a new plan, and a new measurement, in its place")
@@ -170,3 +209,11 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
         elif run.finished is not None and run.finished.state != "complete":
             lines.append(f"[{run.finished.state}] {run.finished.reason}")
         return lines
+
+
+def _plan_of(desk: Desk) -> SweepPlan | LashbenchError:
+    """The plan that a desk asks for, or why there is none."""
+    try:
+        return desk.plan()
+    except LashbenchError as error:
+        return error

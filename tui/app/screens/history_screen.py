@@ -6,22 +6,27 @@ here: a session gets one when its result is opened.
 
 from __future__ import annotations
 
+import os
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
 
-from daq.errors import LashbenchError
 from tui.app.correction_dialog import CorrectionDialog
+from tui.app.sessions import audit_trail, correct_session, responses_of
 from tui.app.step_screen import StepScreen
 from tui.app.widgets.bode import BodePlot
 from tui.app.widgets.panel import Panel
 from tui.app.widgets.plain import Table, Words
 from tui.app.widgets.traces import traces_of_response
-from tui.history_rows import Trends, answer_words, correction_words, measurement_row, trend_lines
+from tui.history_rows import Trends, answer_words, measurement_row, trend_lines
+
+if TYPE_CHECKING:
+    from daq.frf import FrequencyResponse
 
 __all__ = ["HistoryScreen"]
 
@@ -69,6 +74,7 @@ before stays in its audit trail, which A shows.
         self._rows: list[dict[str, Any]] = []
         self._every_unit = self._audit = False
         self._trends: list[str] = []
+        self._trails: dict[int, list[str]] = {}
 
     def body(self) -> ComposeResult:
         """Table, plot, words."""
@@ -87,9 +93,17 @@ before stays in its audit trail, which A shows.
         table.focus()
 
     def arrive(self) -> None:
-        """Sessions as they are now."""
-        self._read()
+        """Sessions as they are now; those of before stay until they are read."""
+        desk = self.desk
+        unit = None if desk.unit is None or self._every_unit else desk.unit.name
+        read = partial(_read_rows, desk.db, unit)
+        self.bench.beside.do("history", read, self._take, "The history cannot be read")
+
+    def _take(self, found: tuple[list[dict[str, Any]], list[str]]) -> None:
+        self._rows, self._trends = found
+        self._trails.clear()
         self._fill()
+        self.show()
 
     def show_body(self) -> None:
         """Trend and words."""
@@ -139,22 +153,20 @@ before stays in its audit trail, which A shows.
 
     def action_overlay(self) -> None:
         """Lay the two marked sessions over each other."""
-        from daq.store import Store
-
         if len(self._marked) != 2:
             self.notify("mark two sessions first: Space", severity="warning")
             return
-        below, above = self._marked
-        try:
-            with Store(self.desk.db, read_only=True) as store:
-                traces = traces_of_response(store.response(below), f"#{below}")
-                traces += traces_of_response(store.response(above))
-        except LashbenchError as error:
-            self.bench.show_error("The sessions cannot be overlaid", error)
-            return
-        self.add_class("-overlay")
-        self.query_one(BodePlot).draw(traces)
-        self.show()
+        marked = list(self._marked)
+
+        def draw(responses: list[FrequencyResponse]) -> None:
+            below, above = responses
+            traces = traces_of_response(below, f"#{marked[0]}") + traces_of_response(above)
+            self.add_class("-overlay")
+            self.query_one(BodePlot).draw(traces)
+            self.show()
+
+        read = partial(responses_of, self.desk.db, marked)
+        self.bench.beside.do("overlay", read, draw, "The sessions cannot be overlaid")
 
     def action_trend(self) -> None:
         """Back to the trend."""
@@ -165,7 +177,6 @@ before stays in its audit trail, which A shows.
         """Sessions of this unit, or all."""
         self._every_unit = not self._every_unit
         self.arrive()
-        self.show()
 
     def action_correct(self) -> None:
         """Ask what is wrong of the session under the cursor."""
@@ -187,15 +198,7 @@ before stays in its audit trail, which A shows.
 
     def on_data_table_row_selected(self, event: Table.RowSelected) -> None:
         """Open it."""
-        from daq.store import Store
-
-        try:
-            with Store(self.desk.db, read_only=True) as store:
-                measurement = store.measurement(int(event.row_key.value or 0))
-        except LashbenchError as error:
-            self.bench.show_error("The measurement cannot be opened", error)
-            return
-        self.bench.open_measurement(measurement)
+        self.bench.open_session(int(event.row_key.value or 0))
 
     def on_data_table_row_highlighted(self) -> None:
         """What was said of it."""
@@ -203,48 +206,30 @@ before stays in its audit trail, which A shows.
 
     # ------------------------------------------------------------ inside
 
-    def _read(self) -> None:
-        from daq.store import Store
-
-        desk = self.desk
-        unit = None if desk.unit is None or self._every_unit else desk.unit.name
-        self._rows, self._trends = [], []
-        if not desk.db.exists():
-            return
-        try:
-            with Store(desk.db, read_only=True) as store:
-                lines = store.lines(unit, last=_SHOWN, with_points=True)
-                self._rows = [measurement_row(line) for line in lines]
-        except LashbenchError as error:
-            self.bench.show_error("The history cannot be read", error)
-        self._trends = [line for line in trend_lines(Trends(self._rows).rows()) if line]
-
     def _correct(self, measurement: int, person: str, changes: dict[str, str]) -> None:
-        from daq.store import Store
+        def tell(names: list[str]) -> None:
+            words = f"corrected: {', '.join(names)}" if names else "nothing was to be corrected"
+            self.notify(words)
+            self.arrive()
 
-        try:
-            with Store(self.desk.db) as store:
-                done = store.correct(measurement, person, changes)
-        except LashbenchError as error:
-            self.bench.show_error("Nothing was corrected", error)
-            return
-        names = ", ".join(one.field for one in done)
-        self.notify(f"corrected: {names}" if done else "nothing was to be corrected")
-        self.arrive()
-        self.show()
+        work = partial(correct_session, self.desk.db, measurement, person, changes)
+        self.bench.beside.do("correction", work, tell, "Nothing was corrected")
 
     def _trail(self, row: dict[str, Any]) -> list[str]:
-        """The audit trail of a session."""
-        from daq.store import Store
-
+        """The audit trail of a session, read beside the screen when it is asked for first."""
+        number = row["id"]
         if not row["corrections"]:
-            return [f"#{row['id']}: nothing was corrected"]
-        try:
-            with Store(self.desk.db, read_only=True) as store:
-                trail = store.corrections(row["id"])
-        except LashbenchError as error:
-            return [str(error)]
-        return [f"#{row['id']}: {correction_words(one)}" for one in trail]
+            return [f"#{number}: nothing was corrected"]
+        if number not in self._trails:
+            self._trails[number] = [f"#{number}: reading its audit trail"]
+
+            def take(found: list[str]) -> None:
+                self._trails[number] = found
+                self.show()
+
+            read = partial(audit_trail, self.desk.db, number)
+            self.bench.beside.do(f"audit trail {number}", read, take, "It cannot be read")
+        return self._trails[number]
 
     def _fill(self) -> None:
         table = self.query_one("#sessions", Table)
@@ -317,6 +302,20 @@ before stays in its audit trail, which A shows.
         if not self.has_class("-overlay"):
             lines.append(_TREND_WORDS)
         lines += self._trends
-        if not any(row["answer"]["state"] != "none" for row in self._rows):
+        if self.bench.beside.is_under_way("history") and not self._rows:
+            lines.append(f"reading {self.desk.db}")
+        elif not any(row["answer"]["state"] != "none" for row in self._rows):
             lines.append("no session is estimated yet: open one with Enter")
         return lines
+
+
+def _read_rows(db: Path, unit: str | None) -> tuple[list[dict[str, Any]], list[str]]:
+    """The latest sessions with points as rows, of one unit or of all, and the trends in words."""
+    from daq.store import Store
+
+    if not os.path.exists(db):
+        return [], []
+    with Store(db, read_only=True) as store:
+        lines = store.lines(unit, last=_SHOWN, with_points=True)
+    rows = [measurement_row(line) for line in lines]
+    return rows, [line for line in trend_lines(Trends(rows).rows()) if line]

@@ -6,18 +6,25 @@ session told them, at most ten times a second.
 
 from __future__ import annotations
 
+from functools import partial
+from typing import TYPE_CHECKING
+
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
 from textual.widgets import ProgressBar
 
-from daq.errors import LashbenchError
 from tui.app.dialogs import QuestionDialog
+from tui.app.sessions import latest_complete, one_session
 from tui.app.step_screen import StepScreen
 from tui.app.widgets.bode import BodePlot
 from tui.app.widgets.plain import Words
 from tui.app.widgets.traces import traces_of_points, traces_of_response
 from tui.app.words import clock_in, plan_words, point_words, span_words
+
+if TYPE_CHECKING:
+    from daq.frf import FrequencyResponse
+    from daq.store_records import Measurement
 
 __all__ = ["SweepScreen"]
 
@@ -208,30 +215,23 @@ Marks: a letter shape per level, ! overload, ~ not periodic, - coarse, ? spoilt.
 
     def action_reference(self) -> None:
         """Put the latest complete session of this unit behind the sweep, or take it away."""
-        from daq.store import Store
-
         desk = self.desk
         if desk.reference is not None:
             desk.reference = None
             self.show()
-            return
-        earlier = [
-            m
-            for m in self.bench.measurements()
-            if m.state == "complete" and m.points and m.id != desk.run.measurement
-            and desk.unit is not None and m.header.unit == desk.unit.name
-        ]  # fmt: skip
-        if not earlier:
+        elif desk.unit is not None:
+            read = partial(
+                latest_complete, desk.db, desk.unit.name, desk.serial, desk.run.measurement
+            )
+            self.bench.beside.do(
+                "reference", read, self._take_reference, "The reference cannot be read"
+            )
+
+    def _take_reference(self, found: tuple[int, FrequencyResponse] | None) -> None:
+        if found is None:
             self.notify("no earlier complete session of this unit")
             return
-        latest = max(earlier, key=lambda m: (m.header.serial == desk.serial, m.id))
-        try:
-            with Store(desk.db, read_only=True) as store:
-                desk.reference = store.response(latest.id)
-        except LashbenchError as error:
-            self.bench.show_error("The reference cannot be read", error)
-            return
-        desk.reference_name = f"#{latest.id}"
+        self.desk.reference_name, self.desk.reference = f"#{found[0]}", found[1]
         self.show()
 
     def on_bode_plot_cursor_moved(self) -> None:
@@ -257,28 +257,24 @@ Marks: a letter shape per level, ! overload, ~ not periodic, - coarse, ? spoilt.
         self.app.push_screen(dialog, lambda yes: self._again(low, high) if yes else None)
 
     def _again(self, low: float, high: float) -> None:
-        from daq.store import Store
-
         desk, keeper = self.desk, self.bench.keeper
 
-        def begin() -> None:
+        def begin(measurement: Measurement) -> None:
+            if lost := desk.take_remarks(measurement):
+                self.notify(lost, severity="warning")
+            desk.resume, desk.given_plan = measurement.id, desk.run.plan
+            keeper.start(hold=False, remeasure_hz=(low, high))
+            self.show()
+
+        def read() -> None:
             run = desk.run
             if run.measurement is None or (run.finished and run.finished.state == "aborted"):
                 self.notify("an aborted measurement stays as it is", severity="warning")
                 return
-            try:
-                with Store(desk.db, read_only=True) as store:
-                    measurement = store.measurement(run.measurement)
-            except LashbenchError as error:
-                self.bench.show_error("Nothing was started", error)
-                return
-            if lost := desk.take_remarks(measurement):
-                self.notify(lost, severity="warning")
-            desk.resume, desk.given_plan = measurement.id, run.plan
-            keeper.start(hold=False, remeasure_hz=(low, high))
-            self.show()
+            work = partial(one_session, desk.db, run.measurement)
+            self.bench.beside.do("session", work, begin, "Nothing was started")
 
-        keeper.finish_then(begin)
+        keeper.finish_then(read)
 
     def _lines(self) -> list[str]:
         run, desk = self.desk.run, self.desk

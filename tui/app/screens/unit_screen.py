@@ -5,6 +5,7 @@ Owns the choice of the unit and of a session to go on with.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from textual.app import ComposeResult
@@ -14,11 +15,15 @@ from textual.widgets.option_list import Option
 
 from daq.errors import LashbenchError
 from daq.visible_text import visible_line
+from tui.app.sessions import one_session, recent_sessions
 from tui.app.step_screen import StepScreen
 from tui.app.widgets.plain import Caption, Choices, Field, Table, Words, choice
 
 if TYPE_CHECKING:
-    from daq.store_records import Measurement
+    from collections.abc import Sequence
+
+    from daq.store_records import HistoryLine, Measurement
+    from sim.unit import Unit
 
 __all__ = ["UnitScreen"]
 
@@ -51,6 +56,10 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
 
     _listed_beside: int | None = None
     """The session that was under way when the others were listed."""
+    _sessions: Sequence[HistoryLine] = ()
+    """Those that are listed."""
+    _offered = False
+    """Whether the offer to resume had its chance to take the focus."""
 
     def body(self) -> ComposeResult:
         """Unit and operator on top, sessions below."""
@@ -79,8 +88,7 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
         if self.desk.unit is None:
             self._choose("adss")
         super().on_mount()
-        interrupted = any(m.state == "interrupted" for m in self._measurements)
-        self.query_one("#sessions" if interrupted else "#units").focus()
+        self.query_one("#units").focus()
 
     def arrive(self) -> None:
         """Sessions as they are now, and what is on the desk wherever it came from."""
@@ -152,9 +160,8 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
     def on_input_submitted(self, event: Field.Submitted) -> None:
         """Enter goes on; a typed file is read first."""
         if event.input.id == "file" and event.value.strip():
-            if not self._choose(event.value.strip()):
-                return
-            self._begin_anew()
+            self._read_unit(event.value.strip())
+            return
         if event.input.id == "notes":
             self.action_next()
         else:
@@ -162,19 +169,23 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
 
     def on_data_table_row_selected(self, event: Table.RowSelected) -> None:
         """Resume an interrupted session, open another."""
-        measurement = next(m for m in self._measurements if str(m.id) == event.row_key.value)
-        if measurement.state == "interrupted":
-            self._resume(measurement)
-        else:
-            self.bench.open_measurement(measurement)
+        line = next(one for one in self._sessions if str(one.id) == event.row_key.value)
+        self._take_up(line)
 
     def action_resume(self) -> None:
         """Resume the latest interrupted session."""
-        found = [m for m in self._measurements if m.state == "interrupted"]
+        found = [one for one in self._sessions if one.state == "interrupted"]
         if found:
-            self._resume(found[0])
+            self._take_up(found[0])
         else:
             self.notify("no session is interrupted")
+
+    def _take_up(self, line: HistoryLine) -> None:
+        if line.state != "interrupted":
+            self.bench.open_session(line.id)
+            return
+        read = partial(one_session, self.desk.db, line.id)
+        self.bench.beside.do("session", read, self._resume, "The session cannot be resumed")
 
     def _resume(self, measurement: Measurement) -> None:
         if self.bench.keeper.busy:
@@ -207,7 +218,32 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
         for name in _REMARKS:
             self.query_one(f"#{name}", Field).disabled = kept_by is not None
 
+    def _read_unit(self, name: str) -> None:
+        """A file that is typed may lie anywhere: it is read beside the screen."""
+        from sim.unit import load_unit
+
+        if self.bench.keeper.busy and name != self.desk.unit_name:
+            self.notify("a session is under way; its unit stays", severity="warning")
+            return
+
+        def take(unit: Unit) -> None:
+            if self.bench.keeper.busy:
+                self.notify("a session is under way; its unit stays", severity="warning")
+                return
+            changes = name != self.desk.unit_name
+            self.desk.take_unit(name, unit)
+            if changes:
+                self.bench.put_away()
+            self._begin_anew()
+            self.show()
+            if self.query_one("#file").has_focus:
+                self.focus_next()
+
+        read = partial(load_unit, name)
+        self.bench.beside.do("unit", read, take, "The unit file cannot be used")
+
     def _choose(self, name: str) -> bool:
+        """One that comes with lashbench: it is part of the program."""
         if self.bench.keeper.busy and name != self.desk.unit_name:
             self.notify("a session is under way; its unit stays", severity="warning")
             return False
@@ -229,38 +265,50 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
         return [choice(name.upper(), name) for name in config_names("units")]
 
     def _list_sessions(self) -> None:
-        self._listed_beside = running = self._under_way()
-        self._measurements = self._recent(running)
+        """Read them beside the screen; those of before stay until then."""
+        self._listed_beside = self._under_way()
+        db = self.desk.db
+        self.bench.beside.do(
+            "sessions", partial(recent_sessions, db), self._show_sessions,
+            "The history cannot be read",
+        )  # fmt: skip
+        if not self._sessions:
+            self.query_one("#sessions-heading", Words).update(f"Reading {db}")
+
+    def _show_sessions(self, found: Sequence[HistoryLine]) -> None:
+        running = self._under_way()
+        self._sessions = [line for line in found if line.id != running][:_RECENT]
         table = self.query_one("#sessions", Table)
+        cursor = table.cursor_row
         table.clear()
-        for measurement in self._measurements:
-            header = measurement.header
-            simulated = measurement.instrument is not None and measurement.instrument.simulated
+        for line in self._sessions:
             table.add_row(
-                "RESUME" if measurement.state == "interrupted" else "",
-                str(measurement.id),
-                measurement.started[:16].replace("T", " "),
-                header.unit + (" SIMULATED" if simulated else ""),
-                header.serial or "-",
-                measurement.state,
-                f"{measurement.points}/{header.plan.points}",
-                key=str(measurement.id),
+                "RESUME" if line.state == "interrupted" else "",
+                str(line.id),
+                line.started[:16].replace("T", " "),
+                line.unit + (" SIMULATED" if line.simulated else ""),
+                line.serial or "-",
+                line.state,
+                f"{line.points}/{line.planned}",
+                key=str(line.id),
             )
-        interrupted = sum(m.state == "interrupted" for m in self._measurements)
+        table.move_cursor(row=min(cursor, max(0, len(self._sessions) - 1)))
+        interrupted = sum(line.state == "interrupted" for line in self._sessions)
+        self._head_sessions(interrupted, running)
+        if interrupted and not self._offered and self.query_one("#units").has_focus:
+            table.focus()
+        self._offered = True
+        self._show_frame()
+
+    def _head_sessions(self, interrupted: int, running: int | None) -> None:
         words = f"Sessions of this bench ({self.desk.db})"
         if interrupted:
             words = f"{interrupted} interrupted: Enter on RESUME goes on   {words}"
         elif running is not None:
             words = f"Session {running} is under way: step 4   {words}"
-        elif not self._measurements:
+        elif not self._sessions:
             words = f"No sessions yet in {self.desk.db}"
         self.query_one("#sessions-heading", Words).update(words)
 
     def _under_way(self) -> int | None:
         return self.desk.run.measurement if self.desk.run.live else None
-
-    def _recent(self, running: int | None) -> list[Measurement]:
-        """Interrupted ones with points first, then the latest; checks without a sweep left out."""
-        found = [m for m in self.bench.measurements() if m.points > 0]
-        latest = [m for m in reversed(found) if m.id != running][:_RECENT]
-        return sorted(latest, key=lambda m: m.state != "interrupted")
