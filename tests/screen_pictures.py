@@ -47,7 +47,8 @@ async def take(folder: Path, db: Path) -> None:
         await op.press("space")
         await op.sees("complete", within_s=PATIENCE_S)
         await op.press("ctrl+n")
-        await op.sees("contribution ratio r", within_s=PATIENCE_S)
+        while not ("contribution ratio r" in op.screen or "No advice" in op.screen):
+            await op.pilot.pause(0.5)
         await picture("result")
         await op.press("ctrl+n", "d")
         while not ("VERDICT" in op.screen or "NO DIAGNOSIS" in op.screen):
