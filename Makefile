@@ -7,12 +7,15 @@ JOBS ?= 3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: help demo test tests check bench blind faults fuzz soak docs audit lock clean
+LOWEST := .venv/lowest
+
+.PHONY: help demo test tests check lowest bench blind faults fuzz soak docs audit lock clean
 
 help:
 	@echo "make demo    the whole job without hardware; results in demo/"
 	@echo "make test    all checks and tests"
 	@echo "make check   style, types, floors and links; under a minute"
+	@echo "make lowest  some tests with the lowest versions that are allowed; two minutes"
 	@echo "make bench   benchmarks"
 	@echo "make blind   hide effects and have the diagnosis find them; some hours"
 	@echo "make faults  hundreds of sessions with something going wrong in each; half an hour"
@@ -40,6 +43,14 @@ check: $(READY)
 	@$(BIN)/lint-imports --no-logo > .venv/lint-imports.log || { cat .venv/lint-imports.log; exit 1; }
 	@$(BIN)/python tests/links.py
 	@$(BIN)/python tests/locked.py
+
+# Numba's cache beside the sources is that of the usual versions.
+lowest: $(LOWEST)/.ready
+	@NUMBA_CACHE_DIR=$(CURDIR)/$(LOWEST)/numba XDG_CACHE_HOME=$(CURDIR)/$(LOWEST)/cache \
+	  $(LOWEST)/bin/python -m pytest -W default --disable-warnings --numprocesses $(JOBS) --dist loadfile \
+	  tests/daq/test_formats_lossless.py tests/daq/test_formats_sdf.py tests/daq/test_formats_uff.py \
+	  tests/daq/test_store.py tests/daq/test_transports_visa.py tests/tui/test_cli.py \
+	  tests/tui/test_app_way.py tests/analysis/test_response_figure.py tests/sim/test_compiling.py
 
 bench: $(READY)
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check --constraint requirements.lock \
@@ -95,4 +106,15 @@ $(READY): pyproject.toml requirements.lock
 	  plan = SweepPlan((500.0,), (1.0,), settle_cycles=1, integrate_cycles=1); \
 	  [simulate_cycles([Servo.of(load_unit('adss'), 0.5)], plan, single=s) for s in (False, True)]; \
 	  from analysis.expectation import compile_all; compile_all()"
+	@touch $@
+
+$(LOWEST)/.ready: pyproject.toml | $(READY)
+	@echo "setting up $(LOWEST)" >&2
+	@rm -rf $(LOWEST)
+	@$(PYTHON) -m venv $(LOWEST)
+	@$(LOWEST)/bin/python -m pip install -qq --disable-pip-version-check uv
+	@$(LOWEST)/bin/uv pip compile --quiet --resolution lowest-direct --python $(LOWEST)/bin/python \
+	  --output-file $(LOWEST)/lowest.txt pyproject.toml
+	@$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST)/bin/python \
+	  --requirement $(LOWEST)/lowest.txt --editable . pytest pytest-xdist hypothesis
 	@touch $@
