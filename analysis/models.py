@@ -22,8 +22,7 @@ from analysis.verdict import Judged, Verdict, Word
 __all__ = ["Model", "backlash_document", "backlash_lines", "models_left"]
 
 _OPEN = 0.05
-"""So much must be believed of another set to stay open where nothing is missing: what is left of
-a probability of 0.95."""
+"""So much must be believed of another set to stay open: what is left of a probability of 0.95."""
 
 _RUNS = 720
 """Most runs that take part in sizing a set beside the accepted one."""
@@ -122,16 +121,15 @@ def _accepted(models: Sequence[Model], word: Word) -> Model | None:
 
 
 def _others(verdict: Verdict) -> tuple[Judged, ...]:
-    if verdict.word == "ambiguous":
-        return verdict.rivals
+    """Rivals, and what else is likely; none where a diagnosis explains, as it then names one."""
     if verdict.word == "explained":
         return ()
+    rivals = verdict.rivals if verdict.word == "ambiguous" else ()
     return tuple(
         one
         for one in verdict.judged
-        if one.effects
-        and one.adequate
-        and one.probability >= _OPEN
+        if one is not verdict.best
+        and (one in rivals or one.adequate and one.probability >= _OPEN)
         and not verdict.says_the_same(one)
     )
 

@@ -82,6 +82,15 @@ def test_every_rival_of_a_tie_is_sized_and_none_is_accepted(explained):
     assert "plain model (probability" in told
 
 
+def test_what_is_likely_is_left_by_a_tie_though_it_is_no_rival(explained):
+    best, *others = explained.verdict.judged
+    (stiff,) = (one for one in others if one.effects == STIFF)
+    for probability, kept in ((0.08, [LOAD, STIFF]), (0.02, [LOAD])):
+        one = replace(stiff, probability=probability, objection="", score=best.score - 100.0)
+        models = left(explained, word="ambiguous", judged=(best, one), also=())
+        assert [model.causes for model in models] == kept
+
+
 def test_where_nothing_explains_no_backlash_is_told(explained):
     assert left(explained, word="unexplained") == ()
     document = backlash_document((), "unexplained", (0.7, 0.03), (0.7, 0.03))
