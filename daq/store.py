@@ -10,8 +10,8 @@ by the clock. The store judges nothing and knows no instrument.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, TypeVar
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import sqlalchemy as sa
 
@@ -40,8 +40,6 @@ from daq.store_rows import (
 )
 
 __all__ = ["Store"]
-
-_Row = TypeVar("_Row")
 
 _MOST_ROWS = 300_000
 """Points, or lines of a journal, of one measurement that are read; a sweep has up to 100,000."""
@@ -249,8 +247,8 @@ class Store(AnswerStore, RemarkStore):
         columns = table.events.c
         query = sa.select(table.events).where(columns.measurement_id == measurement)
         with self._reading() as connection:
-            rows = connection.execute(query.order_by(columns.id).limit(_MOST_ROWS + 1))
-            return list(self._bounded(map(event_of, rows), "lines in its journal", measurement))
+            self._check_number(connection, query, "lines in its journal", measurement)
+            return [event_of(row) for row in connection.execute(query.order_by(columns.id))]
 
     # ------------------------------------------------------------ inside
 
@@ -303,17 +301,21 @@ class Store(AnswerStore, RemarkStore):
             kinds.append(columns.superseded_by.is_not(None))
         found: list[StoredPoint] = []
         for kind in kinds:
-            query = sa.select(table.points).where(own, kind).limit(_MOST_ROWS + 1)
-            rows = map(point_of, connection.execute(query))
-            found += self._bounded(rows, "points", measurement)
+            query = sa.select(table.points).where(own, kind)
+            self._check_number(connection, query, "points", measurement)
+            found += map(point_of, connection.execute(query))
         return sorted(found, key=lambda point: point.id)
 
     @staticmethod
-    def _bounded(rows: Iterable[_Row], words: str, measurement: int) -> Iterator[_Row]:
-        for count, row in enumerate(rows):
-            if count == _MOST_ROWS:
-                raise ValueError(f"measurement {measurement} has more than {count} {words}")
-            yield row
+    def _check_number(
+        connection: sa.Connection, query: sa.Select[Any], words: str, measurement: int
+    ) -> None:
+        rows = query.with_only_columns(sa.literal(1)).limit(_MOST_ROWS + 1).subquery()
+        if (
+            connection.execute(sa.select(sa.func.count()).select_from(rows)).scalar_one()
+            > _MOST_ROWS
+        ):
+            raise ValueError(f"measurement {measurement} has more than {_MOST_ROWS} {words}")
 
 
 def _counts(flags: int) -> bool:

@@ -33,11 +33,11 @@ _IN_FORCE = f"(SELECT count(*) {_LIVE})"
 _FLAGGED = f"(SELECT coalesce(sum(flags & ~8 <> 0), 0) {_LIVE})"
 # Layouts 1 and 2 knew no version of the points and ordered by the clock, which may have been
 # ahead. What no later session can have overtaken is of the points in force; else nobody knows.
+_REPLACED = "SELECT measurement_id FROM points WHERE superseded_by IS NOT NULL"
 _OLD_VERSION = f"""CASE WHEN {_DOCUMENT} AND EXISTS (
     SELECT 1 FROM measurements AS m WHERE m.id = estimates.measurement_id
         AND m.ended IS NOT NULL AND estimates.made > m.ended
-        AND NOT EXISTS (SELECT 1 FROM points AS p
-            WHERE p.measurement_id = m.id AND p.superseded_by IS NOT NULL)
+        AND m.id NOT IN ({_REPLACED})
         AND NOT EXISTS (SELECT 1 FROM events AS v
             WHERE v.measurement_id = m.id AND v.kind = 'resume')) THEN 0 END"""
 _OLD_SUMMARY = f"""CASE WHEN {_DOCUMENT} THEN json_object(
@@ -170,7 +170,10 @@ SCHEMA_VERSION = len(_STEPS)
 
 _NO_ESTIMATES = """CREATE TEMP TABLE estimates (id, measurement_id, made, software, document,
     points_version, physics, edition, elapsed_s, summary)"""
-_OLD_ESTIMATES = f"""CREATE TEMP VIEW estimates AS SELECT *, {_OLD_VERSION} AS points_version,
+# Looked for once: the layouts before the third have no index for it.
+_FIND_REPLACED = f"CREATE TEMP TABLE replaced AS SELECT DISTINCT * FROM ({_REPLACED})"
+_FOUND_VERSION = _OLD_VERSION.replace(_REPLACED, "SELECT measurement_id FROM replaced")
+_OLD_ESTIMATES = f"""CREATE TEMP VIEW estimates AS SELECT *, {_FOUND_VERSION} AS points_version,
     '' AS physics, '' AS edition, NULL AS elapsed_s, {_OLD_SUMMARY} AS summary
     FROM main.estimates"""
 _OLD_REST = (
@@ -183,7 +186,7 @@ _OLD_REST = (
     "CREATE TEMP TABLE diagnosed_points (diagnosis_id, measurement_id, points_version)",
     "CREATE TEMP TABLE corrections (id, measurement_id, time, person, field, old, new)",
 )
-_LAID_OVER = {1: (_NO_ESTIMATES, *_OLD_REST), 2: (_OLD_ESTIMATES, *_OLD_REST)}
+_LAID_OVER = {1: (_NO_ESTIMATES, *_OLD_REST), 2: (_FIND_REPLACED, _OLD_ESTIMATES, *_OLD_REST)}
 """By layout: what makes a file that may not be written look like one of this program's."""
 
 _OF_SQLITE = {

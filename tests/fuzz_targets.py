@@ -41,6 +41,7 @@ from sim.adapter_dialects import AR488, PROLOGIX_USB
 from sim.analyser35670a import Analyser35670A, Choices
 from sim.analyser35670a.plant import LinearPlant
 from sim.unit import load_unit
+from tui.history_rows import measurement_row
 
 Target = Callable[[bytes], Any]
 
@@ -163,6 +164,11 @@ def read_history(path: Path) -> None:
     """Read all that a history holds; nothing beside it is left."""
     try:
         with Store(path, read_only=True) as store:
+            for line in store.each_line():
+                measurement_row(line)
+                store.corrections(line.id)
+                store.estimate_in_force(line.id)
+                store.diagnoses_in_force(line.id)
             for measurement in store.measurements():
                 store.points(measurement.id, superseded=True)
                 store.events(measurement.id)

@@ -21,7 +21,7 @@ _LEAST = 8
 
 def columns_of(text: str) -> int:
     """Columns that a terminal takes for a text: two for an ideograph, none for a combining mark."""
-    return sum(map(_columns, text))
+    return len(text) if text.isascii() else sum(map(_columns, text))
 
 
 def _columns(sign: str) -> int:

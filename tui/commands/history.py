@@ -118,10 +118,10 @@ def history(
 
 def _unit_name(unit: str | None, store: Store) -> str | None:
     """The name that units of the history bear."""
-    from sim.unit import load_unit
-
     if unit is None:
         return None
+    from sim.unit import load_unit
+
     stored = sorted({name.lower() for name in store.unit_names()})
     if unit.lower() in stored:
         return unit
