@@ -17,6 +17,7 @@ Screen { layers: base dialog; }
 #hint { height: 1; background: $surface; color: $text-accent; }
 .pane { padding: 0 1; }
 .heading { text-style: bold; height: 1; color: $text-accent; }
+.heading { text-wrap: nowrap; text-overflow: ellipsis; }
 .scroll { overflow-y: auto; }
 Input.-textual-compact { height: 1; }
 .field { height: 1; }
