@@ -94,7 +94,11 @@ def pass_over(fault: str) -> None:
     """Log, once, that what is kept at a place is not used, and why."""
     if fault not in _TOLD:
         _TOLD.add(fault)
-        _LOG.warning("%s; what is kept there is not used but made anew in this run", fault)
+        _LOG.warning(
+            "%s; what is kept there is not used but made anew in this run; to use it, let only "
+            "yourself write there (chmod go-w)",
+            fault,
+        )
 
 
 @cache

@@ -36,7 +36,7 @@ SHARES = {
     "csv": 8,
     "hdf5": 6,
     "uff": 6,
-    "mat": 0.2,
+    "mat": 0.1,
     "sdf": 7,
     "unit": 7,
     "bench": 7,

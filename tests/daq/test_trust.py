@@ -81,7 +81,7 @@ def test_what_stands_in_is_new_private_and_told_once(tmp_path, caplog):
     assert not place.is_relative_to(tmp_path)
     assert [record.getMessage() for record in caplog.records] == [
         f"{folder} can be written by others; what is kept there is not used but made anew in this "
-        "run"
+        "run; to use it, let only yourself write there (chmod go-w)"
     ]
 
 
