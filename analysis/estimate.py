@@ -22,6 +22,7 @@ from analysis.backlash import Backlash, Uncertain, backlash_of_places
 from analysis.ensemble import Machine
 from analysis.executor import Executor
 from analysis.fit import Posterior, fit_posterior
+from analysis.input_check import check_inputs
 from analysis.lattice import RATIO, Axis
 from analysis.observation import observe
 from analysis.paper_estimate import IndexCurve, index_curve_of_response
@@ -100,6 +101,7 @@ def estimate_response(
     cache: Path | None = None,
     executor: Executor | None = None,
     further: Sequence[FrequencyResponse] = (),
+    as_is: bool = False,
 ) -> Estimate:
     """Estimate from a whole response at all its source levels, or from several together.
 
@@ -124,15 +126,21 @@ def estimate_response(
     executor
         Where it is simulated; on this machine's cores if not given.
 
+    as_is
+        Take responses as they stand, whatever `analysis.input_check` says of them.
+
     Raises
     ------
     AnalysisError
-        If no usable point is left, or nothing simulated comes near the response.
+        If no usable point is left, nothing simulated comes near the response, or it is no response
+        of the unit.
     InputError
-        If the responses are said to be of different units or specimens, or one is there twice.
+        If the responses are said to be of different units or specimens, one is there twice, or one
+        is likely written down wrongly.
     """
     responses: tuple[FrequencyResponse, ...] = (response, *further)
     check_together(responses)
+    noted = check_inputs(responses, unit, as_is)
     responses, doubts = thin_all(tuple(map(settled, responses)))
     observation, axes = observe(*responses), free_axes(unit, total_backlash_unknown)
     with counting() as effort:
@@ -140,7 +148,7 @@ def estimate_response(
             unit, observation, axes, seed=seed, cache=cache, executor=executor, progress=progress
         )
     curve = index_curve_of_response(responses[0], observation, posterior.draws)
-    warnings = doubts + error_doubts(responses)
+    warnings = noted + doubts + error_doubts(responses)
     misfit = _robust_rms(posterior)
     if misfit > _WIDE_RESIDUAL:
         warnings.append(

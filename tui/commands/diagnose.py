@@ -32,6 +32,7 @@ def diagnose(
     paper: bool = False,
     plots: Plots = None,
     json: Json = False,
+    as_is: bool = False,
     cluster: Cluster = None,
     console: Injected,
 ) -> None:
@@ -49,6 +50,8 @@ def diagnose(
         Other sweeps of the same unit, diagnosed together with the first.
     paper
         Diagnose the paper's own measured frequencies and gains in place of a file.
+    as_is
+        Take a response as it stands, also if it looks like a mistake.
     """
     if paper == (file is not None):
         raise InputError("nothing to diagnose; give either a response or --paper" if not paper
@@ -80,7 +83,7 @@ def diagnose(
     with executor_at(cluster) as executor:
         result = diagnose_response(
             response, subject, further=others, cache=cache_folder(), executor=executor,
-            progress=console.progress,
+            progress=console.progress, **({"as_is": True} if as_is else {}),
         )  # fmt: skip
     result = proposing(result, unit, (response, *others))
     _tell(result, json, console, _advice(result, subject))

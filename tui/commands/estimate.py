@@ -30,6 +30,7 @@ def estimate(
     arf_hz: Real | None = None,
     rf_hz: Real | None = None,
     total_backlash_unknown: bool = False,
+    as_is: bool = False,
     cluster: Cluster = None,
     json: Json = False,
     console: Injected,
@@ -50,6 +51,8 @@ def estimate(
         Resonance in Hz, in place of a file.
     total_backlash_unknown
         Estimate the total backlash too, instead of taking the unit's.
+    as_is
+        Take a response as it stands, also if it looks like a mistake.
     """
     if file is None:
         if cluster is not None:
@@ -83,6 +86,7 @@ def estimate(
             result = estimate_response(
                 responses[0], subject, total_backlash_unknown, progress=console.progress,
                 cache=cache_folder(), executor=executor, further=responses[1:],
+                **({"as_is": True} if as_is else {}),
             )  # fmt: skip
     if json:
         document = result.to_json()

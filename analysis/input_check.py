@@ -1,0 +1,393 @@
+"""Whether a response can be one of the unit, or looks like one that was written down wrongly.
+
+Owns the table of usual mistakes (phase in radians, swapped channels, ...) and the test for each:
+the response is held against a wide family of linear machines about the unit, as it is and with
+each mistake undone. It is done before anything is simulated, within a second, and alters no
+response. What a cause of the catalogue does is no mistake; only what is far outside is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.quasi_linear import Family, draw_machines, neighbours
+from daq.errors import AnalysisError, InputError
+from daq.frf import DB_PER_NEPER, FrequencyResponse, PointFlag
+from sim.unit import Unit
+
+__all__ = ["MISTAKES", "Finding", "check_input", "check_inputs"]
+
+Vector = NDArray[np.float64]
+
+_NOT_OF_UNIT = 0.62
+"""Distance from which on nothing of the family is near: noise has 0.8."""
+
+_GAIN = 0.7
+"""Neper by which the gain as a whole may be off by causes of the catalogue, which double it."""
+
+_ANY_GAIN = 30.0
+
+_LEVELS, _POINTS, _FEWEST = 2, 40, 8
+"""Levels (the highest, where the motion is most like a linear one) and points of each that are
+looked at, and points without which nothing is said."""
+
+_MACHINES, _ROUNDS, _PER_ROUND, _BEST = 2000, 3, 500, 8
+_SCALE = 0.45
+"""Neper and rad that a nonlinear machine is off the nearest linear one."""
+
+_GAINED = 0.08
+"""How much nearer a response must be with a mistake undone; of true ones none gains 0.05."""
+
+_TOLD = 0.3
+"""How far behind another a mistake may be that a telltale speaks for."""
+
+_CLOSE = 0.06
+"""How far behind the likeliest another mistake may be to be named, too."""
+
+_FLAT = 0.02
+"""Neper by which the gain of any servo changes over a band at least."""
+
+_LEAST_V = 2e-3
+"""Output below which a point may be noise, V."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Curve:
+    """One level: Hz, log gain in neper, phase in rad or None."""
+
+    frequency_hz: Vector
+    log_gain: Vector
+    phase: Vector | None
+
+
+@dataclass(frozen=True, slots=True)
+class Mistake:
+    """A mistake: how it is undone, how far the gain may then be off, and what to tell a person.
+
+    `telltale`: what its numbers have in common and those of a true response hardly ever have.
+    """
+
+    undo: Callable[[_Curve], _Curve]
+    words: str
+    gain: float = _GAIN
+    needs_phase: bool = False
+    telltale: Callable[[_Curve], bool] | None = None
+
+
+def _turned(sign: float, radians: float = 0.0) -> Callable[[_Curve], _Curve]:
+    def undo(curve: _Curve) -> _Curve:
+        phase = None if curve.phase is None else sign * curve.phase + radians
+        return _Curve(curve.frequency_hz, curve.log_gain, phase)
+
+    return undo
+
+
+def _from_radians(curve: _Curve) -> _Curve:
+    phase = None if curve.phase is None else np.degrees(curve.phase)
+    return _Curve(curve.frequency_hz, curve.log_gain, phase)
+
+
+def _from_swapped(curve: _Curve) -> _Curve:
+    phase = None if curve.phase is None else -curve.phase
+    return _Curve(curve.frequency_hz, -curve.log_gain, phase)
+
+
+def _from_linear(curve: _Curve) -> _Curve:
+    linear = np.maximum(curve.log_gain * DB_PER_NEPER, 1e-9)
+    return _Curve(curve.frequency_hz, np.log(linear), curve.phase)
+
+
+def _is_within_pi(curve: _Curve) -> bool:
+    """Whether no phase in degrees is larger than any in radians."""
+    return curve.phase is not None and bool(np.max(np.abs(np.degrees(curve.phase))) <= 3.1416)
+
+
+def _is_like_linear(curve: _Curve) -> bool:
+    """Whether gains have no sign, are small, and some below 1, as linear gains are."""
+    decibels = curve.log_gain * DB_PER_NEPER
+    return bool(0.0 < np.min(decibels) < 1.0 and np.max(decibels) < 20.0)
+
+
+def _slower(factor: float) -> Callable[[_Curve], _Curve]:
+    def undo(curve: _Curve) -> _Curve:
+        return _Curve(curve.frequency_hz / factor, curve.log_gain, curve.phase)
+
+    return undo
+
+
+def _times_omega(power: int) -> Callable[[_Curve], _Curve]:
+    def undo(curve: _Curve) -> _Curve:
+        log_omega = np.log(2.0 * np.pi * curve.frequency_hz)
+        phase = None if curve.phase is None else curve.phase + power * np.pi / 2.0
+        return _Curve(curve.frequency_hz, curve.log_gain + power * log_omega, phase)
+
+    return undo
+
+
+MISTAKES: Mapping[str, Mistake] = {
+    "phase in radians": Mistake(
+        _from_radians,
+        "the phase is likely in radians; multiply phase_deg by 57.29578",
+        needs_phase=True,
+        telltale=_is_within_pi,
+    ),
+    "conjugate": Mistake(
+        _turned(-1.0),
+        "the sign of the phase is likely reversed (conjugate response); change the sign of "
+        "phase_deg",
+        needs_phase=True,
+    ),
+    "inverted": Mistake(
+        _turned(1.0, np.pi),
+        "one channel is likely inverted; add 180 to phase_deg, and see to the polarity of "
+        "the tachometer",
+        needs_phase=True,
+    ),
+    "swapped": Mistake(
+        _from_swapped,
+        "the channels are likely swapped (V_i/V_o in place of V_o/V_i); change the signs of "
+        "gain_db and phase_deg",
+    ),
+    "linear gain": Mistake(
+        _from_linear,
+        "gain_db likely holds the gain itself, not decibels; give 20 log10 of it",
+        telltale=_is_like_linear,
+    ),
+    "rad/s": Mistake(
+        _slower(2.0 * np.pi),
+        "frequencies are likely in rad/s; divide frequency_hz by 6.283185",
+    ),
+    "position": Mistake(
+        _times_omega(1),
+        "the output is likely a position, not a velocity; multiply the gain by the angular "
+        "frequency and add 90 to phase_deg",
+        _ANY_GAIN,
+        needs_phase=True,
+    ),
+    "acceleration": Mistake(
+        _times_omega(-1),
+        "the output is likely an acceleration, not a velocity; divide the gain by the angular "
+        "frequency and subtract 90 from phase_deg",
+        _ANY_GAIN,
+        needs_phase=True,
+    ),
+    "gain factor": Mistake(
+        lambda curve: curve,
+        "the gain as a whole is likely off by {factor}; see to the scales and probes of both "
+        "channels",
+        _ANY_GAIN,
+    ),
+}
+"""Every mistake that is looked for, by its name."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What a response looks like.
+
+    `mistake`: the name of a likely one (a key of `MISTAKES`), None where there is none;
+    `foreign`: whether nothing makes it a response of the unit; `words`: for a person, empty where
+    all is well; `distances`: of the response as it is and with each mistake undone, 0 to 1.
+    """
+
+    mistake: str | None
+    foreign: bool
+    words: str
+    distances: Mapping[str, float]
+
+
+def check_input(response: FrequencyResponse, unit: Unit) -> Finding:
+    """Hold a response against what any machine near a unit can show.
+
+    Parameters
+    ----------
+    response
+        One level or more; phase may be missing.
+    unit
+        The unit that it is said to be of.
+    """
+    curves = _curves(response)
+    if not curves:
+        return Finding(None, False, "", {})
+    if all(_is_constant(curve) for curve in curves):
+        return Finding(None, True, _FOREIGN.format(unit=unit.name), {})
+    search = _Search(Family(unit))
+    distances: dict[str, float] = {}
+    offsets: dict[str, float] = {}
+    distances["as it is"], _ = search.nearest(curves, lambda c: c, _GAIN)
+    for name, mistake in MISTAKES.items():
+        if mistake.needs_phase and any(curve.phase is None for curve in curves):
+            continue
+        if name == "linear gain" and not all(map(_is_like_linear, curves)):
+            continue
+        distances[name], offsets[name] = search.nearest(curves, mistake.undo, mistake.gain)
+    told = [
+        name
+        for name in offsets
+        if (sign := MISTAKES[name].telltale) is not None
+        and all(map(sign, curves))
+        and distances[name] < distances["as it is"]
+    ]
+    return _judged(distances, offsets, told, unit)
+
+
+def check_inputs(
+    responses: Sequence[FrequencyResponse], unit: Unit, as_is: bool = False
+) -> list[str]:
+    """Refuse responses that look like a mistake, or like nothing of a unit.
+
+    Parameters
+    ----------
+    as_is
+        Refuse nothing, say it instead.
+
+    Returns
+    -------
+    list
+        What is to be said of them, each sentence once.
+
+    Raises
+    ------
+    InputError
+        If one is likely written down wrongly; says what to change.
+    AnalysisError
+        If one is no response of the unit.
+    """
+    said = []
+    for one in responses:
+        found = check_input(one, unit)
+        if found.mistake is not None and not as_is:
+            raise InputError(f"{found.words}; or take it as it stands with --as-is")
+        if found.foreign and not as_is:
+            raise AnalysisError(f"{found.words}; or take it as it stands with --as-is")
+        said += [found.words] if found.words else []
+    return list(dict.fromkeys(said))
+
+
+_FOREIGN = (
+    "this is no response of unit {unit}: nothing like that unit shows it, nor does any usual "
+    "mistake make it one; see to the unit, the band and the wiring"
+)
+
+
+def _is_better(cured: float, given: float) -> bool:
+    """Whether undoing a mistake brings a response clearly nearer than it is."""
+    return given - cured > _GAINED and cured < _NOT_OF_UNIT
+
+
+class _Search:
+    """The nearest of many machines to curves; those of one band are computed once."""
+
+    def __init__(self, family: Family) -> None:
+        self._family = family
+        self._machines = draw_machines(_MACHINES, np.random.default_rng(0))
+        self._shown: dict[bytes, NDArray[np.complex128]] = {}
+
+    def nearest(
+        self, curves: Sequence[_Curve], undo: Callable[[_Curve], _Curve], gain: float
+    ) -> tuple[float, float]:
+        """Mean distance of curves to the nearest machine of each, and of their gains, neper."""
+        found = [self._nearest(undo(curve), gain) for curve in curves]
+        distance, offset = np.mean(found, axis=0)
+        return float(distance), float(offset)
+
+    def _nearest(self, curve: _Curve, gain: float) -> tuple[float, float]:
+        rng = np.random.default_rng(0)
+        key = curve.frequency_hz.tobytes()
+        if key not in self._shown:
+            self._shown[key] = self._family.responses(self._machines[0], curve.frequency_hz)
+        logs, free = self._machines
+        distance, offset = _distances(self._shown[key], curve, gain)
+        for number in range(_ROUNDS + 1):
+            best = np.argsort(distance)[:_BEST]
+            logs, free, distance, offset = logs[best], free[best], distance[best], offset[best]
+            if number == _ROUNDS:
+                break
+            near, near_free = neighbours(logs, free, 0.25 / 2**number, _PER_ROUND, rng)
+            shown = self._family.responses(near, curve.frequency_hz)
+            near_distance, near_offset = _distances(shown, curve, gain)
+            logs, free = np.concatenate([logs, near]), np.concatenate([free, near_free])
+            distance = np.concatenate([distance, near_distance])
+            offset = np.concatenate([offset, near_offset])
+        return float(distance[0]), float(offset[0])
+
+
+def _distances(shown: NDArray[np.complex128], curve: _Curve, gain: float) -> tuple[Vector, Vector]:
+    """Distances (machines,) of a curve, 0 to 1, and by how much its gain is larger, neper.
+
+    Geman's and McClure's: a point that is far off counts as one, however far.
+    """
+    off = curve.log_gain - shown.real
+    offset = np.clip(np.median(off, axis=1), -gain, gain)
+    square = ((off - offset[:, None]) / _SCALE) ** 2
+    if curve.phase is not None:
+        turn = (curve.phase - shown.imag + np.pi) % (2.0 * np.pi) - np.pi
+        square += (turn / _SCALE) ** 2
+    return np.mean(square / (1.0 + square), axis=1), offset
+
+
+def _curves(response: FrequencyResponse) -> list[_Curve]:
+    """The highest levels with enough points, thinned; a level that is not known is one."""
+    spoilt = (response.flags & (PointFlag.SPOILT | PointFlag.OVERLOAD)) != 0
+    size = np.abs(response.gain)
+    level = np.where(np.isfinite(response.source_vpk), response.source_vpk, 0.0)
+    loud = (size * level > _LEAST_V) | (level == 0.0)
+    usable = ~spoilt & np.isfinite(size) & (size > 0.0) & (response.frequency_hz > 0.0)
+    found: list[_Curve] = []
+    for one in np.unique(level)[::-1]:
+        rows = np.flatnonzero((level == one) & usable)
+        heard = rows[loud[rows]]
+        # Where friction holds the servo there is noise, and nothing wrong.
+        if len(heard) < max(_FEWEST, len(rows) // 2):
+            continue
+        rows = heard
+        rows = rows[np.argsort(response.frequency_hz[rows], kind="stable")]
+        rows = rows[np.unique(np.linspace(0, len(rows) - 1, _POINTS).round().astype(int))]
+        known = bool(np.all(response.phase_known[rows]))
+        phase = np.angle(response.gain[rows]) if known else None
+        found.append(_Curve(response.frequency_hz[rows], np.log(size[rows]), phase))
+        if len(found) == _LEVELS:
+            break
+    return found
+
+
+def _is_constant(curve: _Curve) -> bool:
+    """Whether a curve shows nothing that moves: the same gain everywhere."""
+    return bool(np.ptp(curve.log_gain) < _FLAT)
+
+
+def _as_likely(
+    distances: Mapping[str, float], offsets: Mapping[str, float], likely: str
+) -> list[str]:
+    """The mistake that comes next, where it explains nearly as well as the likeliest."""
+    others = sorted((n for n in offsets if n != likely), key=lambda n: distances[n])
+    better = [n for n in others if _is_better(distances[n], distances["as it is"])]
+    return [n for n in better if distances[n] < distances[likely] + _CLOSE][:1]
+
+
+def _factor(neper: float) -> str:
+    decibels = neper * DB_PER_NEPER
+    return f"{decibels:+.1f} dB (a factor of {np.exp(neper):.3g})"
+
+
+def _judged(
+    distances: Mapping[str, float],
+    offsets: Mapping[str, float],
+    told: Sequence[str],
+    unit: Unit,
+) -> Finding:
+    given = distances["as it is"]
+    likely = min(offsets, key=lambda name: distances[name], default="")
+    for name in told:
+        likely = name if distances[name] < distances[likely] + _TOLD else likely
+    if likely and (likely in told or _is_better(distances[likely], given)):
+        near = [] if likely in told else _as_likely(distances, offsets, likely)
+        words = [MISTAKES[n].words.format(factor=_factor(offsets[n])) for n in (likely, *near)]
+        return Finding(likely, False, "; or ".join(words), distances)
+    if given > _NOT_OF_UNIT:
+        return Finding(None, True, _FOREIGN.format(unit=unit.name), distances)
+    return Finding(None, False, "", distances)

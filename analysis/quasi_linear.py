@@ -1,0 +1,156 @@
+"""What linear machines near a unit would show: a wide family, in closed form.
+
+Owns the transfer function of the paper's chain with every parameter free, thousands of machines at
+once. Play softens a mesh and friction damps, so that at one level a machine with both shows about
+what some linear one does. It is good for telling what cannot be this unit at all, and for no
+number. It simulates nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.unit import Unit
+
+__all__ = ["Family", "draw_machines", "neighbours"]
+
+Vector = NDArray[np.float64]
+
+_RANGES: Mapping[str, tuple[float, float]] = {
+    # Factors on datasheet values. Play softens the train by up to a factor of some tens.
+    "softness": (0.03, 1.5),
+    "inertia": (0.45, 2.2),
+    "resistance": (0.5, 2.0),
+    "constant": (0.5, 2.0),
+    "corner": (0.5, 2.0),
+    # Friction and dampers as dampers: on the motor over its B_m, on the load over the critical
+    # damping of the load on its shaft, in the train over the same.
+    "motor_loss": (0.3, 300.0),
+    "load_loss": (1e-3, 3.0),
+    "train_loss": (1e-3, 1.0),
+    # A spring to ground over the stiffness of the shaft; a first-order lag, s.
+    "cable": (1e-3, 2.0),
+    "lag": (1e-6, 5e-3),
+    # Something on the load with its own spring: share of its inertia, and frequency over that of
+    # the load on its shaft.
+    "payload": (1e-3, 0.5),
+    "payload_at": (0.3, 30.0),
+    "payload_loss": (0.005, 0.1),
+}
+
+
+_NEUTRAL = {
+    "motor_loss": 1.0,
+    "load_loss": 1e-3,
+    "train_loss": 1e-3,
+    "cable": 1e-3,
+    "lag": 1e-6,
+    "payload": 1e-3,
+    "payload_loss": 0.05,
+}
+"""What does next to nothing; 1 where it is not named."""
+
+_ALWAYS = ("softness", "motor_loss", "load_loss", "train_loss")
+"""What play and friction do at any machine; of the rest none, one or two at a time."""
+
+_CAUSES = (
+    ("inertia",),
+    ("resistance",),
+    ("constant",),
+    ("corner",),
+    ("cable",),
+    ("lag",),
+    ("payload", "payload_at", "payload_loss"),
+)
+
+_ENDS = np.log(np.array(list(_RANGES.values())))
+_AT_REST = np.log(np.array([_NEUTRAL.get(name, 1.0) for name in _RANGES]))
+
+
+def draw_machines(count: int, rng: np.random.Generator) -> tuple[Vector, NDArray[np.bool_]]:
+    """Logarithms (machines, parameters) of machines, and which of them are not as at rest."""
+    names = list(_RANGES)
+    free = np.zeros((count, len(names)), dtype=bool)
+    free[:, [names.index(name) for name in _ALWAYS]] = True
+    causes = rng.permuted(np.tile(np.arange(len(_CAUSES)), (count, 1)), axis=1)
+    several = rng.choice([0, 1, 1, 2], count)
+    for place in range(2):
+        for cause, parts in enumerate(_CAUSES):
+            having = (causes[:, place] == cause) & (several > place)
+            for part in parts:
+                free[having, names.index(part)] = True
+    drawn = rng.uniform(_ENDS[:, 0], _ENDS[:, 1], free.shape)
+    return np.where(free, drawn, _AT_REST), free
+
+
+def neighbours(
+    logs: Vector, free: NDArray[np.bool_], share: float, count: int, rng: np.random.Generator
+) -> tuple[Vector, NDArray[np.bool_]]:
+    """Machines near some, moved by about a share of every range in half of what is free."""
+    of = rng.integers(len(logs), size=count)
+    moved = free[of] & (rng.random((count, logs.shape[1])) < 0.5)
+    steps = rng.normal(size=moved.shape) * share * np.ptp(_ENDS, axis=1)
+    low, high = np.minimum(_ENDS[:, 0], _AT_REST), np.maximum(_ENDS[:, 1], _AT_REST)
+    return np.clip(logs[of] + steps * moved, low, high), free[of]
+
+
+@dataclass(frozen=True, slots=True)
+class Family:
+    """Linear machines about a unit."""
+
+    unit: Unit
+
+    def responses(self, logs: Vector, frequency_hz: Vector) -> NDArray[np.complex128]:
+        """Logarithms (machines, frequencies) of V_o/V_i.
+
+        Parameters
+        ----------
+        logs
+            Logarithms (machines, parameters), as `draw_machines` gives them.
+        """
+        p = dict(zip(_RANGES, np.exp(logs).T[:, :, None], strict=True))
+        s = 2j * np.pi * frequency_hz[None, :]
+        motor, electronics = self.unit.motor, self.unit.electronics
+        inertia = motor.J_m * s + motor.B_m * p["motor_loss"]
+        mechanical = inertia + self._train(p, s) / self.unit.stage1.N_1**2
+        k_t, k_b = motor.k_t * p["constant"], motor.k_b * p["constant"]
+        electrical = motor.R_m * p["resistance"] + motor.L_a * s
+        speed = electronics.k_a * k_t / (electrical * mechanical + k_t * k_b)
+        d2, d1, d0 = electronics.filter_denominator
+        corner = p["corner"]
+        low_pass = electronics.filter_numerator * corner**2
+        low_pass = low_pass / (d2 * s**2 + d1 * corner * s + d0 * corner**2)
+        shown = electronics.k_ts * speed * low_pass / (1.0 + s * p["lag"])
+        return np.asarray(np.log(shown))
+
+    def _train(self, p: Mapping[str, Vector], s: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """Torque over speed (machines, frequencies) at gear 1."""
+        stage1, load = self.unit.stage1, self.unit.load
+        ratio = self.unit.output_ratio
+        shaft = stage1.k_s1 * p["softness"]
+        at_load = stage1.k_s1 * ratio**2
+        critical = 2.0 * np.sqrt(at_load * load.J_L)
+        own = np.sqrt(at_load / load.J_L)
+        omega = own * p["payload_at"]
+        force = omega**2 + 2.0 * p["payload_loss"] * omega * s
+        swinging = p["payload"] * load.J_L * force / (force + s**2)
+        felt = (load.J_L * p["inertia"] + swinging) * s
+        felt = felt + critical * p["load_loss"] + at_load * p["cable"] / s
+        if self.unit.stage2 is not None:
+            felt = _behind(self.unit.stage2.k_2 + 0.0 * s, felt, s) / self.unit.stage2.N**2
+            felt = felt + (stage1.J_p2 or 0.0) * s
+        spring = shaft + critical / ratio**2 * p["train_loss"] * s
+        felt = _behind(2.0 * spring, felt, s) + stage1.J_s1 * s
+        felt = _behind(2.0 * spring, felt, s) + stage1.J_g1 * s
+        return _behind(stage1.k_g1 + 0.0 * s, felt, s)
+
+
+def _behind(
+    stiffness: NDArray[np.complex128], felt: NDArray[np.complex128], s: NDArray[np.complex128]
+) -> NDArray[np.complex128]:
+    """What is felt through a spring."""
+    return np.asarray(1.0 / (s / stiffness + 1.0 / felt))
