@@ -113,7 +113,7 @@ class Family:
             Logarithms (machines, parameters), as `draw_machines` gives them.
         """
         p = dict(zip(_RANGES, np.exp(logs).T[:, :, None], strict=True))
-        s = 2j * np.pi * frequency_hz[None, :]
+        s = np.asarray(2j * np.pi * frequency_hz[None, :], dtype=np.complex128)
         motor, electronics = self.unit.motor, self.unit.electronics
         inertia = motor.J_m * s + motor.B_m * p["motor_loss"]
         mechanical = inertia + self._train(p, s) / self.unit.stage1.N_1**2

@@ -6,6 +6,7 @@ Owns the options of the verb. The diagnosis is the analysis's.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -81,9 +82,10 @@ def diagnose(
         # Now, as well as with the answer: it may be a slip, and the answer takes a minute.
         console.note(f"warning: {doubt}")
     with executor_at(cluster) as executor:
-        result = diagnose_response(
+        asked = partial(diagnose_response, as_is=True) if as_is else diagnose_response
+        result = asked(
             response, subject, further=others, cache=cache_folder(), executor=executor,
-            progress=console.progress, **({"as_is": True} if as_is else {}),
+            progress=console.progress,
         )  # fmt: skip
     result = proposing(result, unit, (response, *others))
     _tell(result, json, console, _advice(result, subject))
