@@ -279,6 +279,27 @@ def test_a_history_that_stops_answering_holds_neither_source_nor_signal(tmp_path
 
 
 @needs_holding
+def test_a_history_that_does_not_answer_at_the_start_can_be_left(tmp_path):
+    folder = tmp_path / "share"
+    folder.mkdir()
+    instrument = linear_analyser(known_gain)
+    with (
+        served(instrument) as url,
+        started(
+            [LASHBENCH, *words(url, folder / "bench.db")], folder, stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE, text=True,
+        ) as (process, freezer),
+    ):  # fmt: skip
+        freezer.freeze()
+        wait_for(lambda: freezer.holds)
+        process.send_signal(signal.SIGTERM)
+        _, said = process.communicate(timeout=60)
+        assert freezer.holds
+    assert process.returncode == 130
+    assert said.splitlines()[-1] == "error: interrupted by SIGTERM; nothing was driven"
+
+
+@needs_holding
 @pytest.mark.slow
 def test_a_transcript_that_stops_answering_ends_and_the_measurement_goes_on(tmp_path):
     folder = tmp_path / "share"
