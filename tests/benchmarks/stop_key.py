@@ -61,16 +61,16 @@ def history(path: Path, count: int) -> None:
     words = ["measure", "--unit", "adss", "--instrument", "sim:", "--db", str(path), "--quiet"]
     assert command([*words, *plan, *cycles, "--json"]) == 0
     with sqlite3.connect(path) as db:
-        for number in range(2, count + 1):
-            for table, key in (("measurements", "id"), ("points", "measurement_id")):
-                names = [row[1] for row in db.execute(f"PRAGMA table_xinfo({table})")
-                         if row[6] == 0 and row[1] != "id"]  # fmt: skip
-                values = [str(number) if name == key else name for name in names]
-                into, what = ", ".join(names), ", ".join(values)
-                if key == "id":
-                    into, what = f"id, {into}", f"{number}, {what}"
-                rows = f"SELECT {what} FROM {table} WHERE {key} = 1"
-                db.execute(f"INSERT INTO {table} ({into}) {rows}")
+        numbers = "WITH RECURSIVE n(i) AS (SELECT 2 UNION ALL SELECT i + 1 FROM n WHERE i < ?)"
+        for table, key in (("measurements", "id"), ("points", "measurement_id")):
+            names = [row[1] for row in db.execute(f"PRAGMA table_xinfo({table})")
+                     if row[6] == 0 and row[1] not in ("id", key)]  # fmt: skip
+            columns = ", ".join(names)
+            db.execute(
+                f"INSERT INTO {table} ({key}, {columns}) {numbers} "
+                f"SELECT n.i, {columns} FROM n, {table} WHERE {key} = 1 AND n.i <= ?",
+                (count, count),
+            )
 
 
 @contextmanager
