@@ -21,12 +21,14 @@ from analysis.arithmetic import on_one_core
 from analysis.backlash import Backlash, Uncertain, backlash_of_places
 from analysis.ensemble import Machine
 from analysis.executor import Executor
-from analysis.fit import Posterior, fit_posterior
+from analysis.fit import Posterior, fit_posterior, match_runs
 from analysis.input_check import check_inputs
 from analysis.lattice import RATIO, Axis
+from analysis.likelihood import Match
 from analysis.observation import observe
 from analysis.paper_estimate import IndexCurve, index_curve_of_response
 from analysis.progress import Progress
+from analysis.scale_check import frequency_doubt
 from analysis.settled import settled
 from analysis.stated_error import error_doubts
 from analysis.swept import check_together, sweep_document, sweep_lines
@@ -149,8 +151,14 @@ def estimate_response(
         )
     curve = index_curve_of_response(responses[0], observation, posterior.draws)
     warnings = noted + doubts + error_doubts(responses)
-    misfit = _robust_rms(posterior)
+    misfit = _robust_rms(posterior.match)
     if misfit > _WIDE_RESIDUAL:
+        doubt = frequency_doubt(
+            observation,
+            posterior.draws,
+            lambda seen, runs: _robust_rms(match_runs(seen, axes, runs, seed)),
+        )
+        warnings = ([doubt] if doubt else []) + warnings
         warnings.append(
             f"the model leaves {misfit:.1f} standard deviations of the response unexplained; "
             f"{CALL_FOR_DIAGNOSIS}"
@@ -227,8 +235,8 @@ def _play_axis(unit: Unit) -> Axis:
     return Axis("b_t_deg", 0.2 * b_t, 3.0 * b_t, 33, 0.2 * b_t, put)
 
 
-def _robust_rms(posterior: Posterior) -> float:
-    z = posterior.match.residual[:2] / posterior.match.std[:2]
+def _robust_rms(match: Match) -> float:
+    z = match.residual[:2] / match.std[:2]
     z = z[np.isfinite(z)]
     return float(1.4826 * np.median(np.abs(z))) if z.size else 0.0
 

@@ -29,7 +29,7 @@ from analysis.progress import Progress
 from analysis.reading_noise import likeliest_noise, possible_noises
 from sim.unit import Unit
 
-__all__ = ["Posterior", "fit_posterior"]
+__all__ = ["Posterior", "fit_posterior", "match_runs"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,6 +105,23 @@ def fit_posterior(
         match(heard),
         draws,
     )
+
+
+def match_runs(
+    observation: Observation, axes: Sequence[Axis], draws: Draws, seed: int = 0
+) -> Match:
+    """What the best place between runs leaves of an observation; nothing is simulated."""
+    scales = np.array([axis.scale for axis in axes])
+    population, width = _population(axes, draws), 0.6 * scales
+    rng = np.random.default_rng(seed)
+    mean = calibrate(observation, population, width, rng, cautious=True).mean
+    best = np.clip(mean, [axis.low for axis in axes], [axis.high for axis in axes])
+
+    def match(seen: Observation) -> Match:
+        return match_prediction(seen, _emulator(seen, population, width).predict(best))
+
+    noises = possible_noises(observation)
+    return match(likeliest_noise(noises, lambda s: match(s).log_likelihood))
 
 
 def _population(axes: Sequence[Axis], draws: Draws) -> Population:

@@ -99,7 +99,7 @@ class Observation:
     def by_plan(self) -> Iterator[tuple[Observation, NDArray[np.int64]]]:
         """What each plan swept, as if it were all, and the rows that it is here."""
         for _, rows in self.plans:
-            yield self._taking(rows), rows
+            yield self.at_rows(rows), rows
 
     def sweeps(self) -> list[tuple[dict[str, Any], list[int]]]:
         """Plans and their rows as JSON, by which a sweep is known again.
@@ -115,13 +115,14 @@ class Observation:
     def thinned(self, stride: int) -> Observation:
         """Every `stride`-th frequency of each level only."""
         kept = np.concatenate([np.arange(b.start, b.stop)[::stride] for b in self.blocks])
-        return self._taking(kept)
+        return self.at_rows(kept)
 
     def with_noise(self, noise_v: float) -> Observation:
         """The same reading with another noise of its own, V."""
         return replace(self, noise_v=noise_v, noise=self.noise * (noise_v / self.noise_v))
 
-    def _taking(self, kept: NDArray[np.int64]) -> Observation:
+    def at_rows(self, kept: NDArray[np.int64]) -> Observation:
+        """Some rows (ascending indices) only."""
         plans = []
         for plan, rows in self.plans:
             left = np.flatnonzero(np.isin(kept, rows))
