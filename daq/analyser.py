@@ -91,7 +91,7 @@ class Analyser(Protocol):
     is how a session interrupts a point that takes long. None does nothing.
     """
     on_exchange: Callable[[float], None] | None
-    """Told before each exchange except those of `make_safe` how long it may take, s.
+    """Told before each exchange, those of `make_safe` included, how long it may take, s.
 
     A watchdog hears from it that the session lives; it must not raise. None does nothing.
     """

@@ -189,7 +189,7 @@ class HP35670A:
         held = self._dialogue.lock.acquire(timeout=_LOCK_PATIENCE_S)
         try:
             self._dialogue.trusted = False
-            self.safe_off = make_safe(self._transport)
+            self.safe_off = make_safe(self._transport, self.on_exchange)
         finally:
             if held:
                 self._dialogue.lock.release()

@@ -55,8 +55,9 @@ class SafeOff:
 class _Attempt:
     """Runs steps, one after the other, and keeps what became of each."""
 
-    def __init__(self, transport: Transport) -> None:
+    def __init__(self, transport: Transport, told: Callable[[float], None] | None) -> None:
         self.dialogue = Dialogue(transport, reply_s=_REPLY_S)
+        self.dialogue.on_exchange = told
         self.steps: list[Step] = []
         self.answered = False
         self._budget = Deadline.after(_BUDGET_S)
@@ -91,8 +92,13 @@ class _Attempt:
         return reply
 
 
-def make_safe(transport: Transport) -> SafeOff:
+def make_safe(transport: Transport, told: Callable[[float], None] | None = None) -> SafeOff:
     """Switch the source off whatever the instrument is doing, and say what could be proven.
+
+    Parameters
+    ----------
+    told
+        Told before each exchange how long it may take at most, s; must not raise.
 
     Returns
     -------
@@ -101,7 +107,7 @@ def make_safe(transport: Transport) -> SafeOff:
         they should; ``unconfirmed`` if the instrument answers but they do not;
         ``unknown`` if it cannot be asked.
     """
-    attempt = _Attempt(transport)
+    attempt = _Attempt(transport, told)
     _go_quiet(attempt)
     proven = _proof(attempt)
     if not attempt.answered:
@@ -164,6 +170,8 @@ def _ramp(attempt: _Attempt) -> str:
         return "no ramp is set"
     # The level it comes from is not known here, so the highest is taken.
     wait_s = min(_HIGHEST_VPK / rate + _RAMP_MARGIN_S, _LONGEST_RAMP_S)
+    if dialogue.on_exchange is not None:
+        dialogue.on_exchange(wait_s)
     dialogue.transport.pause(wait_s)
     return f"{wait_s:.2f} s"
 

@@ -18,8 +18,10 @@ __all__ = ["HeldInstrument"]
 
 _SAFE_TRIES = 10
 """How often the safe-off recipe is begun again when a key press breaks it."""
-_SAFE_S = 40.0
-"""Announced for one run of the safe-off recipe, which has bounds of its own."""
+_SAFE_S = 8.0
+"""Announced for the beginning of the safe-off recipe, which may wait for another thread."""
+_OPENING_S = 12.0
+"""Announced for opening a connection anew."""
 _RECONNECT_S = 0.3
 """Pause before a dead connection is opened anew; a gateway must see first that it is gone."""
 
@@ -104,8 +106,10 @@ class HeldInstrument:
             # Whatever a dead connection has to say at its end is no reason not to try another.
             with suppress(Exception):
                 self.analyser.close()
+            self._watch.beat(_OPENING_S)
             time.sleep(_RECONNECT_S)
             self.analyser = reopen()
+            self.analyser.on_exchange = self._watch.beat
         except Exception:
             return False
         except KeyboardInterrupt:
