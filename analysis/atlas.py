@@ -204,7 +204,9 @@ def _denser(u: float, hypothesis: Hypothesis) -> float:
 def atlas_name(unit: Unit, coarse: Observation, rare: bool = False) -> str:
     """File name of an atlas, another for everything that it depends on."""
     causes = [hypothesis.effects for hypothesis in every_single_cause(unit, rare)]
-    text = json.dumps([_EDITION, causes, unit.physics, coarse.sweeps()], sort_keys=True)
+    text = json.dumps(
+        [_EDITION, causes, unit.physics, unit.tolerances, coarse.sweeps()], sort_keys=True
+    )
     mark = hashlib.sha256(text.encode()).hexdigest()[:24]
     return f"{'rare' if rare else 'atlas'}-{mark}.npz"
 

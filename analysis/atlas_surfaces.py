@@ -20,6 +20,7 @@ from analysis.causes import Hypothesis
 from analysis.chart import Chart, is_at_load
 from analysis.observation import Observation
 from analysis.population import Population
+from analysis.spread import spread_of
 from analysis.surface import Surface, differences
 from sim.unit import Unit
 
@@ -72,7 +73,7 @@ def surfaces_of(unit: Unit, coarse: Observation, atlas: Atlas) -> dict[Effects, 
     """
     charts = [Chart(Hypothesis(unit, effects), coarse.frequency_hz) for effects in atlas]
     felt = _felt_surfaces(unit, coarse, atlas, [chart for chart in charts if chart.bent.any()])
-    return {k: felt[k] if k in felt else _surface(coarse, atlas[k]) for k in atlas}
+    return {k: felt[k] if k in felt else _surface(unit, coarse, atlas[k]) for k in atlas}
 
 
 def _felt_surfaces(
@@ -87,6 +88,7 @@ def _felt_surfaces(
     felt = np.concatenate([charts[k].felt(atlas[k].places) for k in at_load], axis=1)
     return {
         chart.hypothesis.effects: _plain_surface(
+            unit,
             coarse,
             # Where the runs are says nothing of a range that other hypotheses have.
             np.array([np.zeros(chart.hypothesis.d), np.ones(chart.hypothesis.d)]),
@@ -100,13 +102,14 @@ def _felt_surfaces(
     }
 
 
-def _surface(coarse: Observation, population: Population) -> Surface:
+def _surface(unit: Unit, coarse: Observation, population: Population) -> Surface:
     d = population.places.shape[1]
     runs = differences(coarse, population)
-    return _plain_surface(coarse, population.places, runs, _WIDTHS[d], _ENOUGH[d])
+    return _plain_surface(unit, coarse, population.places, runs, _WIDTHS[d], _ENOUGH[d])
 
 
 def _plain_surface(
+    unit: Unit,
     coarse: Observation,
     places: NDArray[np.float64],
     difference: NDArray[np.float64],
@@ -124,6 +127,7 @@ def _plain_surface(
         np.empty((0, 3, len(coarse))),
         np.empty(0),
         Motions.unknown(len(difference), len(coarse)),
+        spread_of(unit).gain,
         enough,
         tailed=False,
         chart=chart,

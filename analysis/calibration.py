@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dpotri
 
-from analysis.emulator import GAIN_TOLERANCE
 from analysis.observation import Observation, channels_of_readings
 from analysis.population import Population
 from analysis.reading_noise import draw_noises
@@ -59,6 +58,7 @@ def calibrate(
     observation: Observation,
     runs: Population,
     width: NDArray[np.float64],
+    gain: float,
     rng: np.random.Generator,
     *,
     nearest: int = NEAREST,
@@ -68,7 +68,8 @@ def calibrate(
 
     Kernel ridge regression from squashed channels to places, its ridge chosen by what it gets
     wrong about machines left out, first among all runs, then among the nearest. `width` (d,):
-    distance over which the response changes smoothly.
+    distance over which the response changes smoothly. `gain`: one standard deviation of what scales
+    the whole response, as a share.
 
     Parameters
     ----------
@@ -80,7 +81,7 @@ def calibrate(
         that may be the answer count among the nearest, as one that is hardly known would seem to
         be known as well as those lie close together.
     """
-    readings = _readings(observation, runs, rng, _sampling(observation) if cautious else 0.0)
+    readings = _readings(observation, runs, gain, rng, _sampling(observation) if cautious else 0.0)
     kin = _kin(runs.deviations)
     first = _regress(observation, readings, runs.places, kin)
     distance = np.abs((runs.places - first.mean) / width).max(axis=1)
@@ -111,7 +112,11 @@ def _sampling(observation: Observation) -> float:
 
 
 def _readings(
-    observation: Observation, runs: Population, rng: np.random.Generator, sampled: float
+    observation: Observation,
+    runs: Population,
+    gain: float,
+    rng: np.random.Generator,
+    sampled: float,
 ) -> NDArray[np.float64]:
     """Channels of the runs with what a bench adds: reading noise and the tachometer's spread.
 
@@ -126,7 +131,7 @@ def _readings(
     if sampled:
         share = 2.0 * noise**2 / (runs.variance + 2.0 * noise**2)
         values[:, 2] += sampled * share * rng.standard_normal(share.shape)
-    values[:, 0] += rng.normal(0.0, GAIN_TOLERANCE, (len(values), 1))
+    values[:, 0] += rng.normal(0.0, gain, (len(values), 1))
     values[:, :2] += rng.standard_normal(values[:, :2].shape) * noise[:, None]
     return values
 

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from analysis.branches import find_motions
 from analysis.causes import Hypothesis
 from analysis.chart import Chart
-from analysis.ensemble import TOLERANCES
 from analysis.executor import side_by_side
 from analysis.observation import Observation
-from analysis.population import DEVIATING, Population
+from analysis.population import Population
+from analysis.spread import Spread, spread_of
 from analysis.surface import TRIES, Fit, Surface, differences
 from analysis.widths import learn_width
 from sim.unit import Unit
@@ -28,8 +28,6 @@ __all__ = ["Candidate", "Effects", "form_candidates"]
 
 Effects = tuple[str, ...]
 """Identifiers of a hypothesis's effects, sorted."""
-
-_SIGMAS = np.array([TOLERANCES[symbol] for symbol in DEVIATING])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,14 +51,15 @@ def form_candidates(
 
     In so many steps (`Surface.climb`).
     """
+    spread = spread_of(unit)
     raw = {
         key: _surface(observation, population, Hypothesis(unit, key))
         for key, population in fine.items()
     }
-    slopes = _pooled_slopes(observation, fine, raw)
+    slopes = _pooled_slopes(observation, fine, raw, len(spread))
 
     def formed(key: Effects) -> Candidate:
-        surface = _without_deviations(raw[key], fine[key], slopes)
+        surface = _without_deviations(raw[key], fine[key], slopes, spread)
         charts = surface.on_chart(surface.places), surface.on_chart(starts[key][None])
         width = learn_width(charts[0], surface.difference, surface.width, charts[1])
         surface = replace(surface, width=width)
@@ -81,6 +80,7 @@ def _surface(observation: Observation, population: Population, hypothesis: Hypot
         none,
         np.empty(0),
         find_motions(observation, population),
+        spread_of(hypothesis.unit).gain,
         # As few as there are slopes leave a plane that turns with every group: of pairs with four
         # sizes runs left out were predicted worse by hundreds in log density.
         enough=(len(chart.width) + 1) ** 2,
@@ -89,23 +89,26 @@ def _surface(observation: Observation, population: Population, hypothesis: Hypot
 
 
 def _without_deviations(
-    surface: Surface, population: Population, slopes: NDArray[np.float64]
+    surface: Surface, population: Population, slopes: NDArray[np.float64], spread: Spread
 ) -> Surface:
     shift = np.tensordot(population.deviations, slopes, axes=1)
-    return replace(surface, difference=surface.difference - shift, slopes=slopes, sigmas=_SIGMAS)
+    return replace(
+        surface, difference=surface.difference - shift, slopes=slopes, sigmas=spread.sigmas
+    )
 
 
 def _pooled_slopes(
     observation: Observation,
     fine: Mapping[Effects, Population],
     surfaces: Mapping[Effects, Surface],
+    k: int,
 ) -> NDArray[np.float64]:
     """How the channels follow deviations (k, 3, rows), from the runs of all hypotheses together.
 
     Near where each agrees best they all show about the same response, so that they share
     their slopes.
     """
-    k, shape = len(DEVIATING), (3, len(observation))
+    shape = (3, len(observation))
     normal = np.zeros((*shape, k, k))
     right = np.zeros((*shape, k))
     for key, population in fine.items():

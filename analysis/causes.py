@@ -19,12 +19,16 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.ensemble import Machine
+from analysis.ensemble import LEAST_SHARE, Machine
 from sim.catalogue import CATALOGUE, EffectParameter
 from sim.effects import EffectSetting
 from sim.unit import Unit
 
 __all__ = ["Hypothesis", "every_single_cause"]
+
+_KNOWN_WELL = 0.005
+"""Standard deviation of a datasheet value, as a share, up to which runs of the plain model show
+what it does; of wider ones runs of the value itself do so better, and say the same."""
 
 _LEAST_SHARE = 0.01
 """Ranges that begin at zero begin here instead, as a share of their end, so that logs exist."""
@@ -118,22 +122,40 @@ class Hypothesis:
         values = [parameter.nominal(self.unit) or np.nan for _, parameter in self.parameters]
         return self.place(0.0, values)[1:]
 
+    @property
+    def spread(self) -> NDArray[np.float64]:
+        """Standard deviations (d - 1,) of sizes that are believed of the datasheet, 0 where none.
+
+        Along the logarithms that sizes are coordinates of.
+        """
+        shares = np.array([parameter.spread(self.unit) for _, parameter in self.parameters])
+        return np.asarray(shares / np.ptp(self.logs, axis=1))
+
     def within_tolerance(self, place: NDArray[np.float64]) -> list[bool]:
         """Whether each parameter is a datasheet value (or a factor on some) hardly off it."""
         nominal = [parameter.nominal(self.unit) for _, parameter in self.parameters]
         return [
-            known is not None and abs(value / known - 1.0) < parameter.tolerance
+            known is not None and abs(value / known - 1.0) < parameter.within(self.unit)
             for (_, parameter), known, value in zip(
                 self.parameters, nominal, self.values(place), strict=True
             )
         ]
+
+    def is_tolerance(self, place: NDArray[np.float64]) -> bool:
+        """Whether all there is at a place (d,) is what is believed of the datasheet anyway.
+
+        Of values that are believed no better than those of the shipped units.
+        """
+        wide = [parameter.spread(self.unit) > _KNOWN_WELL for _, parameter in self.parameters]
+        return bool(wide) and all(wide) and all(self.within_tolerance(place))
 
     def brought_within_tolerance(self, place: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
         """Places (d,) like one, each with one datasheet value off by just its tolerance."""
         for at, (_, parameter) in enumerate(self.parameters):
             if (known := parameter.nominal(self.unit)) is not None:
                 values = self.values(place)
-                values[at] = known * (1.0 + np.sign(values[at] - known) * parameter.tolerance)
+                off = np.sign(values[at] - known) * parameter.within(self.unit)
+                values[at] = known * max(1.0 + off, LEAST_SHARE)
                 yield self.place(place[0], list(values))
 
     @property

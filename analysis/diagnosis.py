@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from analysis.arithmetic import on_one_core
+from analysis.believed import HINT, believed_document, is_usually_off, trusts_much
 from analysis.bounds import bound_beside, bound_causes
 from analysis.calibration import Calibrated
 from analysis.candidate import Candidate
@@ -214,6 +215,7 @@ def _diagnose(
         observation=observation,
         unseen=unseen,
         models=models,
+        believed=believed_document(unit),
         cut_short=searched.given_up or (searched.spared and verdict.word == "unexplained"),
     )
 
@@ -289,6 +291,9 @@ def _warnings(diagnosis: Diagnosis) -> tuple[str, ...]:
             "each alone takes the model further off: measure them by themselves, or look for "
             "something else that does what they leave"
         )
+    near = (is_usually_off(s.value, s.datasheet) for c in diagnosis.causes for s in c.sizes)
+    if trusts_much(diagnosis.believed) and (diagnosis.verdict.word == "unexplained" or any(near)):
+        found.append(HINT)
     if len(observation.levels) == 1:
         halves = len(observation.blocks) == 1
         held_out = "halves of its band" if halves else "whole sweeps at that level"

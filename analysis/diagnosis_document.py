@@ -5,12 +5,13 @@ Owns the wording and the names in the document. Nothing is computed here.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from analysis.believed import believed_lines
 from analysis.harmonics import Harmonic, describe_harmonics
 from analysis.misfit import Departure
 from analysis.models import Model, backlash_document, backlash_lines
@@ -18,7 +19,7 @@ from analysis.next_measurement import CLEAR_SIGMA, NextMeasurement
 from analysis.observation import Observation
 from analysis.swept import sweep_document, sweep_lines
 from analysis.unseen import Unseen, head_unseen, list_unseen
-from analysis.verdict import Judged, Verdict
+from analysis.verdict import Judged, Verdict, is_nothing_hidden
 from analysis.verdict_words import how_sure
 from sim.catalogue import CATALOGUE
 
@@ -60,7 +61,8 @@ class Diagnosis:
     cause may be all the same where nothing is missing, or each other one beside what is named.
     `models`: every model that may be true with its backlash, the accepted or likeliest first.
     `cut_short`: whether a search that found no explanation did not try every set that was worth
-    it, for what it may simulate. `simulated_s`: seconds of motion that were simulated for it.
+    it, for what it may simulate. `believed`: what was believed of the datasheet
+    (`analysis.believed`). `simulated_s`: seconds of motion that were simulated for it.
     """
 
     unit: str
@@ -78,6 +80,7 @@ class Diagnosis:
     unseen: tuple[Unseen, ...] = ()
     models: tuple[Model, ...] = ()
     cut_short: bool = False
+    believed: Mapping[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     elapsed_s: float = 0.0
     simulated_s: float = 0.0
@@ -92,7 +95,7 @@ class Diagnosis:
         """What is believed of a fault in the "plant", in the "chain", in "both" or in "none"."""
         believed = dict.fromkeys(("plant", "chain", "both", "none"), 0.0)
         for one in self.verdict.judged:
-            sites = _sites(one)
+            sites = [] if is_nothing_hidden(one.candidate) else _sites(one)
             believed["none" if not sites else "both" if len(sites) > 1 else sites[0]] += (
                 one.probability
             )
@@ -155,6 +158,7 @@ class Diagnosis:
                     "causes": list(one.effects),
                     "probability": one.probability,
                     "remark": self.verdict.remark(one),
+                    "within_tolerance": is_nothing_hidden(one.candidate),
                     "site": _sites(one),
                     "rival": one in self.verdict.rivals,
                 }
@@ -184,6 +188,7 @@ class Diagnosis:
                 for level, plain, extended in self.by_level
             ],
             "sweeps": self._swept(),
+            **self.believed,
             "misfit_sigma": {
                 "baseline": self.verdict.baseline.misfit,
                 "extended": self.extended.misfit,
@@ -216,6 +221,7 @@ class Diagnosis:
             lines.append(f"    {effect.meaning} On the bench: {effect.bench_cause}.")
             lines.append(f"    To make sure: {effect.check}.")
         lines += [f"  {text}" for text in sweep_lines(self._swept())]
+        lines += [f"  {text}" for text in believed_lines(self.believed)]
         lines += [f"  {text}" for text in backlash_lines(self.models, self.verdict.word)]
         sigma, db = self.held_out_sigma, self.held_out_db
         lines.append(

@@ -20,9 +20,6 @@ __all__ = ["TAIL_FREEDOM", "Emulator", "Prediction"]
 TAIL_FREEDOM = 4.0
 """Degrees of freedom of Student's t, for the scatter of single runs."""
 
-GAIN_TOLERANCE = 0.005
-"""Spread of the tachometer's gain, which scales the whole response."""
-
 _FIT_ITERATIONS = 10
 _SPARE_DRAWS = 6
 _WIDENINGS = 1.25 ** np.arange(10)
@@ -70,6 +67,8 @@ class Emulator:
         (d,): distance over which the response changes smoothly.
     sigmas
         (k,): prior standard deviation of each deviation.
+    gain
+        That of the tachometer's gain, which scales the whole response, as a share.
     """
 
     places: NDArray[np.float64]
@@ -78,6 +77,7 @@ class Emulator:
     blocks: tuple[slice, ...]
     width: NDArray[np.float64]
     sigmas: NDArray[np.float64]
+    gain: float
 
     def predict(self, place: NDArray[np.float64]) -> Prediction:
         """Local quadratic regression about `place` (d,).
@@ -104,7 +104,7 @@ class Emulator:
             mean=fit.coefficients[0].reshape(shape),
             std=std,
             slopes=slopes,
-            sigmas=np.append(self.sigmas, GAIN_TOLERANCE),
+            sigmas=np.append(self.sigmas, self.gain),
             runs=(values.reshape(count, -1) - basis @ fit.coefficients).reshape(count, *shape),
             shares=w / w.sum(),
         )

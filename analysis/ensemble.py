@@ -18,10 +18,10 @@ from sim.effects import EffectSetting
 from sim.response import START_SPREAD, Servo, simulate_cycles
 from sim.unit import Unit
 
-__all__ = ["TOLERANCES", "Draws", "Machine", "safe_cycles"]
+__all__ = ["LEAST_SHARE", "Draws", "Machine", "safe_cycles"]
 
-TOLERANCES = {"R_m": 0.005, "k_t": 0.005, "J_L": 0.005, "k_s1": 0.005, "k_a": 0.005, "k_ts": 0.005}
-"""One standard deviation of the unit-to-unit spread of datasheet values, as a share."""
+LEAST_SHARE = 0.1
+"""Of a datasheet value that is left at least, however wide its tolerance."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,9 @@ class Machine:
     def servo(self, unit: Unit) -> Servo:
         """The machine as something that can be simulated."""
         known = unit.parameters
-        changes = {symbol: known[symbol] * (1.0 + d) for symbol, d in self.deviations}
+        changes = {
+            symbol: known[symbol] * max(1.0 + d, LEAST_SHARE) for symbol, d in self.deviations
+        }
         if self.b_t_deg is not None:
             changes["b_t_deg"] = self.b_t_deg
         if changes:

@@ -8,8 +8,8 @@ posterior of the contribution ratio; neither looks for causes of a misfit
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from analysis.answer import CALL_FOR_DIAGNOSIS
 from analysis.arithmetic import on_one_core
 from analysis.backlash import Backlash, Uncertain, backlash_of_places
+from analysis.believed import HINT, believed_document, believed_lines, trusts_much
 from analysis.ensemble import Machine
 from analysis.executor import Executor
 from analysis.fit import Posterior, fit_posterior, match_runs
@@ -64,6 +65,7 @@ class Estimate:
     simulated_s: float
     sweeps: tuple[dict[str, Any], ...] = ()
     refuted: bool = False
+    believed: Mapping[str, Any] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """The document of ``estimate --json``."""
@@ -75,6 +77,7 @@ class Estimate:
             "b_t_deg": self.b_t_deg.to_json(),
             "error_index": None if self.curve is None else self.curve.to_json(),
             "sweeps": list(self.sweeps),
+            **self.believed,
             "refuted": self.refuted,
             "warnings": list(self.warnings),
             "simulated_s": self.simulated_s,
@@ -86,6 +89,7 @@ class Estimate:
         head = ", by the plain model, which does not fit" if self.refuted else ""
         lines = [f"{self.unit}: backlash by stage{head}", *told.lines("  ")]
         lines += [f"  {text}" for text in sweep_lines(self.sweeps)]
+        lines += [f"  {text}" for text in believed_lines(self.believed)]
         if self.curve is not None:
             lines.append(self.curve.summary())
         lines.append(f"  motion simulated for this: {self.simulated_s:.0f} s")
@@ -156,13 +160,15 @@ def estimate_response(
         doubt = frequency_doubt(
             observation,
             posterior.draws,
-            lambda seen, runs: _robust_rms(match_runs(seen, axes, runs, seed)),
+            lambda seen, runs: _robust_rms(match_runs(unit, seen, axes, runs, seed)),
         )
         warnings = ([doubt] if doubt else []) + warnings
         warnings.append(
             f"the model leaves {misfit:.1f} standard deviations of the response unexplained; "
             f"{CALL_FOR_DIAGNOSIS}"
         )
+        if trusts_much(believed_document(unit)):
+            warnings.append(HINT)
     found = _from_posterior(unit, posterior, curve, tuple(warnings), effort.simulated_s)
     return replace(
         found,
@@ -277,4 +283,5 @@ def _assemble(
         curve=curve,
         warnings=warnings,
         simulated_s=simulated_s,
+        believed=believed_document(unit),
     )

@@ -18,15 +18,16 @@ from numpy.typing import NDArray
 
 from analysis.calibration import calibrate
 from analysis.emulator import Emulator
-from analysis.ensemble import TOLERANCES, Draws, Machine
+from analysis.ensemble import Draws, Machine
 from analysis.executor import Executor
 from analysis.lattice import RATIO, Axis, Families, near_families, wide_families
 from analysis.library import run_families
 from analysis.likelihood import Match, match_prediction
 from analysis.observation import Observation
-from analysis.population import DEVIATING, Population
+from analysis.population import Population
 from analysis.progress import Progress
 from analysis.reading_noise import likeliest_noise, possible_noises
+from analysis.spread import Spread, spread_of
 from sim.unit import Unit
 
 __all__ = ["Posterior", "fit_posterior", "match_runs"]
@@ -77,22 +78,24 @@ def fit_posterior(
             unit, families, observation, cache=cache, executor=executor, progress=tell
         )
 
-    rng = np.random.default_rng(seed)
+    rng, spread = np.random.default_rng(seed), spread_of(unit)
     axes = tuple(axes)
     scales = np.array([axis.scale for axis in axes])
-    wide = wide_families(axes, observation, seed)
+    wide = wide_families(axes, observation, spread, seed)
     draws = runs(wide, 0.0, 0.5, "simulating the range")
-    found = calibrate(observation, _population(axes, draws), scales, rng, cautious=True)
+    found = calibrate(
+        observation, _population(axes, draws, spread), scales, spread.gain, rng, cautious=True
+    )
     std = np.sqrt(np.diag(found.covariance))
-    near = near_families(axes, found.mean, std, observation, seed)
+    near = near_families(axes, found.mean, std, observation, spread, seed)
     draws = draws.joined(runs(near, 0.5, 0.95, "simulating near the answer"))
-    population, width = _population(axes, draws), 0.6 * scales
-    calibrated = calibrate(observation, population, width, rng, cautious=True)
+    population, width = _population(axes, draws, spread), 0.6 * scales
+    calibrated = calibrate(observation, population, width, spread.gain, rng, cautious=True)
     weight = calibrated.density(_grid(axes))
     best = np.clip(calibrated.mean, [axis.low for axis in axes], [axis.high for axis in axes])
 
     def match(seen: Observation) -> Match:
-        return match_prediction(seen, _emulator(seen, population, width).predict(best))
+        return match_prediction(seen, _emulator(seen, population, width, spread).predict(best))
 
     heard = likeliest_noise(possible_noises(observation), lambda s: match(s).log_likelihood)
     if progress is not None:
@@ -108,33 +111,32 @@ def fit_posterior(
 
 
 def match_runs(
-    observation: Observation, axes: Sequence[Axis], draws: Draws, seed: int = 0
+    unit: Unit, observation: Observation, axes: Sequence[Axis], draws: Draws, seed: int = 0
 ) -> Match:
     """What the best place between runs leaves of an observation; nothing is simulated."""
+    spread = spread_of(unit)
     scales = np.array([axis.scale for axis in axes])
-    population, width = _population(axes, draws), 0.6 * scales
+    population, width = _population(axes, draws, spread), 0.6 * scales
     rng = np.random.default_rng(seed)
-    mean = calibrate(observation, population, width, rng, cautious=True).mean
+    mean = calibrate(observation, population, width, spread.gain, rng, cautious=True).mean
     best = np.clip(mean, [axis.low for axis in axes], [axis.high for axis in axes])
 
     def match(seen: Observation) -> Match:
-        return match_prediction(seen, _emulator(seen, population, width).predict(best))
+        return match_prediction(seen, _emulator(seen, population, width, spread).predict(best))
 
     noises = possible_noises(observation)
     return match(likeliest_noise(noises, lambda s: match(s).log_likelihood))
 
 
-def _population(axes: Sequence[Axis], draws: Draws) -> Population:
+def _population(axes: Sequence[Axis], draws: Draws, spread: Spread) -> Population:
     """Runs with the places of their machines along the axes."""
     places = np.array([[_value(axis, m) for axis in axes] for m in draws.machines])
-    deviations = np.array(
-        [[dict(m.deviations).get(s, 0.0) for s in DEVIATING] for m in draws.machines]
-    )
+    deviations = np.array([spread.along(m.deviations) for m in draws.machines])
     return Population(places, deviations, draws.mean, draws.variance)
 
 
 def _emulator(
-    observation: Observation, population: Population, width: NDArray[np.float64]
+    observation: Observation, population: Population, width: NDArray[np.float64], spread: Spread
 ) -> Emulator:
     """What machines between these would show on the bench of an observation."""
     used = np.any(population.deviations != 0.0, axis=0)
@@ -144,7 +146,8 @@ def _emulator(
         population.channels(observation),
         observation.blocks,
         width,
-        np.array([TOLERANCES[s] for s, u in zip(DEVIATING, used, strict=True) if u]),
+        spread.sigmas[used],
+        spread.gain,
     )
 
 

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.candidate import Candidate
-from analysis.ensemble import TOLERANCES, safe_cycles
+from analysis.ensemble import safe_cycles
 from analysis.observation import Observation
-from analysis.population import DEVIATING
+from analysis.spread import spread_of
 from daq.frf import DB_PER_NEPER, FrequencyResponse
 from daq.plan import SweepPlan
 from sim.servo import Servo
@@ -193,8 +193,9 @@ def _measured(
 def _servos(candidate: Candidate, rng: np.random.Generator) -> Iterator[Servo]:
     """Machines at a candidate's best place, each off its datasheet by chance."""
     hypothesis, place = candidate.hypothesis, candidate.best.place
+    spread = spread_of(hypothesis.unit)
     for _ in range(_RUNS):
-        off = tuple((symbol, float(rng.normal() * TOLERANCES[symbol])) for symbol in DEVIATING)
+        off = spread.draw(rng)
         yield hypothesis.machine(place, int(rng.integers(2**30)), off).servo(hypothesis.unit)
 
 

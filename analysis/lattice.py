@@ -14,9 +14,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.ensemble import TOLERANCES, Machine
+from analysis.ensemble import Machine
 from analysis.observation import Observation
-from analysis.population import DEVIATING
+from analysis.spread import Spread
 from sim.response import START_SPREAD
 
 __all__ = ["RATIO", "Axis", "Families", "every_family", "near_families", "wide_families"]
@@ -58,7 +58,9 @@ class Axis:
 RATIO = Axis("ratio", 0.0, 1.0, 33, 0.08, lambda m, v: replace(m, ratio=float(v)))
 
 
-def wide_families(axes: Sequence[Axis], observation: Observation, seed: int) -> Families:
+def wide_families(
+    axes: Sequence[Axis], observation: Observation, spread: Spread, seed: int
+) -> Families:
     """Machines over the whole range: as the datasheet says, evenly, and families that are not."""
     kin = _kin(observation)
     lines = [np.linspace(axis.low, axis.high, axis.coarse) for axis in axes]
@@ -69,7 +71,7 @@ def wide_families(axes: Sequence[Axis], observation: Observation, seed: int) -> 
     high = np.array([axis.high for axis in axes])
     rng = np.random.default_rng([seed, 1])
     return [tuple(evenly[at : at + kin]) for at in range(0, len(evenly), kin)] + [
-        _family(axes, low, high, kin, rng) for _ in range(_WIDE_FAMILIES * len(axes))
+        _family(axes, low, high, kin, spread, rng) for _ in range(_WIDE_FAMILIES * len(axes))
     ]
 
 
@@ -78,6 +80,7 @@ def near_families(
     mean: NDArray[np.float64],
     std: NDArray[np.float64],
     observation: Observation,
+    spread: Spread,
     seed: int,
 ) -> Families:
     """Families about the answer so far: `mean` and `std`, each (d,)."""
@@ -89,13 +92,16 @@ def near_families(
     # An answer that is hardly known is looked at as closely, in fewer places: families overlap.
     count = min(len(chosen), _MOST_NEAR * len(axes))
     evenly = np.linspace(0, len(chosen) - 1, count).round().astype(int)
-    return _families_at(axes, [chosen[i] for i in evenly], observation, seed)
+    return _families_at(axes, [chosen[i] for i in evenly], observation, spread, seed)
 
 
-def every_family(axes: Sequence[Axis], observation: Observation, seed: int) -> Families:
+def every_family(
+    axes: Sequence[Axis], observation: Observation, spread: Spread, seed: int
+) -> Families:
     """All that any answer is held against."""
     places = product(*(range(len(line)) for line in _lines(axes)))
-    return wide_families(axes, observation, seed) + _families_at(axes, places, observation, seed)
+    wide = wide_families(axes, observation, spread, seed)
+    return wide + _families_at(axes, places, observation, spread, seed)
 
 
 def _lines(axes: Sequence[Axis]) -> list[NDArray[np.float64]]:
@@ -109,7 +115,11 @@ def _lines(axes: Sequence[Axis]) -> list[NDArray[np.float64]]:
 
 
 def _families_at(
-    axes: Sequence[Axis], places: Iterable[tuple[int, ...]], observation: Observation, seed: int
+    axes: Sequence[Axis],
+    places: Iterable[tuple[int, ...]],
+    observation: Observation,
+    spread: Spread,
+    seed: int,
 ) -> Families:
     """The family of each place of the lattice."""
     lines, kin = _lines(axes), _kin(observation)
@@ -121,7 +131,7 @@ def _families_at(
         middle = np.array([line[i] for line, i in zip(lines, at, strict=True)])
         bottom, top = np.maximum(middle - reach, low), np.minimum(middle + reach, high)
         rng = np.random.default_rng([seed, 2, *map(int, at)])
-        families.append(_family(axes, bottom, top, kin, rng))
+        families.append(_family(axes, bottom, top, kin, spread, rng))
     return families
 
 
@@ -136,6 +146,7 @@ def _family(
     bottom: NDArray[np.float64],
     top: NDArray[np.float64],
     kin: int,
+    spread: Spread,
     rng: np.random.Generator,
 ) -> tuple[Machine, ...]:
     """Machines evenly over a box, all off their datasheet in the same way.
@@ -144,7 +155,7 @@ def _family(
     wrong about them is what it will get wrong about a unit.
     """
     first = int(rng.integers(2**30))
-    deviations = tuple((symbol, float(rng.normal(0.0, TOLERANCES[symbol]))) for symbol in DEVIATING)
+    deviations = spread.draw(rng)
     # Evenly along every axis, in an order of its own along each.
     strata = np.stack([rng.permutation(kin) for _ in axes], axis=1)
     places = bottom + (top - bottom) * (strata + rng.uniform(size=strata.shape)) / kin

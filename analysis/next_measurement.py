@@ -24,6 +24,7 @@ from analysis.likelihood import HEAT
 from analysis.observation import Observation, channels_of_readings, noise_and_floor, unread
 from analysis.placement import groups_along
 from analysis.population import Group, Population, simulate_groups
+from analysis.spread import spread_of
 from daq.configs import config_names
 from daq.plan import SweepPlan, spaced_frequencies
 from sim.unit import Unit
@@ -41,8 +42,9 @@ _GROUPS = 4
 _ENOUGH = 0.9
 """A plan that parts the rivals this share as well as the best but takes less time is taken."""
 
-_FLOOR = 0.01
-"""Difference in log gain or phase, rad, that deviations of a datasheet could make anyway."""
+_FLOOR, _OF_GAIN = 0.01, 2.0
+"""Difference in log gain or phase, rad, that deviations of a datasheet could make anyway, and as a
+multiple of what the tachometer's gain may be off by."""
 
 _Moments = tuple[NDArray[np.float64], NDArray[np.float64]]
 
@@ -211,14 +213,15 @@ def _separations(
         for of_one in groups
     )
     share = len(grid) / len(thinned.frequencies_hz)
-    return [float(np.sqrt(share * _squares(first, rival) / HEAT)) for rival in rivals]
+    least = max(_FLOOR, _OF_GAIN * spread_of(unit).gain)
+    return [float(np.sqrt(share * _squares(first, rival, least) / HEAT)) for rival in rivals]
 
 
-def _squares(one: _Moments, other: _Moments) -> float:
+def _squares(one: _Moments, other: _Moments, least: float) -> float:
     """Sum of the squares by which two hypotheses are apart, in units of their variances."""
     apart = one[0] - other[0]
     apart[1] = np.angle(np.exp(1j * apart[1]))
-    floor = np.array([_FLOOR, _FLOOR, 0.3])[:, None]
+    floor = np.array([least, least, 0.3])[:, None]
     return float(np.sum(apart**2 / (one[1] + other[1] + floor**2)))
 
 

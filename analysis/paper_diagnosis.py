@@ -9,14 +9,15 @@ both without and with what the microscope knew of the gears.
 from __future__ import annotations
 
 import time
-from collections.abc import Collection
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from analysis.arithmetic import on_one_core
+from analysis.believed import believed_document
 from analysis.causes import Hypothesis
 from analysis.next_measurement import NextMeasurement
 from analysis.paper_belief import Belief, Knowledge, believe
@@ -87,6 +88,7 @@ class PaperDiagnosis:
     procedures: dict[str, Agreement]
     next_measurement: NextMeasurement | None
     elapsed_s: float
+    believed: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def verdict(self) -> str:
@@ -234,6 +236,7 @@ def diagnose_features(
         procedures=procedures,
         next_measurement=proposal,
         elapsed_s=time.perf_counter() - began,
+        believed=believed_document(unit),
     )
 
 

@@ -45,6 +45,7 @@ def document(diagnosis: PaperDiagnosis) -> dict[str, Any]:
             }
             for name, agreement in diagnosis.procedures.items()
         },
+        **diagnosis.believed,
         "next_measurement": None if proposal is None else proposal.to_json(),
         "warnings": list(diagnosis.warnings),
         "elapsed_s": diagnosis.elapsed_s,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.believed import believed_lines
 from analysis.paper_belief import Belief, Judged, index_of
 from analysis.paper_diagnosis_document import parameters, residual
 from analysis.paper_pairs import CHAIN, DISSIPATION, LOADS, VISCOUS
@@ -34,6 +35,7 @@ def summarise(diagnosis: PaperDiagnosis) -> list[str]:
         f"RF {values[2]:.0f} Hz {values[3]:.1f} dB"
         + (f", half-power width {values[4]:.1f} Hz" if np.isfinite(values[4]) else "")
     ]
+    lines += believed_lines(diagnosis.believed)
     for name, belief in diagnosis.beliefs.items():
         lines += ["", f"{_TITLES[name]}: {belief.word}. {_sentence(belief)}"]
         lines.append(f"  {hidden_words(belief.baseline.probability)}")

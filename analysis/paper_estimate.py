@@ -18,6 +18,7 @@ from analysis.ensemble import Draws
 from analysis.error_index import error_index
 from analysis.observation import Observation
 from analysis.resonance import extract
+from analysis.spread import feature_spread
 from daq.errors import AnalysisError, InputError
 from daq.frf import DB_PER_NEPER, FrequencyResponse
 from daq.plan import SweepPlan
@@ -34,9 +35,6 @@ _LOWEST_HZ, _HIGHEST_HZ = 2.0, 2000.0
 
 _READING_STD_HZ = 0.5
 """A frequency that comes without an error bar was read off a grid of 1 Hz."""
-
-_TOLERANCE = 0.0035
-"""Spread of a unit's own frequencies from that of its inertias and stiffnesses."""
 
 _RATIOS = np.linspace(0.0, 1.0, 101)
 _WIDTH = 0.15
@@ -192,8 +190,9 @@ def fit_features(
     curve = _feature_curve(ratios, [response_of_cycles(c, plan, unit.name, {}) for c in runs])
     index = _index_curve(curve, (arf_hz, _READING_STD_HZ), (rf_hz, _READING_STD_HZ))
 
-    arf_std = np.hypot(curve.arf_std, np.hypot(_READING_STD_HZ, _TOLERANCE * arf_hz))
-    rf_std = np.hypot(curve.rf_std, np.hypot(_READING_STD_HZ, _TOLERANCE * rf_hz))
+    share, _ = feature_spread(unit)
+    arf_std = np.hypot(curve.arf_std, np.hypot(_READING_STD_HZ, share * arf_hz))
+    rf_std = np.hypot(curve.rf_std, np.hypot(_READING_STD_HZ, share * rf_hz))
     chi2 = ((curve.arf - arf_hz) / arf_std) ** 2 + ((curve.rf - rf_hz) / rf_std) ** 2
     excess = max(float(np.nanmin(chi2)), 1.0)
     score = -0.5 * chi2 / excess - np.log(arf_std) - np.log(rf_std)

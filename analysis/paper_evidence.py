@@ -20,11 +20,11 @@ from analysis.causes import Hypothesis
 from analysis.paper_exploration import Explored
 from analysis.paper_surface import FREEDOM
 from analysis.paper_sweeps import Reading
+from analysis.spread import feature_spread
+from daq.frf import DB_PER_NEPER
+from sim.unit import Unit
 
 __all__ = ["Agreement", "RatioPrior", "agree", "reading_error", "weighted_box"]
-
-TOLERANCE = 0.0035
-"""Spread of a unit's own frequencies from that of its inertias and stiffnesses, as a share."""
 
 _IS_HZ = np.array([True, False, True, False, True])
 
@@ -49,10 +49,10 @@ class RatioPrior:
         return np.asarray(drawn, dtype=np.float64)
 
 
-def reading_error(reading: Reading) -> NDArray[np.float64]:
+def reading_error(reading: Reading, unit: Unit) -> NDArray[np.float64]:
     """Reading error and tolerance of the datasheet together, shape (5,); 0 where not measured."""
-    known = np.isfinite(reading.values)
-    tolerance = np.where(_IS_HZ, TOLERANCE * np.abs(reading.values), 0.0)
+    known, (frequency, gain) = np.isfinite(reading.values), feature_spread(unit)
+    tolerance = np.where(_IS_HZ, frequency * np.abs(reading.values), DB_PER_NEPER * gain)
     return np.where(known, np.hypot(reading.std, tolerance), 0.0)
 
 
@@ -220,7 +220,7 @@ def agree(explored: Explored, reading: Reading, prior: RatioPrior) -> Agreement:
     places[:, 0] = prior.draw(places[:, 0])
     mean, scatter, shown = surface.predict(places)
     covariance = scatter[:, :, None] * surface.correlation * scatter[:, None, :]
-    covariance = covariance + np.diag(reading_error(reading) ** 2)
+    covariance = covariance + np.diag(reading_error(reading, explored.hypothesis.unit) ** 2)
     log_volume = float(np.sum(np.log(high - low)))
     return Agreement(
         explored.hypothesis, places, log_volume, mean, covariance, np.log(shown), reading

@@ -116,7 +116,7 @@ def _lay_over(
     scatter = np.maximum(first.scatter[:, :, None], second.scatter[:, None])
     shown = np.minimum(first.shown[:, :, None], second.shown[:, None])
     # How scatters go together is left out here: a guess need not know.
-    std = np.hypot(scatter, reading_error(reading))
+    std = np.hypot(scatter, reading_error(reading, pair.unit))
     z = np.where(np.isfinite(reading.values), (reading.values - mean) / std, 0.0)
     term = -0.5 * (FREEDOM + 1.0) * np.log1p(z**2 / FREEDOM) - np.log(std) + np.log(shown)
     log_likelihood = term[..., np.isfinite(reading.values)].sum(axis=-1).ravel()

@@ -16,16 +16,13 @@ from numpy.typing import NDArray
 from scipy.linalg import hadamard
 
 from analysis.causes import Hypothesis
-from analysis.ensemble import TOLERANCES
 from analysis.executor import Executor
 from analysis.family import Family, read_families
 from analysis.observation import Observation, channels_of_readings
+from analysis.spread import Spread, spread_of
 from sim.unit import Unit
 
-__all__ = ["DEVIATING", "Group", "Population", "simulate_groups"]
-
-DEVIATING = ("R_m", "k_t", "J_L", "k_s1", "k_a")
-"""Datasheet values whose spread is simulated; that of k_ts scales the gain alone."""
+__all__ = ["Group", "Population", "simulate_groups"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,8 +46,8 @@ class Group:
 class Population:
     """Runs of one hypothesis.
 
-    `places` (n, d); `deviations` (n, k) of the datasheet values `DEVIATING`,
-    relative; `mean`, `variance` (n, rows): the reading of each run, see
+    `places` (n, d); `deviations` (n, k) along the ways in which the unit spreads
+    (`analysis.spread`); `mean`, `variance` (n, rows): the reading of each run, see
     `analysis.observation.readings_of_cycles`.
     """
 
@@ -97,9 +94,10 @@ def simulate_groups(
         return {}
     families: list[Family] = []
     deviations: list[NDArray[np.float64]] = []
-    for group, signs in zip(groups, list(_signs(groups, rng)), strict=True):
-        off = signs * np.array([TOLERANCES[symbol] for symbol in DEVIATING])
-        named = tuple((s, float(v)) for s, v in zip(DEVIATING, off, strict=True))
+    spread = spread_of(unit)
+    for group, signs in zip(groups, list(_signs(groups, spread, rng)), strict=True):
+        off = signs * spread.sigmas
+        named = spread.deviations(off)
         seeds = rng.integers(2**30, size=len(group.ratios))
         machines = tuple(
             group.hypothesis.machine(place, int(seed), named)
@@ -116,14 +114,16 @@ def simulate_groups(
     return found
 
 
-def _signs(groups: Sequence[Group], rng: np.random.Generator) -> Iterator[NDArray[np.float64]]:
-    """Signs (k,) of one standard deviation of each datasheet value, for every group.
+def _signs(
+    groups: Sequence[Group], spread: Spread, rng: np.random.Generator
+) -> Iterator[NDArray[np.float64]]:
+    """Signs (k,) of one standard deviation along each way, for every group.
 
     Two neighbouring groups of a hypothesis deviate in opposite ways, and pairs in ways at right
     angles to each other: few groups then tell what deviations do, and their mean is that of a
     unit as the datasheet says. Signs drawn one by one would leave both to chance.
     """
-    patterns = hadamard(8)[:, 1 : len(DEVIATING) + 1].astype(float)
+    patterns = hadamard(8)[:, 1 : len(spread) + 1].astype(float)
     turns: dict[tuple[str, ...], list[NDArray[np.float64]]] = {}
     for group in groups:
         turn = turns.setdefault(group.hypothesis.effects, [])

@@ -19,6 +19,7 @@ from analysis.lattice import every_family
 from analysis.library import are_kept, run_families
 from analysis.observation import Observation
 from analysis.progress import Progress, part_of
+from analysis.spread import spread_of
 from daq.errors import InputError, LashbenchError
 from daq.trust import distrust
 from sim.effort import counting
@@ -79,7 +80,7 @@ def prepare_sweep(
     """
     _check_usable(cache)
     searched = unit.stages == 2
-    families = every_family(free_axes(unit), observation, seed=0)
+    families = every_family(free_axes(unit), observation, spread_of(unit), seed=0)
     coarse = observation.thinned(coarse_stride(observation))
 
     def kept() -> list[bool]:

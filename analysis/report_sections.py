@@ -11,6 +11,7 @@ from typing import Any
 
 from analysis.advice import Advice
 from analysis.answer import Answer, model_name
+from analysis.believed import believed_lines
 from analysis.features import with_error
 from analysis.markup import Markup, element, joined, table
 from analysis.swept import sweep_lines
@@ -138,6 +139,7 @@ def backlash_section(data: Data, answer: Answer, advice: Advice, picture: Markup
             caption = f"{bar} {caption}" if estimate and estimate.get("error_index") else bar
         parts.append(element("figure", picture, element("figcaption", caption)))
     if estimate is not None and diagnosis is None:
+        parts.append(_list(believed_lines(estimate)))
         parts.append(_notes(estimate.get("warnings", [])))
     return _section("Backlash", *parts)
 
@@ -183,6 +185,7 @@ def diagnosis_section(data: Data, pictures: Sequence[tuple[Markup, str]]) -> Mar
         element("p", element("b", f"{word.capitalize()}. "), " ".join(verdict_words(diagnosis))),
         _causes(diagnosis),
         [element("p", f"Taken together: {'; '.join(swept)}.")] if swept else Markup(""),
+        _list(believed_lines(diagnosis)),
         _gain(diagnosis),
         [
             element("figure", svg, element("figcaption", caption), class_="half")

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from analysis.calibration import NEAREST, Calibrated, calibrate
 from analysis.candidate import Candidate
 from analysis.observation import Observation
+from analysis.spread import spread_of
 
 __all__ = ["size_candidate", "widen_if_open"]
 
@@ -33,7 +34,8 @@ def size_candidate(
     `nearest`: how many of the runs take part where the answer lies.
     """
     runs, width = candidate.population, _width(candidate)
-    return _clipped(calibrate(observation, runs, width, rng, nearest=nearest))
+    gain = spread_of(candidate.hypothesis.unit).gain
+    return _clipped(calibrate(observation, runs, width, gain, rng, nearest=nearest))
 
 
 def widen_if_open(
@@ -48,7 +50,8 @@ def widen_if_open(
     A search places runs ever closer about an answer; where the data say nothing, it seems known.
     """
     runs, width = candidate.population, _width(candidate)
-    open_ = calibrate(observation, runs, width, rng, nearest=nearest, cautious=True)
+    gain = spread_of(candidate.hypothesis.unit).gain
+    open_ = calibrate(observation, runs, width, gain, rng, nearest=nearest, cautious=True)
     wider = np.sqrt(np.diag(open_.covariance) / np.diag(found.covariance))
     return _clipped(open_) if wider[0] > _OPEN else found
 

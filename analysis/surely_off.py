@@ -40,15 +40,19 @@ def hold_against_datasheet(verdict: Verdict, found: Calibrated) -> Verdict:
     Returns
     -------
     Verdict
-        If the best set is of one cause, that nothing is missing, or that nothing explains it where
+        If all of it is within the tolerance of the datasheet, that nothing is missing. If the best
+        set is of one cause, that nothing is missing, or that nothing explains it where
         the plain model does not. If it is of several, that the rest is named, and the whole its
         rival; or the rest is a rival, where its own runs are too few or too far to say that it will
         do: all of them as the datasheet has that value are the rest.
     """
     best = verdict.best
+    named = verdict.word in ("explained", "ambiguous")
+    if named and best.candidate.hypothesis.is_tolerance(found.mean):
+        return Verdict("consistent", verdict.baseline, verdict.judged, verdict.baseline)
     unsure = _unsure(best.candidate.hypothesis, found)
     rest = tuple(effect for effect in best.effects if effect not in unsure)
-    if verdict.word not in ("explained", "ambiguous") or not unsure:
+    if not named or not unsure:
         return verdict
     if rest:
         return _with_part(verdict, rest)
@@ -86,7 +90,8 @@ def _among(judged: Sequence[Judged], effects: Effects) -> Judged:
 
 def _unsure(hypothesis: Hypothesis, found: Calibrated) -> set[str]:
     """Effects of which every size is a datasheet value, and is not surely off it."""
-    std = np.sqrt(np.diag(found.covariance))[1:]
+    # Off by more than the datasheet may be, too.
+    std = np.hypot(np.sqrt(np.diag(found.covariance))[1:], hypothesis.spread)
     # What the datasheet says nothing of is no number, and not near to it.
     near = np.abs(found.mean[1:] - hypothesis.datasheet) <= _SURELY * std
     sure = {effect for (effect, _), one in zip(hypothesis.parameters, near, strict=True) if not one}

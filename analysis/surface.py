@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from analysis.agreement import agree, weigh
 from analysis.branches import Motions
 from analysis.chart import Chart
-from analysis.emulator import GAIN_TOLERANCE
 from analysis.executor import side_by_side
 from analysis.expectation import Readings, Runs
 from analysis.likelihood import HEAT
@@ -93,6 +92,8 @@ class Surface:
         (k,): prior standard deviations of the deviations.
     motions
         States of the runs and of the observation: where they differ a run tells nothing.
+    gain
+        Prior standard deviation of what scales the whole response, the tachometer's gain, a share.
     enough
         How many runs a regression takes, by their weights.
     tailed
@@ -110,6 +111,7 @@ class Surface:
     slopes: NDArray[np.float64]
     sigmas: NDArray[np.float64]
     motions: Motions
+    gain: float
     enough: float
     tailed: bool = True
     chart: Chart | None = None
@@ -269,7 +271,7 @@ class Surface:
             np.isfinite(self.observation.values),
             # Solved slopes lie column by column, and what is computed goes along rows.
             np.ascontiguousarray(slopes),
-            np.append(self.sigmas, GAIN_TOLERANCE),
+            np.append(self.sigmas, self.gain),
             *self.motions.course,
         )
 

@@ -28,10 +28,12 @@ __all__ = [
     "LEAST_GAIN",
     "LEAST_LEAD",
     "UNEARNED",
+    "WITHIN_TOLERANCE",
     "Judged",
     "Verdict",
     "Word",
     "earns_its_name",
+    "is_nothing_hidden",
     "judge_candidates",
     "may_be_chance",
     "put_behind",
@@ -108,6 +110,7 @@ are believed in its place, are rivals: of 142 sets drawn and named so two had le
 
 _JUDGED = 6
 
+WITHIN_TOLERANCE = "within the tolerance of the datasheet"
 _NOT_ASKED = "too far behind to be asked"
 UNEARNED = "a part of it does as well, or would by chance"
 
@@ -188,6 +191,8 @@ class Verdict:
         """What speaks against a set, or makes it no rival; empty where nothing does."""
         if self.says_the_same(one):
             return "says the same with more sizes"
+        if one.effects and is_nothing_hidden(one.candidate):
+            return WITHIN_TOLERANCE
         return one.objection if one.refused else ""
 
     def says_the_same(self, one: Judged) -> bool:
@@ -385,7 +390,15 @@ def _score(candidate: Candidate, held_out: HeldOut) -> float:
     return float(agreed - _cost(candidate))
 
 
+def is_nothing_hidden(candidate: Candidate) -> bool:
+    """Whether it is the plain model, or that within the tolerance of its datasheet."""
+    hypothesis = candidate.hypothesis
+    return not hypothesis.effects or hypothesis.is_tolerance(candidate.best.place)
+
+
 def _cost(candidate: Candidate) -> float:
+    if is_nothing_hidden(candidate):
+        return 0.0
     sizes = candidate.best.place[1:]
     bound = np.count_nonzero((sizes < EDGE) | (sizes > 1.0 - EDGE))
     causes = len(candidate.hypothesis.effects)

@@ -100,11 +100,13 @@ def open_questions(document: Mapping[str, Any]) -> list[str]:
 
 
 def _of_nothing(document: Mapping[str, Any]) -> float | None:
-    """The probability of the plain model among the sets that were judged."""
+    """The probability of the plain model, and of all within its tolerance, of the sets judged."""
     believed: Sequence[float] = [
-        one["probability"] for one in document.get("rivals") or () if not one["causes"]
+        one["probability"]
+        for one in document.get("rivals") or ()
+        if not one["causes"] or one.get("within_tolerance")
     ]
     if believed:
-        return float(believed[0])
+        return float(sum(believed))
     sides = document.get("site_probability") or {}
     return None if sides.get("none") is None else float(sides["none"])

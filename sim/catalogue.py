@@ -323,7 +323,7 @@ _ALL = (
     ),
     Effect(
         "motor-constant",
-        (_P("scale", "1", span(0.5, 2.0), (1e-9, math.inf)),),
+        (_P("scale", "1", span(0.5, 2.0), (1e-9, math.inf), of=("k_t", "k_b")),),
         "plant",
         "Torque constant and back-EMF constant are both off by one factor.",
         "magnets that lost or differ in strength",

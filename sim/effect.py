@@ -26,6 +26,12 @@ __all__ = [
     "times",
 ]
 
+_HEALTHY = 3.0
+"""Standard deviations of a datasheet value within which a unit is as its datasheet says."""
+
+_BEYOND = 6.0
+"""Standard deviations of a datasheet value that its plausible range holds at least."""
+
 SOURCE_MOST_VPK = 5.0
 """What the source of a 35670A gives at most, V peak."""
 
@@ -36,7 +42,8 @@ class EffectParameter:
 
     `range` gives the plausible span for a unit, in `unit_symbol`; values
     outside `allowed` have no physical meaning and are refused. `tolerance`: the share by
-    which what the datasheet knows may be off in a healthy unit, three standard deviations.
+    which what the datasheet knows may be off in a healthy unit at least, three standard
+    deviations. `of`: the datasheet values that a factor is on.
     """
 
     name: str
@@ -44,6 +51,7 @@ class EffectParameter:
     range: Callable[[Unit], tuple[float, float]]
     allowed: tuple[float, float] = (0.0, math.inf)
     tolerance: float = 0.015
+    of: tuple[str, ...] = ()
 
     def nominal(self, unit: Unit) -> float | None:
         """What a unit without the effect has: its datasheet's value, or 1 of a factor on some.
@@ -51,6 +59,15 @@ class EffectParameter:
         None where the effect adds what the datasheet does not know.
         """
         return 1.0 if self.name == "scale" else unit.parameters.get(self.name)
+
+    def spread(self, unit: Unit) -> float:
+        """One standard deviation of it that is believed of the datasheet, as a share; 0 if none."""
+        shares = unit.tolerances
+        return max((shares.get(symbol, 0.0) for symbol in (self.name, *self.of)), default=0.0)
+
+    def within(self, unit: Unit) -> float:
+        """The share by which it may be off in a healthy unit: three standard deviations."""
+        return max(self.tolerance, _HEALTHY * self.spread(unit))
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,8 +103,13 @@ def table_1(symbol: str) -> Callable[[Unit, Mapping[str, float]], Unit]:
 
 
 def around(symbol: str, low: float, high: float) -> Callable[[Unit], tuple[float, float]]:
-    """A range as multiples of the datasheet's value."""
-    return lambda unit: (low * unit.parameters[symbol], high * unit.parameters[symbol])
+    """A range as multiples of the datasheet's value, wider where that is hardly known."""
+
+    def ends(unit: Unit) -> tuple[float, float]:
+        known, wide = unit.parameters[symbol], math.exp(_BEYOND * unit.tolerances.get(symbol, 0.0))
+        return min(low, 1.0 / wide) * known, max(high, wide) * known
+
+    return ends
 
 
 def span(low: float, high: float) -> Callable[[Unit], tuple[float, float]]:

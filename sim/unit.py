@@ -7,14 +7,16 @@ backlash between the stages. It builds no equations.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
 
 from daq.configs import config_path
 from daq.errors import ConfigurationError
 from daq.toml_files import read_toml
+from sim.tolerance import Share, believed_shares, find_fault
 
 __all__ = ["StageBacklash", "Unit", "load_unit", "stage_backlash", "unit_from_mapping"]
 
@@ -127,6 +129,17 @@ class Unit(_Section):
     load: Load
     backlash: Backlash
     limits: Limits
+    tolerance: Mapping[str, Share] | None = None
+    """One standard deviation of datasheet values, as a share, by symbol or ``default``."""
+    _override: dict[str, float] = PrivateAttr(default_factory=dict)
+    """The same, as told on a command line in place of the file."""
+
+    @model_validator(mode="after")
+    def _has_known_tolerances(self) -> Self:
+        fault = find_fault(self.parameters, self.tolerance or {})
+        if fault:
+            raise ValueError(fault)
+        return self
 
     @model_validator(mode="after")
     def _has_whole_stages(self) -> Self:
@@ -183,12 +196,42 @@ class Unit(_Section):
         }
 
     @property
+    def tolerances(self) -> dict[str, float]:
+        """What is believed of the datasheet: one standard deviation of each value, as a share."""
+        return {symbol: share for symbol, (share, _) in self.believed.items()}
+
+    @property
+    def believed(self) -> dict[str, tuple[float, str]]:
+        """The same with where it comes from: ``option``, ``unit file`` or ``default``."""
+        return believed_shares(self.parameters, self._override, self.tolerance or {})
+
+    def with_tolerance(self, shares: Mapping[str, float]) -> Unit:
+        """A copy of which the datasheet is believed otherwise.
+
+        Parameters
+        ----------
+        shares
+            By symbol, or ``default`` for all values but exact ones; they override the file's.
+
+        Raises
+        ------
+        ConfigurationError
+            If a symbol has no tolerance, or a share is not between 0 and 0.5.
+        """
+        fault = find_fault(self.parameters, shares)
+        if fault:
+            raise ConfigurationError(f"unit {self.name}: {fault}")
+        copy = self.model_copy()
+        copy._override = {**self._override, **shares}
+        return copy
+
+    @property
     def physics(self) -> dict[str, Any]:
         """What decides how it moves, as JSON: neither its name nor its limits, nor its tolerance.
 
         Whatever is stored of a unit, and every seed, depends on this alone.
         """
-        return self.model_dump(mode="json", exclude={"schema_", "name", "limits"})
+        return self.model_dump(mode="json", exclude={"schema_", "name", "limits", "tolerance"})
 
     def with_parameters(self, **changes: float) -> Unit:
         """A copy with some parameters changed by symbol, checked like a file.
@@ -206,10 +249,12 @@ class Unit(_Section):
                     f"unit {self.name}: there is no parameter {symbol!r}; "
                     f"use one of: {', '.join(sorted(known))}"
                 )
-            for section in document.values():
-                if isinstance(section, dict) and symbol in section:
+            for name, section in document.items():
+                if name != "tolerance" and isinstance(section, dict) and symbol in section:
                     section[symbol] = float(value)
-        return unit_from_mapping(document, source=f"unit {self.name}")
+        changed = unit_from_mapping(document, source=f"unit {self.name}")
+        changed._override = dict(self._override)
+        return changed
 
 
 def unit_from_mapping(document: dict[str, Any], source: str) -> Unit:

@@ -24,6 +24,7 @@ from analysis.lattice import RATIO, Families, every_family
 from analysis.library import run_name, write_runs
 from analysis.observation import Observation, unread
 from analysis.population import Population
+from analysis.spread import spread_of
 from daq.plan import SweepPlan, spaced_frequencies
 from sim.unit import load_unit
 
@@ -70,7 +71,7 @@ def _rounded(values: NDArray[np.float64], bits: int) -> NDArray[np.float64]:
 
 def usual_families(name: str) -> Families:
     """All machines that an estimate of the usual sweep of a unit may ask for."""
-    return every_family((RATIO,), usual_sweep(name), seed=0)
+    return every_family((RATIO,), usual_sweep(name), spread_of(load_unit(name)), seed=0)
 
 
 def agreement(apart: NDArray[np.complex128], rng: np.random.Generator) -> float:

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.causes import Hypothesis
-from analysis.ensemble import TOLERANCES
 from daq.frf import DB_PER_NEPER, GAIN_STD_IS, FrequencyResponse, error_words
 from daq.plan import SweepPlan, spaced_frequencies
 from sim.catalogue import COMMON
@@ -21,6 +20,9 @@ from sim.unit import Unit, load_unit
 
 BANDS_HZ = {"adss": (100.0, 180.0), "edss": (30.0, 110.0)}
 LEVELS_VPK = (1.5, 2.5, 4.0)
+TOLERANCES = dict.fromkeys(("R_m", "k_t", "J_L", "k_s1", "k_a", "k_ts"), 0.005)
+"""What the shipped units state of their datasheets."""
+
 NOISE_V = 5e-4
 
 SHARES = (0.06, 0.4)

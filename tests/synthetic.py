@@ -14,7 +14,8 @@ from analysis.branches import Motions
 from analysis.candidate import Candidate
 from analysis.causes import Hypothesis
 from analysis.observation import Observation
-from analysis.population import DEVIATING, Population
+from analysis.population import Population
+from analysis.spread import spread_of
 from analysis.surface import Surface
 from daq.plan import SweepPlan
 from sim.effects import drivetrain_with
@@ -25,7 +26,8 @@ PAYLOAD = Hypothesis(ADSS, ("payload-flexibility",))
 FREQUENCIES = tuple(np.linspace(100.0, 180.0, 24))
 LEVELS = (1.5, 4.0)
 ROWS = len(FREQUENCIES) * len(LEVELS)
-SIGMAS = np.full(len(DEVIATING), 0.005)
+SPREAD = spread_of(load_unit("adss"))
+SIGMAS = SPREAD.sigmas
 SCATTER = np.array([0.02, 0.02, 0.2])[:, None]
 
 
@@ -39,7 +41,7 @@ def shape(seed: int) -> np.ndarray:
 
 
 BASE, RATIO_SLOPE = shape(1), shape(2)
-DEVIATION_SLOPES = np.stack([shape(10 + i) for i in range(len(DEVIATING))])
+DEVIATION_SLOPES = np.stack([shape(10 + i) for i in range(len(SPREAD))])
 
 
 def effect_slope(effects: tuple[str, ...]) -> np.ndarray:
@@ -49,7 +51,7 @@ def effect_slope(effects: tuple[str, ...]) -> np.ndarray:
 
 def read(effects, place, rng, deviations=None, scatter=1.0):
     """One run (3, rows)."""
-    deviations = np.zeros(len(DEVIATING)) if deviations is None else deviations
+    deviations = np.zeros(len(SPREAD)) if deviations is None else deviations
     size = place[1] if len(place) > 1 else 0.0
     value = BASE + RATIO_SLOPE * (place[0] - 0.5) + effect_slope(effects) * size
     value = value + np.tensordot(deviations, DEVIATION_SLOPES, axes=1)
@@ -59,7 +61,7 @@ def read(effects, place, rng, deviations=None, scatter=1.0):
 def population(places, runs) -> Population:
     """Runs (m, 3, rows) at places (m, d) of units as their datasheet says."""
     mean = np.exp(runs[:, 0] + 1j * runs[:, 1])
-    none = np.zeros((len(runs), len(DEVIATING)))
+    none = np.zeros((len(runs), len(SPREAD)))
     return Population(places, none, mean, np.exp(2.0 * runs[:, 2]))
 
 
@@ -127,7 +129,7 @@ def candidate(
     difference = runs - seen.values - np.tensordot(deviations, slopes, axes=1)
     width = np.array([0.4] + [0.4] * (hypothesis.d - 1))
     motions = Motions.unknown(*difference.shape[::2])
-    surface = Surface(seen, places, difference, width, slopes, SIGMAS, motions, 9.0)
+    surface = Surface(seen, places, difference, width, slopes, SIGMAS, motions, SPREAD.gain, 9.0)
     nothing = np.zeros(runs[:, 0].shape)
     population = Population(places, deviations, nothing + 1.0 + 0j, nothing)
     return Candidate(hypothesis, population, surface, surface.climb(places.mean(axis=0)))

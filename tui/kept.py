@@ -76,7 +76,7 @@ def software() -> str:
 
 def belief_of(unit: Unit) -> str:
     """Digest of what an answer depends on of a unit: its values and their tolerances."""
-    believed = [unit.physics, getattr(unit, "tolerances", None)]
+    believed = [unit.physics, unit.tolerances]
     return hashlib.sha256(json.dumps(believed, sort_keys=True).encode()).hexdigest()
 
 

@@ -22,10 +22,12 @@ __all__ = [
     "Json",
     "Plots",
     "Real",
+    "Tolerance",
     "UnitName",
     "Whole",
     "parameter_settings",
     "prepare_directory",
+    "tolerance_shares",
 ]
 
 _WHOLE = re.compile(r"[+-]?[0-9]+\Z")
@@ -82,6 +84,17 @@ Cluster = Annotated[
 ]
 """Where ensembles are simulated, in place of this machine."""
 
+Tolerance = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--tolerance",
+        negative=(),
+        help="Of the datasheet, one standard deviation as a share or per cent: 0.05 or 5% of all "
+        "values, R_m=8% of one; repeat it for several. In place of what the unit file says.",
+    ),
+]
+"""What is believed of the datasheet, see `tolerance_shares`."""
+
 Plots = Annotated[Path | None, Parameter(name="--plots", help="Directory for figures (PNG).")]
 """Where figures go, made if it is not there."""
 
@@ -106,6 +119,34 @@ def parameter_settings(settings: Sequence[str]) -> dict[str, float]:
         except ValueError as error:
             raise InputError(f"--set {symbol}: {error}") from error
     return values
+
+
+def tolerance_shares(settings: Sequence[str] | None) -> dict[str, float]:
+    """Read ``SHARE`` and ``NAME=SHARE``; what stands alone is that of ``default``.
+
+    Raises
+    ------
+    InputError
+        If one is no share, or a name comes twice.
+    """
+    shares: dict[str, float] = {}
+    for setting in settings or ():
+        name, equals, text = (part.strip() for part in setting.partition("="))
+        if not equals:
+            name, text = "default", name
+        number, per_cent = text.removesuffix("%").strip(), text.endswith("%")
+        try:
+            share = real_number(number) / (100.0 if per_cent else 1.0)
+        except ValueError:
+            raise InputError(
+                f"--tolerance {setting!r} is not SHARE or NAME=SHARE; give for instance 0.05, 5% "
+                "or R_m=8%"
+            ) from None
+        if name in shares:
+            of = "for all values" if name == "default" else f"for {name}"
+            raise InputError(f"--tolerance is given twice {of}; give it once")
+        shares[name] = share
+    return shares
 
 
 def prepare_directory(path: Path) -> Path:

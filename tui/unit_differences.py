@@ -25,7 +25,8 @@ def differing_values(
     Parameters
     ----------
     limits
-        Whether what a unit may be driven with, and may have as backlash, is compared, too.
+        Whether what a unit may be driven with, and may have as backlash, is compared, too, and
+        its tolerance.
     """
     ours, theirs = _values(one, limits), _values(other, limits)
     return {
@@ -55,9 +56,10 @@ def origin_words(unit: Unit, name: str) -> str:
 
 
 def _values(unit: Unit, limits: bool) -> dict[str, Value]:
-    return {
-        symbol: value
-        for section, values in unit.model_dump().items()
-        if isinstance(values, dict) and (limits or section != "limits")
-        for symbol, value in values.items()
-    }
+    found: dict[str, Value] = {}
+    for section, values in unit.model_dump().items():
+        if isinstance(values, dict) and (limits or section not in ("limits", "tolerance")):
+            # A tolerance bears the name of its value.
+            of = "tolerance of " if section == "tolerance" else ""
+            found |= {f"{of}{symbol}": value for symbol, value in values.items()}
+    return found

@@ -80,7 +80,7 @@ def branching(request):
 def surface(seen, values, states):
     places = np.linspace(0.0, 1.0, len(values))[:, None]
     none = np.empty((0, 3, ROWS))
-    return Surface(seen, places, values, np.array([0.5]), none, np.empty(0), states, 4.0)
+    return Surface(seen, places, values, np.array([0.5]), none, np.empty(0), states, 0.005, 4.0)
 
 
 def test_what_is_expected_of_a_quiet_sweep_is_what_quiet_runs_show(branching):

@@ -7,7 +7,7 @@ import pytest
 
 from analysis.calibration import calibrate
 from analysis.observation import USUAL_NOISE_V, observe, unread
-from analysis.population import DEVIATING, Population
+from analysis.population import Population
 from daq.frf import FrequencyResponse
 from daq.plan import SweepPlan
 
@@ -16,6 +16,8 @@ SCATTER = 0.2
 SENSITIVITY = np.linspace(0.5, 2.0, ROWS)
 LEVEL = 0.25
 """Source level at which the quietest points show less than a bench's usual noise, V."""
+
+GAIN = 0.005
 
 
 def channels(x, rng, branch=False, scatter=SCATTER):
@@ -37,7 +39,7 @@ def experiment(seed, branch, scatter=SCATTER, step=1):
     drawn = np.array([channels(v, rng, branch, scatter) for v in x])[..., ::step]
     measured = channels(truth, rng, branch, scatter)[:, ::step]
     observation = observed(measured, step)
-    return truth, calibrate(observation, runs(x[:, None], drawn), np.array([0.3]), rng)
+    return truth, calibrate(observation, runs(x[:, None], drawn), np.array([0.3]), GAIN, rng)
 
 
 def observed(measured, step=1):
@@ -55,7 +57,7 @@ def observed(measured, step=1):
 def runs(places, drawn):
     """Runs (m, 3, rows) at places (m, d) of units as their datasheet says."""
     mean, variance = np.exp(drawn[:, 0] + 1j * drawn[:, 1]), np.exp(2.0 * drawn[:, 2])
-    return Population(places, np.zeros((len(places), len(DEVIATING))), mean, variance)
+    return Population(places, np.zeros((len(places), 5)), mean, variance)
 
 
 @pytest.mark.parametrize("branch", [False, True])
@@ -100,7 +102,7 @@ def test_two_free_numbers_are_told_apart():
     truth = (0.4, 0.6)
     measured = pair(*truth)
     known = runs(places, np.array([pair(*p) for p in places]))
-    found = calibrate(observed(measured), known, np.array([0.3, 0.3]), rng)
+    found = calibrate(observed(measured), known, np.array([0.3, 0.3]), GAIN, rng)
     z = (found.mean - truth) / np.sqrt(np.diag(found.covariance))
     assert np.abs(z).max() < 4.0
     assert np.all(np.sqrt(np.diag(found.covariance)) < 0.2)
@@ -137,7 +139,7 @@ def chattering(truth, noise_v, rng):
     doubted = replace(quiet, values=shown, loudest_v=loudest_v)
     # Heard as the belief about benches would have it, right or wrong.
     return calibrate(
-        doubted, runs(x[:, None], np.array([motion(v) for v in x])), np.array([0.3]), rng
+        doubted, runs(x[:, None], np.array([motion(v) for v in x])), np.array([0.3]), GAIN, rng
     )
 
 

@@ -81,7 +81,7 @@ def test_a_regression_over_what_is_reflected_foretells_a_resonance_and_one_over_
     chart = Chart(PAYLOAD, FREQUENCIES)
 
     def missed(width, chart):
-        surface = Surface(seen, runs, difference, width, none, np.empty(0), alike, 16.0,
+        surface = Surface(seen, runs, difference, width, none, np.empty(0), alike, 0.005, 16.0,
                           chart=chart)  # fmt: skip
         found = np.array([surface.expected(place)[0] for place in asked]) - truth
         found[:, 1] = np.angle(np.exp(1j * found[:, 1]))

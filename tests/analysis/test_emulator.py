@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.emulator import GAIN_TOLERANCE, Emulator
+from analysis.emulator import Emulator
 from daq.errors import AnalysisError
 
 ROWS = 12
@@ -33,6 +33,7 @@ def drawn(seed, count=400, outliers=0.0):
         (slice(0, ROWS),),
         np.array([0.15]),
         np.array([0.005]),
+        0.004,
     )
 
 
@@ -45,7 +46,7 @@ def test_mean_slope_and_scatter_come_back(seed):
     np.testing.assert_allclose(np.median(prediction.std / SCALE), 1.0, atol=0.35)
     np.testing.assert_array_equal(prediction.slopes[1, 0], 1.0)
     np.testing.assert_array_equal(prediction.slopes[1, 1:], 0.0)
-    np.testing.assert_array_equal(prediction.sigmas, [0.005, GAIN_TOLERANCE])
+    np.testing.assert_array_equal(prediction.sigmas, [0.005, 0.004])
 
 
 @pytest.mark.parametrize("seed", range(4))

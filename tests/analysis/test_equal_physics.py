@@ -30,11 +30,12 @@ FORMATS = ("csv", "h5", "uff", "mat")
 def renamed(name: str, folder: Path) -> str:
     """The file of a unit under another name, with other limits and comments."""
     text = Path(config_path("units", name)).read_text()
-    head, _, _ = text.partition("[limits]")
+    head, _, rest = text.partition("[limits]")
+    tolerance = rest[rest.index("[tolerance]") :]
     head = head.replace(f'name = "{name.upper()}"', 'name = "mine"  # of ours')
     limits = "source_vpk = 4.2\nsource_offset_v = 0.5\nstart_hz = 35\nstop_hz = 410.0\n"
     path = folder / "mine.toml"
-    path.write_text(f"{head}[limits]\n{limits}b1_deg = 0.2\nb2_deg = 0.01\n")
+    path.write_text(f"{head}[limits]\n{limits}b1_deg = 0.2\nb2_deg = 0.01\n{tolerance}")
     assert load_unit(str(path)).name == "mine"
     return str(path)
 

@@ -8,15 +8,17 @@ import pytest
 from analysis.estimate import _total_axis
 from analysis.lattice import RATIO, every_family, near_families, wide_families
 from analysis.observation import unread
+from analysis.spread import spread_of
 from daq.plan import SweepPlan
 from sim.unit import load_unit
 
 SEEN = unread(SweepPlan((120.0, 130.0), (1.5, 2.5, 4.0)), 5e-4)
+SPREAD = spread_of(load_unit("adss"))
 BOTH = (replace(RATIO, coarse=17, scale=0.12), _total_axis(load_unit("adss")))
 
 
 def near(mean, std, seed=0, axes=(RATIO,)):
-    return near_families(axes, np.atleast_1d(mean), np.atleast_1d(std), SEEN, seed)
+    return near_families(axes, np.atleast_1d(mean), np.atleast_1d(std), SEEN, SPREAD, seed)
 
 
 def ratios(families):
@@ -60,8 +62,8 @@ def test_an_answer_hardly_known_costs_little_more_and_is_looked_at_everywhere():
 
 @pytest.mark.parametrize("axes", [(RATIO,), BOTH])
 def test_every_family_that_an_answer_may_ask_for_is_among_all(axes):
-    known = set(every_family(axes, SEEN, 0))
-    assert set(wide_families(axes, SEEN, 0)) <= known
+    known = set(every_family(axes, SEEN, SPREAD, 0))
+    assert set(wide_families(axes, SEEN, SPREAD, 0)) <= known
     rng = np.random.default_rng(4)
     low, high = (np.array([getattr(axis, end) for axis in axes]) for end in ("low", "high"))
     for _ in range(50):
@@ -73,12 +75,12 @@ def test_every_family_that_an_answer_may_ask_for_is_among_all(axes):
 
 
 def test_half_of_the_machines_start_anywhere_in_their_play():
-    spreads = [m.start_spread for family in every_family((RATIO,), SEEN, 0) for m in family]
+    spreads = [m.start_spread for family in every_family((RATIO,), SEEN, SPREAD, 0) for m in family]
     assert 0.4 < np.mean(np.array(spreads) == 1.0) < 0.6
 
 
 def test_a_family_fills_the_lanes_with_all_levels():
     assert {len(family) for family in near(0.5, 0.1)} == {21}
     one_level = unread(SweepPlan((120.0, 130.0), (2.5,)), 5e-4)
-    lone = near_families((RATIO,), np.array([0.5]), np.array([0.1]), one_level, 0)
+    lone = near_families((RATIO,), np.array([0.5]), np.array([0.1]), one_level, SPREAD, 0)
     assert {len(family) for family in lone} == {32}

@@ -12,7 +12,7 @@ from analysis.atlas import atlas_name, make_atlas
 from analysis.causes import Hypothesis
 from analysis.family import Family, read_family
 from analysis.observation import unread
-from analysis.population import DEVIATING
+from analysis.spread import spread_of
 from daq.plan import SweepPlan
 from sim.unit import load_unit
 
@@ -102,7 +102,7 @@ def differences(unit, coarse, atlas, key, rng):
     at = MACHINES * int(rng.integers(len(one) // MACHINES))
     rows = slice(at, at + MACHINES)
     hypothesis = Hypothesis(unit, key)
-    named = tuple(zip(DEVIATING, map(float, one.deviations[at]), strict=True))
+    named = spread_of(unit).deviations(one.deviations[at])
     machines = tuple(
         hypothesis.machine(place, int(rng.integers(2**30)), named) for place in one.places[rows]
     )

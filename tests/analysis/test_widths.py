@@ -83,7 +83,16 @@ def gain_of_more_runs(rng):
 
     def predicted(enough):
         none, alike = np.empty((0, 3, ROWS)), Motions.unknown(120, ROWS)
-        known = places[:120], difference[:120], np.full(d, 0.06), none, np.empty(0), alike, enough
+        known = (
+            places[:120],
+            difference[:120],
+            np.full(d, 0.06),
+            none,
+            np.empty(0),
+            alike,
+            0.005,
+            enough,
+        )
         surface = Surface(seen, *known)
         expected = [surface.expected(place) for place in places[120:]]
         densities = [

@@ -26,6 +26,7 @@ from analysis.family import Family, read_family  # noqa: E402
 from analysis.lattice import RATIO, every_family, near_families, wide_families  # noqa: E402
 from analysis.library import run_families  # noqa: E402
 from analysis.observation import observe  # noqa: E402
+from analysis.spread import spread_of  # noqa: E402
 from daq.plan import SweepPlan, spaced_frequencies  # noqa: E402
 from sim.response import simulate  # noqa: E402
 from sim.unit import load_unit  # noqa: E402
@@ -68,10 +69,10 @@ def main() -> None:
     unit = load_unit("adss")
     plan = SweepPlan(spaced_frequencies(100.0, 180.0, 61), (1.4, 2.4, 3.8))
     response = simulate(unit, 0.4, plan)
-    seen = observe(response)
-    every = every_family([RATIO], seen, 0)
-    near = near_families([RATIO], np.array([0.4]), np.array([0.04]), seen, 0)
-    each, shared = len(wide_families([RATIO], seen, 0)) + len(near), len(every)
+    seen, spread = observe(response), spread_of(unit)
+    every = every_family([RATIO], seen, spread, 0)
+    near = near_families([RATIO], np.array([0.4]), np.array([0.04]), seen, spread, 0)
+    each, shared = len(wide_families([RATIO], seen, spread, 0)) + len(near), len(every)
     family = Family(unit, near[0], seen.plans)
     readings = read_family(family)
     family_s = processor_s(lambda: read_family(family), 2)

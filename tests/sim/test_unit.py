@@ -107,6 +107,8 @@ def test_no_single_bad_value_is_half_accepted(data):
         return
     with pytest.raises(ConfigurationError, match=key):
         unit_from_mapping(bad, source="here")
+    if sections == ["tolerance"]:  # what is not named there has a default
+        return
     del place[key]
     with pytest.raises(ConfigurationError, match=rf"{key}.*[Rr]equired"):
         unit_from_mapping(bad, source="here")

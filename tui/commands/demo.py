@@ -15,7 +15,7 @@ from cyclopts import Parameter
 
 from daq.errors import InputError
 from tui.entry import INTERRUPTED
-from tui.options import Json, Whole, prepare_directory
+from tui.options import Json, Tolerance, Whole, prepare_directory, tolerance_shares
 from tui.output import Console, Injected
 from tui.pasted import pasted
 from tui.places import cache_folder
@@ -37,6 +37,7 @@ def demo(
     surprise: bool = False,
     seed: Annotated[Whole | None, Parameter(help="Hide the same surprise again.")] = None,
     out: Path = Path("demo"),
+    tolerance: Tolerance = None,
     json: Json = False,
     console: Injected,
 ) -> int:
@@ -59,7 +60,7 @@ def demo(
         raise InputError(f"--seed {seed}: give 0 or more, and --surprise with it")
     began = time.perf_counter()
     prepare_directory(out)
-    unit = load_unit("adss")
+    unit = load_unit("adss").with_tolerance(tolerance_shares(tolerance))
     hidden = drawn(unit, seed) if surprise else standing()
     tell = console.note if json else console.data
     tell("1. A simulated analyser, and a sweep on it (SIMULATED: ADSS)\n")

@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING
 
 from daq.errors import InputError
 from tui.executors import executor_at
-from tui.options import Cluster, Json, Plots, UnitName, prepare_directory
+from tui.options import (
+    Cluster,
+    Json,
+    Plots,
+    Tolerance,
+    UnitName,
+    prepare_directory,
+    tolerance_shares,
+)
 from tui.output import Console, Injected, readers_may_leave
 from tui.pasted import proposing
 from tui.places import cache_folder
@@ -34,6 +42,7 @@ def diagnose(
     plots: Plots = None,
     json: Json = False,
     as_is: bool = False,
+    tolerance: Tolerance = None,
     cluster: Cluster = None,
     console: Injected,
 ) -> None:
@@ -61,7 +70,7 @@ def diagnose(
 
     if paper and cluster is not None:
         raise InputError("--cluster is for responses; the paper's numbers are diagnosed here")
-    subject = load_unit(unit)
+    subject = load_unit(unit).with_tolerance(tolerance_shares(tolerance))
     if plots is not None:
         prepare_directory(plots)
     if file is None:

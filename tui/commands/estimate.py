@@ -6,12 +6,13 @@ its uncertainty are the analysis's.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.errors import InputError
 from tui.executors import executor_at
-from tui.options import Cluster, Json, Real, UnitName
+from tui.options import Cluster, Json, Real, Tolerance, UnitName, tolerance_shares
 from tui.output import Injected
 from tui.places import cache_folder
 
@@ -31,6 +32,7 @@ def estimate(
     rf_hz: Real | None = None,
     total_backlash_unknown: bool = False,
     as_is: bool = False,
+    tolerance: Tolerance = None,
     cluster: Cluster = None,
     json: Json = False,
     console: Injected,
@@ -66,7 +68,7 @@ def estimate(
                 "--total-backlash-unknown needs a response at several source levels; "
                 "two frequencies cannot tell it"
             )
-        subject = _unit(unit)
+        subject = _unit(unit, tolerance)
         from analysis.estimate import estimate_features
 
         result = estimate_features(arf_hz, rf_hz, subject, progress=console.progress)
@@ -74,7 +76,7 @@ def estimate(
     else:
         if arf_hz is not None or rf_hz is not None:
             raise InputError(f"{file}: give either a response or --arf-hz and --rf-hz, not both")
-        subject, responses = _unit(unit), [_response(path) for path in (file, *further)]
+        subject, responses = _unit(unit, tolerance), [_response(path) for path in (file, *further)]
         from analysis.estimate import estimate_response
         from analysis.stated_error import error_notes
         from analysis.swept import unit_doubts
@@ -100,10 +102,10 @@ def estimate(
         console.data("\n".join([*result.summary(), *(f"  {text}" for text in told)]))
 
 
-def _unit(name_or_path: str) -> Unit:
+def _unit(name_or_path: str, tolerance: Sequence[str] | None) -> Unit:
     from sim.unit import load_unit
 
-    return load_unit(name_or_path)
+    return load_unit(name_or_path).with_tolerance(tolerance_shares(tolerance))
 
 
 def _response(file: Path) -> FrequencyResponse:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal
 from daq.errors import InputError, LashbenchError
 from tui.executors import executor_at
 from tui.measure_options import PlanOptions, swept_plan
-from tui.options import Cluster, Json, Real, UnitName, Whole
+from tui.options import Cluster, Json, Real, Tolerance, UnitName, Whole, tolerance_shares
 from tui.output import Injected
 from tui.places import cache_folder
 
@@ -37,6 +37,7 @@ def prepare(
     integrate_cycles: Whole | None = None,
     offset: Real | None = None,
     recipe: str | None = None,
+    tolerance: Tolerance = None,
     cluster: Cluster = None,
     json: Json = False,
     console: Injected,
@@ -78,7 +79,7 @@ def prepare(
         tuple(level or ()), start, stop, points, spacing, direction,
         settle_cycles, integrate_cycles, offset,
     )  # fmt: skip
-    subject = load_unit(unit)
+    subject = load_unit(unit).with_tolerance(tolerance_shares(tolerance))
     observation = _observation(file, options, recipe)
     from analysis.preparation import prepare_sweep
 

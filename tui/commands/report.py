@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from daq.errors import InputError, LashbenchError
-from tui.options import UnitName
+from tui.options import Tolerance, UnitName, tolerance_shares
 from tui.output import Console, Injected
 from tui.pasted import proposing
 from tui.places import cache_folder, history_path
@@ -43,6 +43,7 @@ def report(
     unit: UnitName,
     out: Path,
     db: Path | None = None,
+    tolerance: Tolerance = None,
     diagnose: Annotated[bool | None, Parameter(negative="--no-diagnose")] = None,
     console: Injected,
 ) -> None:
@@ -71,7 +72,7 @@ def report(
     if out.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{out}: a report is HTML; give a name that ends in .html")
     checked_target(out)
-    subject = load_unit(unit)
+    subject = load_unit(unit).with_tolerance(tolerance_shares(tolerance))
     remarks: dict[str, str] = {}
     kept: _Kept | None = None
     if not _is_identifier(source, db):

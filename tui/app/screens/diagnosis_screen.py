@@ -14,6 +14,7 @@ from textual.binding import Binding
 from textual.containers import VerticalScroll
 from textual.widgets import ProgressBar
 
+from analysis.believed import believed_lines
 from analysis.swept import sweep_lines
 from analysis.unseen import head_unseen, list_unseen
 from analysis.verdict_words import verdict_words
@@ -148,6 +149,7 @@ def diagnosis_lines(document: Mapping[str, Any]) -> list[str]:
     lines = [
         f"VERDICT: {document['verdict'].upper()}. {' '.join(verdict_words(document))}",
         *sweep_lines(document.get("sweeps", ())),
+        *believed_lines(document),
         "",
         f"residual before  {_residual(before)}",
         f"residual after   {_residual(after)}",

@@ -127,6 +127,7 @@ least index marks the likeliest ratio. E estimates once more. Ctrl+Y copies ever
         self.show()
 
     def _lines(self) -> list[str]:
+        from analysis.believed import believed_lines
         from analysis.features import summary
 
         desk, results = self.desk, self.desk.results
@@ -134,6 +135,7 @@ least index marks the likeliest ratio. E estimates once more. Ctrl+Y copies ever
         if results.estimate is not None and desk.unit is not None:
             diagnosis = None if results.diagnosis is None else results.diagnosis.to_json()
             lines += answer_lines(results.estimate, diagnosis, desk.unit)
+            lines += believed_lines(results.estimate)
             if diagnosis is None:
                 lines += [f"warning: {text}" for text in results.estimate.get("warnings", ())]
         elif "result" in self.bench.analyses.progress:

@@ -1,0 +1,69 @@
+"""What was believed of a datasheet, as it is told with every answer.
+
+Owns the fields of a document and the words for a person. What is believed, `sim.unit` knows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from sim.tolerance import USUAL
+from sim.unit import Unit
+
+__all__ = ["HINT", "believed_document", "believed_lines", "is_usually_off", "trusts_much"]
+
+HINT = (
+    "datasheet values that are off by more than is believed here would look like this, too; "
+    f"try --tolerance {100.0 * USUAL:g}%"
+)
+
+_HEALTHY = 3.0
+"""Standard deviations within which a value is as its datasheet says."""
+
+_ORIGINS = {
+    "option": "by --tolerance",
+    "unit file": "by the unit file",
+    "default": "by default; say otherwise under [tolerance] in the unit file, or by --tolerance",
+}
+
+
+def believed_document(unit: Unit) -> dict[str, Any]:
+    """The fields ``tolerance`` and ``tolerance_from``, each by symbol."""
+    believed = unit.believed
+    return {
+        "tolerance": {symbol: share for symbol, (share, _) in believed.items()},
+        "tolerance_from": {symbol: origin for symbol, (_, origin) in believed.items()},
+    }
+
+
+def believed_lines(document: Mapping[str, Any]) -> list[str]:
+    """The same in words, of a document that holds them: a line for every share.
+
+    Counted teeth and the filter's gain are exact if nobody says otherwise, and not told.
+    """
+    shares, origins = document.get("tolerance", {}), document.get("tolerance_from", {})
+    alike: dict[tuple[float, str], list[str]] = {}
+    for symbol, share in shares.items():
+        origin = origins.get(symbol, "")
+        if share or origin != "default":
+            alike.setdefault((share, origin), []).append(symbol)
+    ranked = sorted(alike.items(), key=lambda one: len(one[1]))
+    rest = "all values" if len(alike) == 1 else "all other values"
+    lines = []
+    for number, ((share, origin), symbols) in enumerate(ranked, start=1):
+        said = "exact" if share == 0.0 else f"to {100.0 * share:.3g} %"
+        named = rest if number == len(ranked) and len(symbols) > 1 else ", ".join(symbols)
+        by = f" ({_ORIGINS[origin]})" if origin in _ORIGINS else ""
+        lines.append(f"datasheet believed {said}: {named}{by}")
+    return lines
+
+
+def trusts_much(document: Mapping[str, Any]) -> bool:
+    """Whether all values of the datasheet are believed to be better than usual."""
+    return all(share < USUAL for share in document.get("tolerance", {}).values())
+
+
+def is_usually_off(value: float, datasheet: float | None) -> bool:
+    """Whether a value is off its datasheet by no more than those of a usual one are."""
+    return datasheet is not None and abs(value / datasheet - 1.0) < _HEALTHY * USUAL

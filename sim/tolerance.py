@@ -1,0 +1,79 @@
+"""How far the values of a datasheet may be off: which have a tolerance, and what is believed.
+
+Owns the names of ``[tolerance]`` in a unit file and of ``--tolerance``, the shares that are
+taken where nobody gives one, and which of several counts. What follows from them is the analysis's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Annotated
+
+from pydantic import Field
+
+__all__ = ["DEFAULT", "MOST", "USUAL", "Share", "believed_shares", "find_fault"]
+
+MOST = 0.5
+"""Largest tolerance: a value that is known no better is not known."""
+
+Share = Annotated[float, Field(ge=0, le=MOST)]
+"""One standard deviation of a datasheet value, as a share of it."""
+
+DEFAULT = "default"
+"""Key of the tolerance of all values that none is given for."""
+
+USUAL = 0.05
+"""Of a datasheet of which nobody said how good it is."""
+
+_EXACT = ("filter_numerator", "N_1", "N")
+"""Teeth are counted, and the filter's gain is the tachometer's: no tolerance if not by name."""
+
+_TOLERATED = (
+    "L_a", "R_m", "k_b", "k_t", "J_m", "B_m", "T_f_m", "k_a", "k_ts", "filter_numerator",
+    "N_1", "k_g1", "J_g1", "k_s1", "J_s1", "J_p2", "N", "k_2", "J_L", "T_f_L",
+)  # fmt: skip
+"""Table 1 but for the backlash, whose departure is the effect total-backlash."""
+
+
+def believed_shares(
+    parameters: Iterable[str], options: Mapping[str, float], file: Mapping[str, float]
+) -> dict[str, tuple[float, str]]:
+    """One standard deviation of each value that has one, as a share, and where it comes from.
+
+    ``option``, ``unit file`` or ``default``. A name counts before ``default``, an option before
+    the file.
+    """
+    found = {}
+    for symbol in _tolerated(parameters):
+        keys = (symbol,) if symbol in _EXACT else (symbol, DEFAULT)
+        told = ((options, "option"), (file, "unit file"))
+        given = [(shares[k], origin) for shares, origin in told for k in keys if k in shares]
+        found[symbol] = (*given, (0.0 if symbol in _EXACT else USUAL, "default"))[0]
+    return found
+
+
+def find_fault(parameters: Iterable[str], shares: Mapping[str, float]) -> str:
+    """What is wrong with tolerances by symbol, in words; empty where nothing is."""
+    known = (DEFAULT, *_tolerated(parameters))
+    for symbol, share in shares.items():
+        if symbol == "b_t_deg":
+            return (
+                "tolerance of b_t_deg: what the backlash is off by is estimated "
+                "(--total-backlash-unknown) or diagnosed (total-backlash); leave it out"
+            )
+        if symbol not in known:
+            return (
+                f"tolerance of {symbol!r}: no value of that name has one; use one of: "
+                f"{', '.join(known)}"
+            )
+        if not 0.0 <= share <= MOST:
+            return (
+                f"tolerance of {symbol}: {share:g} is outside 0 to {MOST:g}; give one standard "
+                "deviation as a share (0.05) or in per cent (5%)"
+            )
+    return ""
+
+
+def _tolerated(parameters: Iterable[str]) -> tuple[str, ...]:
+    there = set(parameters)
+    return tuple(symbol for symbol in _TOLERATED if symbol in there)
