@@ -16,7 +16,9 @@ SHAFT, BRAKE, LOAD = "shaft-stiffness", "load-viscous-damping", "load-inertia"
 
 
 def standing(effects, score, objection=""):
-    candidate = SimpleNamespace(hypothesis=Hypothesis(ADSS, effects))
+    candidate = SimpleNamespace(
+        hypothesis=Hypothesis(ADSS, effects), best=SimpleNamespace(place=None)
+    )
     return Judged(candidate, None, score, 0.0, 0.0, 0.5, objection)
 
 
@@ -154,3 +156,25 @@ def test_a_rest_that_nobody_looked_at_is_no_rival():
     judged = tuple(one for one in verdict.judged if one.effects != (LOAD,))
     verdict = replace(verdict, judged=judged)
     assert hold_against_datasheet(verdict, found) is verdict
+
+
+@pytest.mark.parametrize("word", ["explained", "ambiguous"])
+@pytest.mark.parametrize(("off", "named"), [(0.9, False), (1.12, False), (0.7, True), (1.4, True)])
+def test_what_is_within_the_tolerance_is_not_named(off, named, word, rivals):
+    """Though the plain model does worse than runs of the value, and another such value as well."""
+    unit = ADSS.with_tolerance({"default": 0.05})
+
+    def judged(effects, score, objection=""):
+        candidate = SimpleNamespace(hypothesis=Hypothesis(unit, effects))
+        return Judged(candidate, None, score, 0.0, 0.0, 0.5, objection)
+
+    best, other = judged((SHAFT,), 100.0), judged((LOAD,), 90.0)
+    baseline = judged((), 0.0, "leaves structure")
+    rivals.append(other)
+    place = best.candidate.hypothesis.place(0.5, [off * unit.stage1.k_s1])
+    verdict = Verdict(word, best, (best, other, baseline), baseline)
+    held = hold_against_datasheet(verdict, Calibrated(place, 0.01**2 * np.eye(2)))
+    if named:
+        assert held is verdict
+    else:
+        assert (held.word, held.best.effects) == ("consistent", ())
