@@ -146,8 +146,16 @@ class Hypothesis:
 
         Of values that are believed no better than those of the shipped units.
         """
+        return bool(self.effects) and not self.beyond_tolerance(place)
+
+    def beyond_tolerance(self, place: NDArray[np.float64]) -> tuple[str, ...]:
+        """Those of its effects of which something at a place (d,) is not, see `is_tolerance`."""
         wide = [parameter.spread(self.unit) > _KNOWN_WELL for _, parameter in self.parameters]
-        return bool(wide) and all(wide) and all(self.within_tolerance(place))
+        if not any(wide):
+            return self.effects
+        within = zip(self.parameters, wide, self.within_tolerance(place), strict=True)
+        beyond = {effect for (effect, _), one, near in within if not (one and near)}
+        return tuple(effect for effect in self.effects if effect in beyond)
 
     def brought_within_tolerance(self, place: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
         """Places (d,) like one, each with one datasheet value off by just its tolerance."""

@@ -245,7 +245,9 @@ def _causes(
         rest = tuple(e for e in hypothesis.effects if e != effect)
         return likelihood.get(rest, -math.inf)
 
-    strongest_first = sorted(sizes, key=without)
+    # What its datasheet may be off by anyway is in the model, and no cause.
+    beyond = hypothesis.beyond_tolerance(found.mean) or tuple(sizes)
+    strongest_first = sorted(beyond, key=without)
     return tuple(Cause(e, tuple(sizes[e]), verdict.probability) for e in strongest_first)
 
 

@@ -49,6 +49,7 @@ def test_a_rival_may_explain_it_too_or_is_said_not_to(explained, effects, lead, 
             "causes": list(effects),
             "probability": 0.48,
             "remark": objection,
+            "within_tolerance": not effects,
             "site": ["plant"] if effects else [],
             "rival": True,
         }
