@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.quasi_linear import Family, draw_machines, neighbours
+from analysis.samples import refuse_levels
 from daq.errors import AnalysisError, InputError
 from daq.frf import DB_PER_NEPER, FrequencyResponse, PointFlag
 from sim.unit import Unit
@@ -210,7 +211,13 @@ def check_input(response: FrequencyResponse, unit: Unit) -> Finding:
         One level or more; phase may be missing.
     unit
         The unit that it is said to be of.
+
+    Raises
+    ------
+    InputError
+        If it has more source levels than any sweep.
     """
+    refuse_levels(response)
     curves = _curves(response)
     if not curves:
         return Finding(None, False, "", {})

@@ -19,16 +19,14 @@ from analysis.features import Feature, LevelFeatures, Method, summary, to_json
 from analysis.linear import LinearReading, Start, read_both, read_one
 from analysis.peak import read_peak, shape_error
 from analysis.progress import Progress
-from analysis.samples import MOST_POINTS, Samples, level_samples
-from daq.errors import AnalysisError, InputError
+from analysis.samples import MOST_POINTS, Samples, level_samples, refuse_levels
+from daq.errors import AnalysisError
 from daq.frf import FrequencyResponse
 
 __all__ = ["Feature", "LevelFeatures", "Method", "extract", "summary", "to_json"]
 
 NOTABLE_SCATTER = 1.25
 """Residuals beyond this many stated errors are worth a flag."""
-MOST_LEVELS = 1000
-"""Source levels of a response; a file with more holds no levels that anybody set."""
 _MOST_ROWS, _LEAST_GROUPS = 60_000, 256
 """Points of all levels together that are read one by one, and of one level at least."""
 _SAME_LEVEL = 1e-9
@@ -76,6 +74,7 @@ def extract(
 
 def _levels(response: FrequencyResponse) -> list[tuple[float, FrequencyResponse]]:
     """The response at each level, its rows in ascending frequency; nameless rows last."""
+    refuse_levels(response)
     nameless = ~np.isfinite(response.source_vpk)
     named = np.flatnonzero(~nameless)
     # By level, then frequency: each level is a stretch.
@@ -89,19 +88,10 @@ def _levels(response: FrequencyResponse) -> list[tuple[float, FrequencyResponse]
         part = order[start:end]
         part = part[np.argsort(response.frequency_hz[part], kind="stable")]
         found.append((float(level[start]), response.take(part)))
-        _refuse_levels(len(found), response)
         start = end
     if nameless.any():
         found.append((math.nan, response.take(nameless)))
     return found
-
-
-def _refuse_levels(count: int, response: FrequencyResponse) -> None:
-    if count > MOST_LEVELS:
-        raise InputError(
-            f"the response holds more than {MOST_LEVELS} source levels in {len(response)} rows; "
-            "see whether source_vpk is the level that was set, and not one that was measured"
-        )
 
 
 def _read_level(source_vpk: float, level: FrequencyResponse, most: int) -> LevelFeatures:

@@ -12,10 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.noise import Vector, evened, neighbour_noise
-from daq.errors import AnalysisError
+from daq.errors import AnalysisError, InputError
 from daq.frf import DB_PER_NEPER, FrequencyResponse, PointFlag
 
-__all__ = ["MOST_POINTS", "Samples", "level_samples"]
+__all__ = ["MOST_LEVELS", "MOST_POINTS", "Samples", "level_samples", "refuse_levels"]
+
+MOST_LEVELS = 1000
+"""Source levels of a response; a file with more holds no levels that anybody set."""
 
 MOST_POINTS = 2048
 """Points of a level that are read one by one: an analyser has 801."""
@@ -28,6 +31,21 @@ UNKNOWN_NEPER = 1.0 / DB_PER_NEPER
 """Taken where errors are not given and the points are too few to show them."""
 LEAST_REPEATS = 4
 """Repeats beyond the first from which on their scatter says what the noise is."""
+
+
+def refuse_levels(response: FrequencyResponse) -> None:
+    """Refuse a response with more source levels than anybody sets.
+
+    Raises
+    ------
+    InputError
+        If it has.
+    """
+    if len(np.unique(response.source_vpk)) > MOST_LEVELS:
+        raise InputError(
+            f"the response holds more than {MOST_LEVELS} source levels in {len(response)} rows; "
+            "see whether source_vpk is the level that was set, and not one that was measured"
+        )
 
 
 @dataclass(frozen=True, slots=True)

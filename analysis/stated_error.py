@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.noise import neighbour_residual
+from analysis.samples import refuse_levels
 from daq.errors import InputError
 from daq.frf import (
     DB_PER_NEPER,
@@ -65,8 +66,9 @@ def stated_error(response: FrequencyResponse) -> StatedError:
     Raises
     ------
     InputError
-        If its words count other cycles than were integrated.
+        If its words count other cycles than were integrated, or it has more levels than any sweep.
     """
+    refuse_levels(response)
     if not np.any(response.gain_std_db > 0.0):
         return StatedError(None, None)
     declared = _declared(response)
