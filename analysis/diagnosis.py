@@ -25,7 +25,6 @@ from analysis.certainty import hold_against_doubt
 from analysis.diagnosis_document import Cause, Diagnosis, Size
 from analysis.executor import Executor
 from analysis.harmonics import compare_harmonics
-from analysis.input_check import check_inputs
 from analysis.misfit import describe_departures, find_departures
 from analysis.models import models_left
 from analysis.next_measurement import NextMeasurement, propose_measurement
@@ -62,7 +61,6 @@ def diagnose_response(
     unit: Unit,
     *,
     further: Sequence[FrequencyResponse] = (),
-    as_is: bool = False,
     without: Collection[str] = (),
     cache: Path | None = None,
     seed: int = 0,
@@ -90,21 +88,16 @@ def diagnose_response(
     progress
         Told the share done and what is being done, from the calling thread.
 
-    as_is
-        Take responses as they stand, whatever `analysis.input_check` says of them.
-
     Raises
     ------
     AnalysisError
-        If a response is none of the unit or has no usable point, all hold too few frequencies, a
+        If a response has no usable point, all hold too few frequencies, a
         motion grew without bound, or the unit has one stage.
     InputError
-        If the responses are said to be of different units or specimens, one is there twice, or one
-        is likely written down wrongly.
+        If the responses are said to be of different units or specimens, or one is there twice.
     """
     responses: tuple[FrequencyResponse, ...] = (response, *further)
     check_together(responses)
-    noted = check_inputs(responses, unit, as_is)
     responses, doubts = thin_all(tuple(map(settled, responses)))
     if unit.stages == 1:
         raise AnalysisError(
@@ -123,7 +116,6 @@ def diagnose_response(
     return replace(
         found,
         warnings=(
-            *noted,
             *doubts,
             *unit_doubts(responses, unit),
             *error_doubts(responses),

@@ -23,12 +23,12 @@ from analysis.believed import HINT, believed_document, believed_lines, trusts_mu
 from analysis.ensemble import Machine
 from analysis.executor import Executor
 from analysis.fit import Posterior, fit_posterior, match_runs
-from analysis.input_check import check_inputs
 from analysis.lattice import RATIO, Axis
 from analysis.likelihood import Match
 from analysis.observation import observe
 from analysis.paper_estimate import IndexCurve, index_curve_of_response
 from analysis.progress import Progress
+from analysis.samples import refuse_levels
 from analysis.scale_check import frequency_doubt
 from analysis.settled import settled
 from analysis.stated_error import error_doubts
@@ -107,7 +107,6 @@ def estimate_response(
     cache: Path | None = None,
     executor: Executor | None = None,
     further: Sequence[FrequencyResponse] = (),
-    as_is: bool = False,
 ) -> Estimate:
     """Estimate from a whole response at all its source levels, or from several together.
 
@@ -132,21 +131,17 @@ def estimate_response(
     executor
         Where it is simulated; on this machine's cores if not given.
 
-    as_is
-        Take responses as they stand, whatever `analysis.input_check` says of them.
-
     Raises
     ------
     AnalysisError
-        If no usable point is left, nothing simulated comes near the response, or it is no response
-        of the unit.
+        If no usable point is left, or nothing simulated comes near the response.
     InputError
-        If the responses are said to be of different units or specimens, one is there twice, or one
-        is likely written down wrongly.
+        If the responses are said to be of different units or specimens, or one is there twice.
     """
     responses: tuple[FrequencyResponse, ...] = (response, *further)
     check_together(responses)
-    noted = check_inputs(responses, unit, as_is)
+    for one in responses:
+        refuse_levels(one)
     responses, doubts = thin_all(tuple(map(settled, responses)))
     observation, axes = observe(*responses), free_axes(unit, total_backlash_unknown)
     with counting() as effort:
@@ -154,7 +149,7 @@ def estimate_response(
             unit, observation, axes, seed=seed, cache=cache, executor=executor, progress=progress
         )
     curve = index_curve_of_response(responses[0], observation, posterior.draws)
-    warnings = noted + doubts + error_doubts(responses)
+    warnings = doubts + error_doubts(responses)
     misfit = _robust_rms(posterior.match)
     if misfit > _WIDE_RESIDUAL:
         doubt = frequency_doubt(

@@ -6,7 +6,7 @@ Owns the options of the verb. The diagnosis is the analysis's.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -80,10 +80,12 @@ def diagnose(
 
     response, *others = (read_response(path) for path in (file, *further))
     from analysis.diagnosis import diagnose_response
+    from analysis.input_check import check_inputs
     from analysis.stated_error import error_doubts, error_notes
     from analysis.swept import check_together, unit_doubts
 
     check_together((response, *others))
+    said = check_inputs((response, *others), subject, as_is)
     for note in error_notes((response, *others)):
         console.note(note)
     doubts = unit_doubts((response, *others), subject) + error_doubts((response, *others))
@@ -91,11 +93,12 @@ def diagnose(
         # Now, as well as with the answer: it may be a slip, and the answer takes a minute.
         console.note(f"warning: {doubt}")
     with executor_at(cluster) as executor:
-        asked = partial(diagnose_response, as_is=True) if as_is else diagnose_response
-        result = asked(
+        result = diagnose_response(
             response, subject, further=others, cache=cache_folder(), executor=executor,
             progress=console.progress,
         )  # fmt: skip
+    if said:
+        result = replace(result, warnings=(*said, *result.warnings))
     result = proposing(result, unit, (response, *others))
     _tell(result, json, console, _advice(result, subject))
     if plots is not None:

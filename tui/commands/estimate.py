@@ -7,6 +7,7 @@ its uncertainty are the analysis's.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -78,9 +79,11 @@ def estimate(
             raise InputError(f"{file}: give either a response or --arf-hz and --rf-hz, not both")
         subject, responses = _unit(unit, tolerance), [_response(path) for path in (file, *further)]
         from analysis.estimate import estimate_response
+        from analysis.input_check import check_inputs
         from analysis.stated_error import error_notes
         from analysis.swept import unit_doubts
 
+        said = check_inputs(responses, subject, as_is)
         warnings = unit_doubts(responses, subject)
         for note in error_notes(responses):
             console.note(note)
@@ -88,8 +91,9 @@ def estimate(
             result = estimate_response(
                 responses[0], subject, total_backlash_unknown, progress=console.progress,
                 cache=cache_folder(), executor=executor, further=responses[1:],
-                **({"as_is": True} if as_is else {}),
             )  # fmt: skip
+        if said:
+            result = replace(result, warnings=(*said, *result.warnings))
     if json:
         document = result.to_json()
         console.document(document | {"warnings": warnings + document["warnings"]})

@@ -176,10 +176,12 @@ def _diagnose(
     console: Console,
 ) -> Diagnosis | None:
     from analysis.diagnosis import diagnose_response
+    from analysis.input_check import check_inputs
     from tui.kept import keep_diagnosis
 
     console.note("diagnosing")
     try:
+        check_inputs((response,), unit)
         made = diagnose_response(response, unit, cache=cache_folder(), progress=console.progress)
     except LashbenchError as error:
         remarks["diagnosis"] = f"No diagnosis could be made: {error}."
