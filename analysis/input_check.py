@@ -1,37 +1,34 @@
 """Whether a response can be one of the unit, or looks like one that was written down wrongly.
 
-Owns the table of usual mistakes (phase in radians, swapped channels, ...) and the test for each:
-the response is held against a wide family of linear machines about the unit, as it is and with
-each mistake undone. It is done before anything is simulated, within a second, and alters no
-response. What a cause of the catalogue does is no mistake; only what is far outside is.
+Owns the test for each mistake of `analysis.usual_mistakes`: the response is held against a wide
+family of linear machines about the unit, as it is and with each mistake undone. It is done before
+anything is simulated, within a second, and alters no response. What a cause of the catalogue does
+is no mistake; only what is far outside is.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.quasi_linear import Family, draw_machines, neighbours
 from analysis.samples import refuse_levels
+from analysis.usual_mistakes import GAIN, MISTAKES, Curve, is_like_linear
 from daq.errors import AnalysisError, InputError
 from daq.frf import DB_PER_NEPER, FrequencyResponse, PointFlag
 from sim.unit import Unit
 
-__all__ = ["MISTAKES", "Finding", "check_input", "check_inputs"]
+__all__ = ["MISTAKES", "Finding", "check_input", "check_inputs", "doubted"]
 
 Vector = NDArray[np.float64]
 
 _NOT_OF_UNIT = 0.7
 """Distance from which on nothing of the family is near: noise has 0.8, and the furthest of 260
 machines that hide causes 0.61."""
-
-_GAIN = 0.7
-"""Neper by which the gain as a whole may be off by causes of the catalogue, which double it."""
-
-_ANY_GAIN = 30.0
 
 _LEVELS, _POINTS, _FEWEST = 2, 40, 8
 """Levels (the highest, where the motion is most like a linear one) and points of each that are
@@ -55,136 +52,6 @@ _FLAT = 0.02
 
 _LEAST_V = 2e-3
 """Output below which a point may be noise, V."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Curve:
-    """One level: Hz, log gain in neper, phase in rad or None."""
-
-    frequency_hz: Vector
-    log_gain: Vector
-    phase: Vector | None
-
-
-@dataclass(frozen=True, slots=True)
-class Mistake:
-    """A mistake: how it is undone, how far the gain may then be off, and what to tell a person.
-
-    `telltale`: what its numbers have in common and those of a true response hardly ever have.
-    """
-
-    undo: Callable[[_Curve], _Curve]
-    words: str
-    gain: float = _GAIN
-    needs_phase: bool = False
-    telltale: Callable[[_Curve], bool] | None = None
-
-
-def _turned(sign: float, radians: float = 0.0) -> Callable[[_Curve], _Curve]:
-    def undo(curve: _Curve) -> _Curve:
-        phase = None if curve.phase is None else sign * curve.phase + radians
-        return _Curve(curve.frequency_hz, curve.log_gain, phase)
-
-    return undo
-
-
-def _from_radians(curve: _Curve) -> _Curve:
-    phase = None if curve.phase is None else np.degrees(curve.phase)
-    return _Curve(curve.frequency_hz, curve.log_gain, phase)
-
-
-def _from_swapped(curve: _Curve) -> _Curve:
-    phase = None if curve.phase is None else -curve.phase
-    return _Curve(curve.frequency_hz, -curve.log_gain, phase)
-
-
-def _from_linear(curve: _Curve) -> _Curve:
-    linear = np.maximum(curve.log_gain * DB_PER_NEPER, 1e-9)
-    return _Curve(curve.frequency_hz, np.log(linear), curve.phase)
-
-
-def _is_within_pi(curve: _Curve) -> bool:
-    """Whether no phase in degrees is larger than any in radians."""
-    return curve.phase is not None and bool(np.max(np.abs(np.degrees(curve.phase))) <= 3.1416)
-
-
-def _is_like_linear(curve: _Curve) -> bool:
-    """Whether gains have no sign, are small, and some below 1, as linear gains are."""
-    decibels = curve.log_gain * DB_PER_NEPER
-    return bool(0.0 < np.min(decibels) < 1.0 and np.max(decibels) < 20.0)
-
-
-def _slower(factor: float) -> Callable[[_Curve], _Curve]:
-    def undo(curve: _Curve) -> _Curve:
-        return _Curve(curve.frequency_hz / factor, curve.log_gain, curve.phase)
-
-    return undo
-
-
-def _times_omega(power: int) -> Callable[[_Curve], _Curve]:
-    def undo(curve: _Curve) -> _Curve:
-        log_omega = np.log(2.0 * np.pi * curve.frequency_hz)
-        phase = None if curve.phase is None else curve.phase + power * np.pi / 2.0
-        return _Curve(curve.frequency_hz, curve.log_gain + power * log_omega, phase)
-
-    return undo
-
-
-MISTAKES: Mapping[str, Mistake] = {
-    "phase in radians": Mistake(
-        _from_radians,
-        "the phase is likely in radians; multiply phase_deg by 57.29578",
-        needs_phase=True,
-        telltale=_is_within_pi,
-    ),
-    "conjugate": Mistake(
-        _turned(-1.0),
-        "the sign of the phase is likely reversed (conjugate response); change the sign of "
-        "phase_deg",
-        needs_phase=True,
-    ),
-    "inverted": Mistake(
-        _turned(1.0, np.pi),
-        "one channel is likely inverted; add 180 to phase_deg, and see to the polarity of "
-        "the tachometer",
-        needs_phase=True,
-    ),
-    "swapped": Mistake(
-        _from_swapped,
-        "the channels are likely swapped (V_i/V_o in place of V_o/V_i); change the signs of "
-        "gain_db and phase_deg",
-    ),
-    "linear gain": Mistake(
-        _from_linear,
-        "gain_db likely holds the gain itself, not decibels; give 20 log10 of it",
-        telltale=_is_like_linear,
-    ),
-    "rad/s": Mistake(
-        _slower(2.0 * np.pi),
-        "frequencies are likely in rad/s; divide frequency_hz by 6.283185",
-    ),
-    "position": Mistake(
-        _times_omega(1),
-        "the output is likely a position, not a velocity; multiply the gain by the angular "
-        "frequency and add 90 to phase_deg",
-        _ANY_GAIN,
-        needs_phase=True,
-    ),
-    "acceleration": Mistake(
-        _times_omega(-1),
-        "the output is likely an acceleration, not a velocity; divide the gain by the angular "
-        "frequency and subtract 90 from phase_deg",
-        _ANY_GAIN,
-        needs_phase=True,
-    ),
-    "gain factor": Mistake(
-        lambda curve: curve,
-        "the gain as a whole is likely off by {factor}; see to the scales and probes of both "
-        "channels",
-        _ANY_GAIN,
-    ),
-}
-"""Every mistake that is looked for, by its name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,11 +93,11 @@ def check_input(response: FrequencyResponse, unit: Unit) -> Finding:
     search = _Search(Family(unit))
     distances: dict[str, float] = {}
     offsets: dict[str, float] = {}
-    distances["as it is"], _ = search.nearest(curves, lambda c: c, _GAIN)
+    distances["as it is"], _ = search.nearest(curves, lambda c: c, GAIN)
     for name, mistake in MISTAKES.items():
         if mistake.needs_phase and any(curve.phase is None for curve in curves):
             continue
-        if name == "linear gain" and not all(map(_is_like_linear, curves)):
+        if name == "linear gain" and not all(map(is_like_linear, curves)):
             continue
         distances[name], offsets[name] = search.nearest(curves, mistake.undo, mistake.gain)
     told = [
@@ -244,7 +111,10 @@ def check_input(response: FrequencyResponse, unit: Unit) -> Finding:
 
 
 def check_inputs(
-    responses: Sequence[FrequencyResponse], unit: Unit, as_is: bool = False
+    responses: Sequence[FrequencyResponse],
+    unit: Unit,
+    as_is: bool = False,
+    way_on: str = "; or take it as it stands with --as-is",
 ) -> list[str]:
     """Refuse responses that look like a mistake, or like nothing of a unit.
 
@@ -252,6 +122,8 @@ def check_inputs(
     ----------
     as_is
         Refuse nothing, say it instead.
+    way_on
+        How a person can have it taken all the same; the end of the error.
 
     Returns
     -------
@@ -269,11 +141,22 @@ def check_inputs(
     for one in responses:
         found = check_input(one, unit)
         if found.mistake is not None and not as_is:
-            raise InputError(f"{found.words}; or take it as it stands with --as-is")
+            raise InputError(f"{found.words}{way_on}")
         if found.foreign and not as_is:
-            raise AnalysisError(f"{found.words}; or take it as it stands with --as-is")
+            raise AnalysisError(f"{found.words}{way_on}")
         said += [found.words] if found.words else []
     return list(dict.fromkeys(said))
+
+
+def doubted(estimate: Mapping[str, Any], said: Sequence[str]) -> dict[str, Any]:
+    """The document of an estimate of a response that `check_inputs` has something to say of.
+
+    What was said comes first of its warnings, and its numbers are in force nowhere.
+    """
+    if not said:
+        return dict(estimate)
+    warnings = [*said, *(text for text in estimate["warnings"] if text not in said)]
+    return {**estimate, "warnings": warnings, "refuted": True}
 
 
 _FOREIGN = (
@@ -296,14 +179,14 @@ class _Search:
         self._shown: dict[bytes, NDArray[np.complex128]] = {}
 
     def nearest(
-        self, curves: Sequence[_Curve], undo: Callable[[_Curve], _Curve], gain: float
+        self, curves: Sequence[Curve], undo: Callable[[Curve], Curve], gain: float
     ) -> tuple[float, float]:
         """Mean distance of curves to the nearest machine of each, and of their gains, neper."""
         found = [self._nearest(undo(curve), gain) for curve in curves]
         distance, offset = np.mean(found, axis=0)
         return float(distance), float(offset)
 
-    def _nearest(self, curve: _Curve, gain: float) -> tuple[float, float]:
+    def _nearest(self, curve: Curve, gain: float) -> tuple[float, float]:
         rng = np.random.default_rng(0)
         key = curve.frequency_hz.tobytes()
         if key not in self._shown:
@@ -324,7 +207,7 @@ class _Search:
         return float(distance[0]), float(offset[0])
 
 
-def _distances(shown: NDArray[np.complex128], curve: _Curve, gain: float) -> tuple[Vector, Vector]:
+def _distances(shown: NDArray[np.complex128], curve: Curve, gain: float) -> tuple[Vector, Vector]:
     """Distances (machines,) of a curve, 0 to 1, and by how much its gain is larger, neper.
 
     Geman's and McClure's: a point that is far off counts as one, however far.
@@ -338,14 +221,14 @@ def _distances(shown: NDArray[np.complex128], curve: _Curve, gain: float) -> tup
     return np.mean(square / (1.0 + square), axis=1), offset
 
 
-def _curves(response: FrequencyResponse) -> list[_Curve]:
+def _curves(response: FrequencyResponse) -> list[Curve]:
     """The highest levels with enough points, thinned; a level that is not known is one."""
     spoilt = (response.flags & (PointFlag.SPOILT | PointFlag.OVERLOAD)) != 0
     size = np.abs(response.gain)
     level = np.where(np.isfinite(response.source_vpk), response.source_vpk, 0.0)
     loud = (size * level > _LEAST_V) | (level == 0.0)
     usable = ~spoilt & np.isfinite(size) & (size > 0.0) & (response.frequency_hz > 0.0)
-    found: list[_Curve] = []
+    found: list[Curve] = []
     for one in np.unique(level)[::-1]:
         rows = np.flatnonzero((level == one) & usable)
         heard = rows[loud[rows]]
@@ -357,13 +240,13 @@ def _curves(response: FrequencyResponse) -> list[_Curve]:
         rows = rows[np.unique(np.linspace(0, len(rows) - 1, _POINTS).round().astype(int))]
         known = bool(np.all(response.phase_known[rows]))
         phase = np.angle(response.gain[rows]) if known else None
-        found.append(_Curve(response.frequency_hz[rows], np.log(size[rows]), phase))
+        found.append(Curve(response.frequency_hz[rows], np.log(size[rows]), phase))
         if len(found) == _LEVELS:
             break
     return found
 
 
-def _is_constant(curve: _Curve) -> bool:
+def _is_constant(curve: Curve) -> bool:
     """Whether a curve shows nothing that moves: the same gain everywhere."""
     return bool(np.ptp(curve.log_gain) < _FLAT)
 

@@ -74,7 +74,8 @@ def write_report(
         An `analysis.diagnosis.Diagnosis` or anything with its document; pictures
         are drawn of the former only. None leaves the section empty.
     remarks
-        Why there is no ``"estimate"`` or ``"diagnosis"``; further keys are free.
+        Why there is no ``"estimate"`` or ``"diagnosis"``; ``"input"``, what the response looks
+        like, is the first line of the page; further keys are free.
     made
         Moment of the report; now, if left out.
 
@@ -145,7 +146,9 @@ def stored_origin(store: Store, measurement: int) -> Origin:
 def _actions(data: Mapping[str, Any], unit: Unit, answer: Answer, advice: Advice) -> list[str]:
     """What to do, most important first."""
     diagnosis = data["diagnosis"]
-    lines = [advice.before] if advice.before else []
+    doubt = data["remarks"].get("input")
+    lines = [f"This response looks like a mistake: {doubt}."] if doubt else []
+    lines += [advice.before] if advice.before else []
     lines += [] if answer.state == "none" else [advice.headline]
     if answer.models:
         lines += [stage.line for stage in advice.stages if stage.verdict is not None]

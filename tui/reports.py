@@ -70,6 +70,7 @@ def report_measurement(
     LashbenchError
         As `analysis.report.write_report` and `daq.store.Store`.
     """
+    from analysis.input_check import check_inputs
     from analysis.report import stored_origin, write_report
     from daq.store import Store
     from tui.kept import kept_estimate
@@ -77,6 +78,8 @@ def report_measurement(
     with Store(db, read_only=True) as store:
         response, origin = store.response(measurement), stored_origin(store, measurement)
         estimate = estimate or kept_estimate(store, measurement, unit)
+    said = check_inputs([response], unit, as_is=True)
+    remarks = {**(remarks or {}), **({"input": "; ".join(said)} if said else {})}
     return write_report(
         path, response, unit, origin, estimate=estimate, diagnosis=diagnosis, remarks=remarks
     )

@@ -10,7 +10,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -92,6 +92,8 @@ class Task:
         What it is about.
     given_up
         Set when nobody waits for it any more.
+    as_is
+        Whether a response is taken as it stands, also if it looks like a mistake.
     """
 
     post: Post
@@ -99,6 +101,13 @@ class Task:
     measurement: int
     unit: Unit
     given_up: threading.Event
+    as_is: bool = False
+
+    def doubts(self, responses: Sequence[FrequencyResponse]) -> list[str]:
+        """What there is to be said of responses; raises an error where they are refused."""
+        from analysis.input_check import check_inputs
+
+        return check_inputs(responses, self.unit, self.as_is, "; or key A: take it as it stands")
 
     def response(self) -> FrequencyResponse:
         """The measurement's points in force."""
@@ -141,6 +150,7 @@ class Task:
 
 def read_result(task: Task, analyses: Analyses) -> None:
     """Features first, since they are quick; then the estimate, from the history if it is there."""
+    from analysis.input_check import doubted
     from daq.store import Store
     from tui.kept import kept_diagnosis, kept_estimate
 
@@ -157,7 +167,9 @@ def read_result(task: Task, analyses: Analyses) -> None:
         if known is not None:
             return known
         began_s = time.monotonic()
-        made = analyses.estimate(task.response(), task.unit, task.progress("result"))
+        response = task.response()
+        said = task.doubts([response])
+        made = doubted(analyses.estimate(response, task.unit, task.progress("result")), said)
         _keep_estimate(task, measured, made, time.monotonic() - began_s)
         return made
 
@@ -175,8 +187,13 @@ def diagnose(task: Task, analyses: Analyses) -> None:
 
     def work() -> Any:
         responses = task.responses()
+        said = task.doubts(responses)
         made = analyses.diagnose(responses, task.unit, task.progress("diagnosis"))
-        _keep_diagnosis(task, responses, made.to_json())
+        if said:
+            made = replace(made, warnings=(*said, *made.warnings))
+        if not said:
+            # The history would show its numbers as those of the unit.
+            _keep_diagnosis(task, responses, made.to_json())
         return made
 
     task.run("diagnosis", work)

@@ -47,7 +47,8 @@ class AnalysisKeeper:
         if job in self.progress or desk.measurement is None or desk.unit is None:
             return
         post = self._app.post_message
-        task = Task(post, desk.db, desk.measurement, desk.unit, self._given_up)
+        task = Task(post, desk.db, desk.measurement, desk.unit, self._given_up,
+                    desk.results.as_is)  # fmt: skip
         works: dict[str, Callable[[], None]] = {
             "result": partial(read_result, task, self._analyses),
             "diagnosis": partial(diagnose, task, self._analyses),

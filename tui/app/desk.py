@@ -48,6 +48,8 @@ class Results:
     """Where the report was written."""
     faults: dict[str, str] = field(default_factory=dict)
     """Why an analysis gave nothing, by job."""
+    as_is: bool = False
+    """Whether it is taken as it stands, also if it looks like a mistake."""
 
 
 @dataclass(slots=True)

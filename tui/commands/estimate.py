@@ -93,7 +93,7 @@ def estimate(
                 cache=cache_folder(), executor=executor, further=responses[1:],
             )  # fmt: skip
         if said:
-            result = replace(result, warnings=(*said, *result.warnings))
+            result = replace(result, warnings=(*said, *result.warnings), refuted=True)
     if json:
         document = result.to_json()
         console.document(document | {"warnings": warnings + document["warnings"]})

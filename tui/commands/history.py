@@ -200,6 +200,7 @@ def _estimates(
 def _estimate(db: Path, number: int, executor: Executor | None, console: Console) -> Answer | None:
     """Make an estimate and keep it; it is given back where it cannot be kept."""
     from analysis.estimate import estimate_response
+    from analysis.input_check import check_inputs
     from daq.store import Store
     from tui.kept import keep_estimate, loose_answer
 
@@ -208,10 +209,11 @@ def _estimate(db: Path, number: int, executor: Executor | None, console: Console
         measured = store.measurement(number)
         response = store.response(number)
     try:
+        unit = unit_as_measured(measured)
+        check_inputs([response], unit, way_on="")
         result = estimate_response(
-            response, unit_as_measured(measured), progress=console.progress,
-            cache=cache_folder(), executor=executor,
-        )  # fmt: skip
+            response, unit, progress=console.progress, cache=cache_folder(), executor=executor
+        )
         content: dict[str, Any] = result.to_json()
     except (AnalysisError, InputError, ValueError) as error:
         # A lost cluster is not among them: it says nothing of the data, and ends the verb.

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 __all__ = ["report"]
 
+_WAY_ON = "--as-is takes it as it stands"
+
 _MOST_DIGITS = 18
 """What an identifier in a history can have."""
 
@@ -45,6 +47,7 @@ def report(
     db: Path | None = None,
     tolerance: Tolerance = None,
     diagnose: Annotated[bool | None, Parameter(negative="--no-diagnose")] = None,
+    as_is: bool = False,
     console: Injected,
 ) -> None:
     """Write a report on one measurement as a single HTML file that prints on A4.
@@ -64,7 +67,10 @@ def report(
     diagnose
         Diagnose too, which takes a minute or two, even where the history holds a diagnosis of
         these points; --no-diagnose makes none, and shows the one of the history if there is one.
+    as_is
+        Estimate and diagnose a response as it stands, also if it looks like a mistake.
     """
+    from analysis.input_check import check_inputs
     from analysis.swept import unit_doubts
     from daq.formats.atomic import checked_target
     from sim.unit import load_unit
@@ -85,8 +91,15 @@ def report(
         response, origin = kept.response, kept.origin
     for doubt in unit_doubts([response], subject):
         console.note(f"warning: {doubt}")
+    said = check_inputs([response], subject, as_is=True)
+    if said:
+        remarks["input"] = "; ".join(said)
+        console.note(f"warning: {remarks['input']}")
+    refused = bool(said) and not as_is
     estimate = None if kept is None else kept.estimate
-    if estimate is None:
+    if estimate is None and refused:
+        remarks["estimate"] = f"No estimate was made: {remarks['input']}; {_WAY_ON}."
+    elif estimate is None:
         estimate = _estimate(response, subject, remarks, kept, console)
     diagnosis: Diagnosed | None = None
     if kept is not None and kept.diagnosis is not None and not diagnose:
@@ -95,6 +108,8 @@ def report(
         console.note(f"the diagnosis is {kept.diagnosis.origin}; --diagnose makes it anew")
     elif diagnose is False:
         remarks["diagnosis"] = "No diagnosis was made: it was left out on request."
+    elif refused:
+        remarks["diagnosis"] = f"No diagnosis was made: {remarks['input']}; {_WAY_ON}."
     else:
         diagnosis = _diagnose(response, subject, unit, remarks, kept, console)
     from analysis.report import write_report
@@ -148,14 +163,14 @@ def _estimate(
     console: Console,
 ) -> dict[str, Any] | None:
     from analysis.estimate import estimate_response
+    from analysis.input_check import doubted
     from tui.kept import keep_estimate
 
     console.note("estimating")
     began_s = time.monotonic()
     try:
-        made = estimate_response(
-            response, unit, cache=cache_folder(), progress=console.progress
-        ).to_json()
+        found = estimate_response(response, unit, cache=cache_folder(), progress=console.progress)
+        made = doubted(found.to_json(), [remarks["input"]] if "input" in remarks else [])
     except LashbenchError as error:
         remarks["estimate"] = f"No estimate could be made: {error}."
         console.note(remarks["estimate"])
@@ -176,19 +191,20 @@ def _diagnose(
     console: Console,
 ) -> Diagnosis | None:
     from analysis.diagnosis import diagnose_response
-    from analysis.input_check import check_inputs
     from tui.kept import keep_diagnosis
 
     console.note("diagnosing")
     try:
-        check_inputs((response,), unit)
         made = diagnose_response(response, unit, cache=cache_folder(), progress=console.progress)
     except LashbenchError as error:
         remarks["diagnosis"] = f"No diagnosis could be made: {error}."
         console.note(remarks["diagnosis"])
         return None
+    if "input" in remarks:
+        made = replace(made, warnings=(remarks["input"], *made.warnings))
     made = proposing(made, named, [response])
-    if kept is not None:
+    if kept is not None and "input" not in remarks:
+        # Of a response that looks like a mistake the history shows no numbers as the unit's.
         with _in_spite_of_faults("diagnosis", console):
             keep_diagnosis(kept.db, kept.measured.id, [response], unit, made.to_json())
     return made

@@ -42,10 +42,12 @@ which takes a minute or two of both processors; the screen stays free meanwhile.
 Every cause is given with its probability. The residual is the distance of measurement and model
 on source levels that were held out, in standard errors and dB, before and after the cause was
 added. N starts the measurement that would tell rivals apart: checks first, as always, then the
-sweep itself. D then diagnoses both measurements together.
+sweep itself. D then diagnoses both measurements together. A response that looks like a mistake
+is not diagnosed; A takes it as it stands.
 """
     BINDINGS = [
         Binding("d", "diagnose", "Diagnose", id="diagnosis.run"),
+        Binding("a", "as_is", "As it is", id="diagnosis.as-is", show=False),
         Binding("n", "measure_next", "Measure this next", id="diagnosis.next"),
     ]
 
@@ -75,6 +77,8 @@ sweep itself. D then diagnoses both measurements together.
             return "Diagnosing beside the screen; look around.  Ctrl+N: on to report and history"
         if self._next_plan() is not None:
             return "N: measure this next, one key.  Ctrl+N: on to report and history"
+        if "diagnosis" in self.desk.results.faults:
+            return "D: once more.  A: take it as it is.  Ctrl+N: on to report and history"
         if self.desk.results.diagnosis is None:
             return "D: diagnose.  Ctrl+N: on to report and history"
         return "Ctrl+Y: copy.  Ctrl+N: on to report and history"
@@ -87,6 +91,12 @@ sweep itself. D then diagnoses both measurements together.
         """Begin, unless it runs."""
         self.bench.analyses.begin("diagnosis")
         self.show()
+
+    def action_as_is(self) -> None:
+        """Diagnose what was refused."""
+        if "diagnosis" in self.desk.results.faults:
+            self.desk.results.as_is = True
+            self.action_diagnose()
 
     def action_measure_next(self) -> None:
         """Start the proposed sweep; its checks run first."""

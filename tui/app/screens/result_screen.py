@@ -43,12 +43,14 @@ response there is no advice before a diagnosis (step 6); after it, the numbers a
 model that the diagnosis accepts.
 
 V changes between the Bode plot and the error index, the paper's measure over the ratio: the
-least index marks the likeliest ratio. E estimates once more. Ctrl+Y copies everything.
+least index marks the likeliest ratio. E estimates once more. A response that looks like a mistake
+is not estimated; A takes it as it stands. Ctrl+Y copies everything.
 """
     BINDINGS = [
         Binding("v", "view", "Bode/index", id="result.view"),
         Binding("g", "panels", "Gain/phase", id="result.panels", show=False),
         Binding("e", "estimate", "Estimate", id="result.estimate", show=False),
+        Binding("a", "as_is", "As it is", id="result.as-is", show=False),
     ]
     DEFAULT_CSS = """
     ResultScreen #plots { height: 1fr; }
@@ -102,6 +104,8 @@ least index marks the likeliest ratio. E estimates once more. Ctrl+Y copies ever
         """Wait, or go on."""
         if "result" in self.bench.analyses.progress:
             return "Estimating beside the screen; look around.  Ctrl+N: on to the diagnosis"
+        if "result" in self.desk.results.faults:
+            return "E: estimate once more.  A: take it as it is.  Ctrl+N: on to the diagnosis"
         if self.desk.results.estimate is None:
             return "E: estimate once more.  Ctrl+N: on to the diagnosis"
         return "V: the error index.  Ctrl+Y: copy.  Ctrl+N: on to the diagnosis"
@@ -125,6 +129,12 @@ least index marks the likeliest ratio. E estimates once more. Ctrl+Y copies ever
         self.desk.results.faults.pop("result", None)
         self.bench.analyses.begin("result")
         self.show()
+
+    def action_as_is(self) -> None:
+        """Estimate what was refused."""
+        if "result" in self.desk.results.faults:
+            self.desk.results.as_is = True
+            self.action_estimate()
 
     def _lines(self) -> list[str]:
         from analysis.believed import believed_lines
