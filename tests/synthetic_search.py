@@ -11,6 +11,7 @@ import synthetic
 from analysis import atlas, hunt, population, search
 from analysis.causes import Hypothesis
 from analysis.population import Population
+from analysis.spread import spread_of
 from analysis.verdict import judge_candidates
 
 ADSS = synthetic.ADSS
@@ -43,7 +44,8 @@ def simulate_in(monkeypatch) -> Asked:
     def simulate(unit, groups, observation, rng, executor=None, progress=None):
         found = {}
         count.executors.add(executor)
-        for group, signs in zip(groups, population._signs(groups, rng), strict=True):
+        spread = spread_of(unit)
+        for group, signs in zip(groups, population._signs(groups, spread, rng), strict=True):
             key, off = group.hypothesis.effects, signs * synthetic.SIGMAS
             rows = np.isin(
                 np.tile(synthetic.FREQUENCIES, len(synthetic.LEVELS)), observation.frequency_hz

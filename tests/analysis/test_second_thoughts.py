@@ -58,7 +58,9 @@ def test_phase_is_compared_around_the_circle():
 
 def told(effects, word="explained"):
     surface = SimpleNamespace(observation=SHORT)
-    candidate = SimpleNamespace(hypothesis=Hypothesis(ADSS, effects), surface=surface)
+    hypothesis = Hypothesis(ADSS, effects)
+    found = SimpleNamespace(place=np.full(hypothesis.d, 0.9))
+    candidate = SimpleNamespace(hypothesis=hypothesis, surface=surface, best=found)
     best = Judged(candidate, None, 100.0, 0.0, 0.0, 0.9, "")
     baseline = Judged(SimpleNamespace(hypothesis=Hypothesis(ADSS)), None, 0.0, 0.0, 0.0, 0.1, "")
     return Verdict(word, best, (best, baseline), baseline)

@@ -8,7 +8,9 @@ from synthetic import candidate, observation, read
 
 import analysis.sizing as module
 from analysis.calibration import Calibrated
+from analysis.causes import Hypothesis
 from analysis.sizing import size_candidate, widen_if_open
+from sim.unit import load_unit
 
 TRUE = ("load-inertia",)
 
@@ -22,7 +24,11 @@ def test_what_is_hardly_known_with_caution_is_told_with_it(monkeypatch, wider, t
         return Calibrated(np.array([0.5]), np.array([[(0.05 * wider) ** 2]]))
 
     monkeypatch.setattr(module, "calibrate", calibrate)
-    one = SimpleNamespace(population=None, surface=SimpleNamespace(chart=None, width=None))
+    one = SimpleNamespace(
+        population=None,
+        surface=SimpleNamespace(chart=None, width=None),
+        hypothesis=Hypothesis(load_unit("adss")),
+    )
     found = Calibrated(np.array([0.3]), np.array([[0.05**2]]))
     assert widen_if_open(found, one, None, None, 400).mean[0] == told
     assert asked == [{"nearest": 400, "cautious": True}]

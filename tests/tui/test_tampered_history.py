@@ -213,7 +213,9 @@ import resource, sys
 resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
 from tui import cli
 code = cli.main(sys.argv[1:])
-print(code, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, file=sys.stdout)
+# Not ru_maxrss: that counts what the parent held when it started this process.
+(peak,) = [line for line in open("/proc/self/status") if line.startswith("VmHWM")]
+print(code, peak.split()[1])
 """
 
 
