@@ -1,0 +1,164 @@
+"""The amortised posterior of a unit, asked about one observation.
+
+Owns the way from an observation to the probability of every set of causes, and to contribution
+ratio and sizes given a set, in milliseconds and without simulation. It must not load a training
+library, and refines nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.inference.checkpoint import Checkpoint
+from analysis.inference.examples import Scales, conditions
+from analysis.inference.inputs import SweptLevels
+from analysis.inference.network import Densities, densities, set_logits, summarise
+from analysis.observation import Observation
+
+__all__ = ["Posterior", "SetPosterior", "swept_levels"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SetPosterior:
+    """What is believed given one set of causes.
+
+    `effects` by identifier, `probability` of the set. `ratio` (bins,): probability of each of
+    equal parts of 0 to 1. `sizes`: mean and standard deviation of the natural logarithm of each
+    size by (effect, parameter).
+    """
+
+    effects: tuple[str, ...]
+    probability: float
+    ratio: NDArray[np.float64]
+    sizes: Mapping[tuple[str, str], tuple[float, float]]
+
+    @property
+    def ratio_mean(self) -> float:
+        """Mean of the contribution ratio."""
+        return float(self.ratio @ _centres(len(self.ratio)))
+
+    @property
+    def ratio_std(self) -> float:
+        """Standard deviation of the contribution ratio."""
+        variance = self.ratio @ (_centres(len(self.ratio)) - self.ratio_mean) ** 2
+        return float(np.sqrt(variance + 1.0 / (12.0 * len(self.ratio) ** 2)))
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """The trained posterior of one unit."""
+
+    scales: Scales
+    checkpoint: Checkpoint
+
+    def summary(
+        self,
+        observation: Observation,
+        tolerance: Mapping[str, float],
+        total_known: bool = True,
+    ) -> NDArray[np.float32]:
+        """What the network keeps of an observation (1, hidden).
+
+        Parameters
+        ----------
+        tolerance
+            Believed standard deviation of datasheet values by symbol, as shares; 0 where a symbol
+            is not named.
+        total_known
+            Whether the total backlash of the datasheet may be relied on.
+        """
+        parts = [self.scales.inputs(swept) for swept in swept_levels(observation)]
+        points = np.concatenate([p for p, _ in parts], axis=1)
+        facts = np.concatenate([f for _, f in parts], axis=1)
+        rows = np.concatenate([facts, np.ones((*facts.shape[:2], 1), dtype=np.float32)], axis=2)
+        shares = [[tolerance.get(symbol, 0.0) for symbol in self.scales.prior.symbols]]
+        known = [np.isfinite(observation.values[channel]).any() for channel in (2, 1)]
+        condition = conditions(
+            np.array(shares, dtype=np.float32),
+            np.array([total_known]),
+            *(np.array([one]) for one in known),
+        )
+        return np.asarray(
+            summarise(self.checkpoint.weights, self.checkpoint.shape, points, rows, condition)
+        )
+
+    def set_probabilities(
+        self, summary: NDArray[np.float32], without: Sequence[str] = ()
+    ) -> NDArray[np.float64]:
+        """Posterior probability (sets,) of every set of causes; 0 of those with an effect left out."""
+        logits = set_logits(self.checkpoint.weights, self.scales.sets, summary)[0].astype(float)
+        places = [self.scales.prior.effects.index(effect) for effect in without]
+        logits[np.isin(self.scales.sets.members, places).any(axis=1)] = -np.inf
+        weight = np.exp(logits - logits.max())
+        return np.asarray(weight / weight.sum())
+
+    def likeliest(
+        self, summary: NDArray[np.float32], share: float = 0.99, without: Sequence[str] = ()
+    ) -> list[SetPosterior]:
+        """The fewest sets that hold a share of the probability, likeliest first."""
+        probability = self.set_probabilities(summary, without)
+        order = np.argsort(-probability)
+        count = int(np.searchsorted(np.cumsum(probability[order]), share)) + 1
+        return [self.given(summary, int(n), float(probability[n])) for n in order[:count]]
+
+    def given(
+        self, summary: NDArray[np.float32], number: int, probability: float = 1.0
+    ) -> SetPosterior:
+        """Contribution ratio and sizes given the set of a number."""
+        sets, shape = self.scales.sets, self.checkpoint.shape
+        chosen = np.zeros((1, shape.effects), dtype=np.float32)
+        chosen[0, list(sets.places[number])] = 1.0
+        found: Densities = densities(self.checkpoint.weights, shape, summary, chosen)
+        logits = np.asarray(found.ratio[0], dtype=float)
+        ratio = np.exp(logits - logits.max())
+        names, (low, high) = sets.names(number), self.scales.size_ends.T
+        sizes = {}
+        for place, (effect, parameter) in enumerate(self.scales.prior.parameters):
+            if effect in names:
+                stretch = high[place] - low[place]
+                mean = low[place] + stretch * float(found.size_mean[0, place])
+                std = stretch * float(np.exp(found.size_log_std[0, place]))
+                sizes[effect, parameter.name] = (mean, std)
+        return SetPosterior(names, probability, ratio / ratio.sum(), sizes)
+
+
+def swept_levels(observation: Observation) -> list[SweptLevels]:
+    """The sweeps of an observation as the network reads them."""
+    found = []
+    for plan, rows in observation.plans:
+        values, cycles = observation.values[:, rows], plan.integrate_cycles
+        levels = np.unique(observation.source_vpk[rows])
+        frequency_hz = np.asarray(plan.frequencies_hz)
+        shape = (1, len(levels), len(frequency_hz))
+        place = (
+            np.searchsorted(levels, observation.source_vpk[rows]),
+            np.searchsorted(frequency_hz, observation.frequency_hz[rows]),
+        )
+        gain = np.full(shape, np.nan, dtype=np.complex64)
+        scatter, phase = np.full(shape, np.nan, dtype=np.float32), np.zeros(shape, dtype=bool)
+        gain[0, *place] = np.exp(values[0] + 1j * np.nan_to_num(values[1]))
+        scatter[0, *place] = np.exp(values[2]) * np.sqrt(cycles)
+        phase[0, *place] = np.isfinite(values[1])
+        found.append(
+            SweptLevels(
+                frequency_hz,
+                levels,
+                gain,
+                scatter,
+                np.array([observation.noise_v], dtype=np.float32),
+                phase,
+                plan.direction == "down",
+                plan.settle_cycles,
+                cycles,
+                plan.dc_offset_v,
+            )
+        )
+    return found
+
+
+def _centres(bins: int) -> NDArray[np.float64]:
+    return (np.arange(bins) + 0.5) / bins

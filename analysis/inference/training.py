@@ -1,0 +1,168 @@
+"""Training of the posterior network with JAX: weights in, better weights out.
+
+Owns the loss, the optimiser and the loop over batches of runs. The loss is the negative log
+posterior probability of what is true, averaged over the prior (neural posterior estimation,
+Greenberg et al. 2019). It is imported by whoever trains, and by nobody who answers.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optax
+
+from analysis.inference.examples import Examples, Scales, read_batch
+from analysis.inference.network import Architecture, densities, set_logits, summarise
+from analysis.inference.runs import Batch
+
+__all__ = ["Progress", "Schedule", "train"]
+
+_SHARES = {"set": 1.0, "ratio": 0.5, "size": 0.3, "error": 0.2, "total": 0.05}
+"""How much each part of the loss counts. The set and the ratio are what is asked for."""
+
+_POOL = 24
+"""Batches that are mixed at a time, so that one step sees many sweeps."""
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """How long to train, and how fast.
+
+    `steps` of `examples` each; `rate` the highest learning rate, after a warm-up of 2 % and
+    before a cosine decay; `dropout` of the summary's units; `decay` of weights.
+    """
+
+    steps: int
+    examples: int = 192
+    rate: float = 1.2e-3
+    dropout: float = 0.1
+    decay: float = 0.02
+
+    def rate_at(self, step: int) -> float:
+        """Learning rate of a step."""
+        share = step / self.steps
+        return self.rate * min(
+            share / 0.02 + 1e-3, 1.0, max(0.01, 0.5 + 0.5 * np.cos(np.pi * share))
+        )
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where training stands: parts of the loss over the last steps, and processor time, s."""
+
+    step: int
+    loss: dict[str, float]
+    processor_s: float
+
+
+def train(
+    scales: Scales,
+    shape: Architecture,
+    weights: dict[str, Any],
+    batches: Callable[[], Sequence[Batch]],
+    schedule: Schedule,
+    seed: int,
+    told: Callable[[Progress, dict[str, Any]], None],
+    every: int = 500,
+) -> dict[str, Any]:
+    """Train, and return the weights.
+
+    Parameters
+    ----------
+    batches
+        Gives the batches that there are, at the beginning of every pass through them.
+    told
+        Told of the progress every so many steps, with the weights.
+    """
+    optimiser = optax.chain(
+        optax.clip_by_global_norm(1.0),
+        optax.scale_by_adam(b2=0.99),
+        optax.add_decayed_weights(schedule.decay),
+    )
+    state = optimiser.init(weights)
+
+    @jax.jit
+    def step(weights: Any, state: Any, batch: Any, key: Any, rate: Any) -> Any:
+        def loss(weights: Any) -> Any:
+            parts = losses(scales, shape, weights, batch, key, schedule.dropout)
+            return sum(_SHARES[name] * part for name, part in parts.items()), parts
+
+        gradient, parts = jax.grad(loss, has_aux=True)(weights)
+        change, state = optimiser.update(gradient, state, weights)
+        moved = jax.tree.map(lambda w, c: w - rate * c, weights, change)
+        return moved, state, parts
+
+    rng = np.random.default_rng([seed, 1])
+    key = jax.random.PRNGKey(seed)
+    began_s, recent = time.process_time(), []
+    stream = mixed_examples(scales, batches, schedule.examples, rng)
+    for number in range(schedule.steps):
+        key, one = jax.random.split(key)
+        some = next(stream)
+        content = {name: getattr(some, name) for name in Examples.__slots__}
+        weights, state, parts = step(weights, state, content, one, schedule.rate_at(number))
+        recent.append(parts)
+        if (number + 1) % every == 0 or number + 1 == schedule.steps:
+            mean = {name: float(np.mean([r[name] for r in recent])) for name in _SHARES}
+            told(Progress(number + 1, mean, time.process_time() - began_s), weights)
+            recent = []
+    return weights
+
+
+def mixed_examples(
+    scales: Scales,
+    batches: Callable[[], Sequence[Batch]],
+    count: int,
+    rng: np.random.Generator,
+) -> Iterator[Examples]:
+    """Examples in lots of `count`, from many batches at a time, for ever."""
+    pool: list[Examples] = []
+    while True:
+        known = batches()
+        order = rng.permutation(len(known))
+        for first in range(0, len(order), _POOL):
+            pool += [read_batch(scales, known[i], rng) for i in order[first : first + _POOL]]
+            mixed = Examples.joined(pool)
+            mixed = mixed.taken(rng.permutation(len(mixed)))
+            whole = len(mixed) // count * count
+            for start in range(0, whole, count):
+                yield mixed.taken(slice(start, start + count))
+            pool = [mixed.taken(slice(whole, None))]
+
+
+def losses(
+    scales: Scales, shape: Architecture, weights: Any, batch: Any, key: Any, dropout: float
+) -> dict[str, Any]:
+    """Negative log densities of what is true, by what they are of."""
+    keys = jax.random.split(key, 3)
+
+    def drop(layer: int, array: Any) -> Any:
+        kept = jax.random.bernoulli(keys[layer], 1.0 - dropout, array.shape)
+        return jnp.where(kept, array / (1.0 - dropout), 0.0)
+
+    inputs = batch["points"], batch["rows"], batch["conditions"]
+    summary = summarise(weights, shape, *inputs, dropout=drop, xp=jnp)
+    logits = set_logits(weights, scales.sets, summary, jnp)
+    found = densities(weights, shape, summary, batch["chosen"], jnp)
+    bins = jnp.clip((batch["ratio"] * shape.bins).astype(int), 0, shape.bins - 1)
+    cross = optax.softmax_cross_entropy_with_integer_labels
+    return {
+        "set": cross(logits, batch["set"]).mean(),
+        "ratio": cross(found.ratio, bins).mean(),
+        "size": _normal(batch["size"], found.size_mean, found.size_log_std),
+        "error": _normal(batch["error"], found.error_mean, found.error_log_std),
+        "total": _normal(batch["total"], found.total_mean, found.total_log_std),
+    }
+
+
+def _normal(value: Any, mean: Any, log_std: Any) -> Any:
+    """Negative log of a normal density, where there is a value."""
+    known = jnp.isfinite(value)
+    z = (jnp.where(known, value, 0.0) - mean) * jnp.exp(-log_std)
+    return jnp.where(known, 0.5 * z * z + log_std, 0.0).sum() / (known.sum() + 1.0)
