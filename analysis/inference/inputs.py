@@ -38,7 +38,7 @@ reference. `scatter`: log of the relative cycle-to-cycle scatter of one cycle. `
 relative reading noise. `position`: log frequency between ARF and RF. `wave_*`: of `position`."""
 
 ROW_FACTS = ("level", "down", "settle", "integrate", "offset")
-"""Facts of a row: log of level over the unit's limit, direction, log of cycles, offset over level."""
+"""Facts of a row: log of level over the unit's limit, direction, log of cycles, offset by level."""
 
 _GAIN_LIMIT = 4.0
 _WAVES = (0.5, 2.0)

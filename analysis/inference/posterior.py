@@ -89,7 +89,7 @@ class Posterior:
     def set_probabilities(
         self, summary: NDArray[np.float32], without: Sequence[str] = ()
     ) -> NDArray[np.float64]:
-        """Posterior probability (sets,) of every set of causes; 0 of those with an effect left out."""
+        """Posterior probability (sets,) of every set of causes; 0 with an effect left out."""
         logits = set_logits(self.checkpoint.weights, self.scales.sets, summary)[0].astype(float)
         places = [self.scales.prior.effects.index(effect) for effect in without]
         logits[np.isin(self.scales.sets.members, places).any(axis=1)] = -np.inf

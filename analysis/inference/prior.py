@@ -96,8 +96,10 @@ class Prior:
 
     @cached_property
     def lane_effects(self) -> frozenset[str]:
-        """Effects whose size leaves the linear part alone: machines that differ in them only are
-        stepped side by side."""
+        """Effects whose size leaves the linear part alone.
+
+        Machines that differ in these alone are stepped side by side.
+        """
         rng = np.random.default_rng(0)
         tolerance = dict.fromkeys(self.symbols, 0.0)
         found = set()

@@ -8,7 +8,7 @@ Greenberg et al. 2019). It is imported by whoever trains, and by nobody who answ
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,7 +21,7 @@ from analysis.inference.examples import Examples, Scales, read_batch
 from analysis.inference.network import Architecture, densities, set_logits, summarise
 from analysis.inference.runs import Batch
 
-__all__ = ["Progress", "Schedule", "train"]
+__all__ = ["Progress", "Schedule", "Trainer"]
 
 _SHARES = {"set": 1.0, "ratio": 0.5, "size": 0.3, "error": 0.2, "total": 0.05}
 """How much each part of the loss counts. The set and the ratio are what is asked for."""
@@ -54,80 +54,83 @@ class Schedule:
 
 @dataclass(frozen=True)
 class Progress:
-    """Where training stands: parts of the loss over the last steps, and processor time, s."""
+    """What training came to: steps made, parts of the loss in the mean, and processor time, s."""
 
-    step: int
+    steps: int
     loss: dict[str, float]
     processor_s: float
 
 
-def train(
-    scales: Scales,
-    shape: Architecture,
-    weights: dict[str, Any],
-    batches: Callable[[], Sequence[Batch]],
-    schedule: Schedule,
-    seed: int,
-    told: Callable[[Progress, dict[str, Any]], None],
-    every: int = 500,
-) -> dict[str, Any]:
-    """Train, and return the weights.
+class Trainer:
+    """Compiles one step of training and makes many; the optimiser's state goes on between calls.
 
     Parameters
     ----------
-    batches
-        Gives the batches that there are, at the beginning of every pass through them.
-    told
-        Told of the progress every so many steps, with the weights.
+    scales, shape
+        The unit, and the network for it.
+    schedule
+        Of each call of `train`.
     """
-    optimiser = optax.chain(
-        optax.clip_by_global_norm(1.0),
-        optax.scale_by_adam(b2=0.99),
-        optax.add_decayed_weights(schedule.decay),
-    )
-    state = optimiser.init(weights)
 
-    @jax.jit
-    def step(weights: Any, state: Any, batch: Any, key: Any, rate: Any) -> Any:
-        def loss(weights: Any) -> Any:
-            parts = losses(scales, shape, weights, batch, key, schedule.dropout)
-            return sum(_SHARES[name] * part for name, part in parts.items()), parts
+    def __init__(self, scales: Scales, shape: Architecture, schedule: Schedule) -> None:
+        self._scales, self._schedule = scales, schedule
+        self._optimiser = optax.chain(
+            optax.clip_by_global_norm(1.0),
+            optax.scale_by_adam(b2=0.99),
+            optax.add_decayed_weights(schedule.decay),
+        )
+        self._state: Any = None
 
-        gradient, parts = jax.grad(loss, has_aux=True)(weights)
-        change, state = optimiser.update(gradient, state, weights)
-        moved = jax.tree.map(lambda w, c: w - rate * c, weights, change)
-        return moved, state, parts
+        def step(weights: Any, state: Any, batch: Any, key: Any, rate: Any) -> Any:
+            def loss(weights: Any) -> Any:
+                parts = losses(scales, shape, weights, batch, key, schedule.dropout)
+                return sum(_SHARES[name] * part for name, part in parts.items()), parts
 
-    rng = np.random.default_rng([seed, 1])
-    key = jax.random.PRNGKey(seed)
-    began_s, recent = time.process_time(), []
-    stream = mixed_examples(scales, batches, schedule.examples, rng)
-    for number in range(schedule.steps):
-        key, one = jax.random.split(key)
-        some = next(stream)
-        content = {name: getattr(some, name) for name in Examples.__slots__}
-        weights, state, parts = step(weights, state, content, one, schedule.rate_at(number))
-        recent.append(parts)
-        if (number + 1) % every == 0 or number + 1 == schedule.steps:
-            mean = {name: float(np.mean([r[name] for r in recent])) for name in _SHARES}
-            told(Progress(number + 1, mean, time.process_time() - began_s), weights)
-            recent = []
-    return weights
+            gradient, parts = jax.grad(loss, has_aux=True)(weights)
+            change, state = self._optimiser.update(gradient, state, weights)
+            return jax.tree.map(lambda w, c: w - rate * c, weights, change), state, parts
+
+        self._step = jax.jit(step)
+
+    def train(
+        self, weights: dict[str, Any], batches: Sequence[Batch], seed: int
+    ) -> tuple[dict[str, Any], Progress]:
+        """Make the steps of the schedule on some batches; weights, and what it came to.
+
+        `seed` draws the order, the bench's part of the examples, and dropout.
+        """
+        if self._state is None:
+            self._state = self._optimiser.init(weights)
+        key, began_s, recent = jax.random.PRNGKey(seed), time.process_time(), []
+        stream = mixed_examples(
+            self._scales, batches, self._schedule.examples, np.random.default_rng([seed, 1])
+        )
+        for number in range(self._schedule.steps):
+            key, one = jax.random.split(key)
+            some = next(stream)
+            content = {name: getattr(some, name) for name in Examples.__slots__}
+            rate = self._schedule.rate_at(number)
+            weights, self._state, parts = self._step(weights, self._state, content, one, rate)
+            recent.append(parts)
+        mean = {name: float(np.mean([one[name] for one in recent])) for name in _SHARES}
+        return (
+            {name: np.asarray(weight) for name, weight in weights.items()},
+            Progress(self._schedule.steps, mean, time.process_time() - began_s),
+        )
 
 
 def mixed_examples(
     scales: Scales,
-    batches: Callable[[], Sequence[Batch]],
+    batches: Sequence[Batch],
     count: int,
     rng: np.random.Generator,
 ) -> Iterator[Examples]:
     """Examples in lots of `count`, from many batches at a time, for ever."""
     pool: list[Examples] = []
     while True:
-        known = batches()
-        order = rng.permutation(len(known))
+        order = rng.permutation(len(batches))
         for first in range(0, len(order), _POOL):
-            pool += [read_batch(scales, known[i], rng) for i in order[first : first + _POOL]]
+            pool += [read_batch(scales, batches[i], rng) for i in order[first : first + _POOL]]
             mixed = Examples.joined(pool)
             mixed = mixed.taken(rng.permutation(len(mixed)))
             whole = len(mixed) // count * count

@@ -1,7 +1,7 @@
 """Draw the sets of a paired study and write them to a folder, with their truths.
 
-Owns the folder: one HDF5 file a set, `truth.jsonl`, and `tasks.jsonl` without the truths. Sets that are there are kept.
-It must not look at any answer.
+Owns the folder: one HDF5 file a set, `truth.jsonl`, and `tasks.jsonl` without the truths. Sets
+that are there are kept. It must not look at any answer.
 
     python tests/studies/draw.py SEED FOLDER [--datasheet SHARE] [KIND=COUNT ...]
 """
