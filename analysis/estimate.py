@@ -22,14 +22,14 @@ from analysis.backlash import Backlash, Uncertain, backlash_of_places
 from analysis.believed import HINT, believed_document, believed_lines, trusts_much
 from analysis.ensemble import Machine
 from analysis.executor import Executor
-from analysis.fit import Posterior, fit_posterior, match_runs
+from analysis.fit import Posterior, fit_posterior, match_runs, robust_rms
 from analysis.lattice import RATIO, Axis
-from analysis.likelihood import Match
 from analysis.observation import observe
 from analysis.paper_estimate import IndexCurve, index_curve_of_response
 from analysis.progress import Progress
 from analysis.samples import refuse_levels
-from analysis.scale_check import frequency_doubt
+from analysis.scale_check import REFUTED, frequency_doubt
+from analysis.setting_check import doubt_settings
 from analysis.settled import settled
 from analysis.stated_error import error_doubts
 from analysis.swept import check_together, sweep_document, sweep_lines
@@ -148,15 +148,23 @@ def estimate_response(
         posterior = fit_posterior(
             unit, observation, axes, seed=seed, cache=cache, executor=executor, progress=progress
         )
+    simulated_s = effort.simulated_s
     curve = index_curve_of_response(responses[0], observation, posterior.draws)
     warnings = doubts + error_doubts(responses)
-    misfit = _robust_rms(posterior.match)
+    misfit = robust_rms(posterior.match)
     if misfit > _WIDE_RESIDUAL:
         doubt = frequency_doubt(
             observation,
             posterior.draws,
-            lambda seen, runs: _robust_rms(match_runs(unit, seen, axes, runs, seed)),
+            lambda seen, runs: robust_rms(match_runs(unit, seen, axes, runs, seed)),
         )
+        if not doubt and misfit >= REFUTED:
+            with counting() as further_effort:
+                other = doubt_settings(
+                    responses, unit, axes, seed=seed, executor=executor, progress=progress
+                )
+            simulated_s += further_effort.simulated_s
+            doubt = "" if other is None else other.warning
         warnings = ([doubt] if doubt else []) + warnings
         warnings.append(
             f"the model leaves {misfit:.1f} standard deviations of the response unexplained; "
@@ -164,7 +172,7 @@ def estimate_response(
         )
         if trusts_much(believed_document(unit)):
             warnings.append(HINT)
-    found = _from_posterior(unit, posterior, curve, tuple(warnings), effort.simulated_s)
+    found = _from_posterior(unit, posterior, curve, tuple(warnings), simulated_s)
     return replace(
         found,
         sweeps=tuple(sweep_document(plan) for plan, _ in observation.plans),
@@ -234,12 +242,6 @@ def _play_axis(unit: Unit) -> Axis:
         return replace(machine, ratio=1.0, b_t_deg=value)
 
     return Axis("b_t_deg", 0.2 * b_t, 3.0 * b_t, 33, 0.2 * b_t, put)
-
-
-def _robust_rms(match: Match) -> float:
-    z = match.residual[:2] / match.std[:2]
-    z = z[np.isfinite(z)]
-    return float(1.4826 * np.median(np.abs(z))) if z.size else 0.0
 
 
 def _from_posterior(

@@ -30,7 +30,7 @@ from analysis.reading_noise import likeliest_noise, possible_noises
 from analysis.spread import Spread, spread_of
 from sim.unit import Unit
 
-__all__ = ["Posterior", "fit_posterior", "match_runs"]
+__all__ = ["Posterior", "fit_posterior", "match_runs", "robust_rms"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,6 +126,13 @@ def match_runs(
 
     noises = possible_noises(observation)
     return match(likeliest_noise(noises, lambda s: match(s).log_likelihood))
+
+
+def robust_rms(match: Match) -> float:
+    """What is left of gain and phase, standard deviations, by its median."""
+    z = match.residual[:2] / match.std[:2]
+    z = z[np.isfinite(z)]
+    return float(1.4826 * np.median(np.abs(z))) if z.size else 0.0
 
 
 def _population(axes: Sequence[Axis], draws: Draws, spread: Spread) -> Population:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from analysis.quasi_linear import Family, draw_machines, neighbours
 from analysis.samples import refuse_levels
-from analysis.usual_mistakes import GAIN, MISTAKES, Curve, is_like_linear
+from analysis.usual_mistakes import GAIN, MISTAKES, Curve
 from daq.errors import AnalysisError, InputError
 from daq.frf import DB_PER_NEPER, FrequencyResponse, PointFlag
 from sim.unit import Unit
@@ -97,7 +97,7 @@ def check_input(response: FrequencyResponse, unit: Unit) -> Finding:
     for name, mistake in MISTAKES.items():
         if mistake.needs_phase and any(curve.phase is None for curve in curves):
             continue
-        if name == "linear gain" and not all(map(is_like_linear, curves)):
+        if not all(map(mistake.possible, curves)):
             continue
         distances[name], offsets[name] = search.nearest(curves, mistake.undo, mistake.gain)
     told = [

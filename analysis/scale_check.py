@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from analysis.ensemble import Draws
 from analysis.observation import Observation
 
-__all__ = ["frequency_doubt"]
+__all__ = ["REFUTED", "frequency_doubt", "undoes"]
 
 _FACTORS = np.exp(np.arange(-6, 7) * np.log(1.2) / 6.0)
 """Factors that are tried: steps of 3 %, up to 20 % either way."""
 
-_REFUTED, _FITS, _SHARE = 3.0, 1.6, 0.35
+REFUTED, _FITS, _SHARE = 3.0, 1.6, 0.35
 """Robust misfit, standard deviations, from which the response as it is must be off, that it may
 have at the other frequencies, and what share of the first that may be at most."""
 
@@ -45,7 +45,7 @@ def frequency_doubt(
         Robust misfit of the plain model fitted to an observation with such runs.
     """
     given = misfit(observation, draws)
-    if given < _REFUTED:
+    if given < REFUTED:
         return ""
     tried = [
         (misfit(*moved), float(factor))
@@ -53,13 +53,18 @@ def frequency_doubt(
         if abs(factor - 1.0) > 0.01 and (moved := _at(observation, draws, factor)) is not None
     ]
     left, factor = min(tried, default=(given, 1.0))
-    if left > min(_FITS, _SHARE * given):
+    if not undoes(left, given):
         return ""
     return (
         f"frequencies are likely {factor:.2f} times what they should be: divided by that, the "
         f"model leaves {left:.1f} standard deviations in place of {given:.1f}; see to the time "
         "base or the sampling rate"
     )
+
+
+def undoes(left: float, given: float) -> bool:
+    """Whether a change that leaves so many standard deviations undoes the misfit given."""
+    return given >= REFUTED and left <= min(_FITS, _SHARE * given)
 
 
 def _at(observation: Observation, draws: Draws, factor: float) -> tuple[Observation, Draws] | None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from daq.frf import DB_PER_NEPER
 
-__all__ = ["GAIN", "MISTAKES", "Curve", "Mistake", "is_like_linear"]
+__all__ = ["GAIN", "MISTAKES", "Curve", "Mistake"]
 
 Vector = NDArray[np.float64]
 
@@ -22,6 +22,9 @@ GAIN = 0.7
 """Neper by which the gain as a whole may be off by causes of the catalogue, which double it."""
 
 _ANY_GAIN = 30.0
+
+_MOST_LOG = 6.0
+"""Neper of a gain that can be an amount of decibels: 400."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +40,7 @@ class Curve:
 class Mistake:
     """A mistake: how it is undone, how far the gain may then be off, and what to tell a person.
 
+    `possible`: what its numbers must have in common for it to be looked for.
     `telltale`: what its numbers have in common and those of a true response hardly ever have.
     """
 
@@ -45,6 +49,7 @@ class Mistake:
     gain: float = GAIN
     needs_phase: bool = False
     telltale: Callable[[Curve], bool] | None = None
+    possible: Callable[[Curve], bool] = lambda curve: True
 
 
 def _turned(sign: float, radians: float = 0.0) -> Callable[[Curve], Curve]:
@@ -70,12 +75,23 @@ def _from_linear(curve: Curve) -> Curve:
     return Curve(curve.frequency_hz, np.log(linear), curve.phase)
 
 
+def _from_decibels(curve: Curve) -> Curve:
+    # An amount of decibels below 0, of which the logarithm was taken once more.
+    decibels = np.exp(np.minimum(curve.log_gain, _MOST_LOG))
+    return Curve(curve.frequency_hz, -decibels / DB_PER_NEPER, curve.phase)
+
+
+def _is_like_decibels(curve: Curve) -> bool:
+    """Whether gains are mostly above 1, as amounts of decibels are."""
+    return bool(np.median(curve.log_gain) > 0.0)
+
+
 def _is_within_pi(curve: Curve) -> bool:
     """Whether no phase in degrees is larger than any in radians."""
     return curve.phase is not None and bool(np.max(np.abs(np.degrees(curve.phase))) <= 3.1416)
 
 
-def is_like_linear(curve: Curve) -> bool:
+def _is_like_linear(curve: Curve) -> bool:
     """Whether gains have no sign, are small, and some below 1, as linear gains are."""
     decibels = curve.log_gain * DB_PER_NEPER
     return bool(0.0 < np.min(decibels) < 1.0 and np.max(decibels) < 20.0)
@@ -124,7 +140,14 @@ MISTAKES: Mapping[str, Mistake] = {
     "linear gain": Mistake(
         _from_linear,
         "gain_db likely holds the gain itself, not decibels; give 20 log10 of it",
-        telltale=is_like_linear,
+        telltale=_is_like_linear,
+        possible=_is_like_linear,
+    ),
+    "decibels as gain": Mistake(
+        _from_decibels,
+        "the gain was likely in decibels already, below 0, and converted once more without its "
+        "sign; give it as it was before: -10^(gain_db / 20)",
+        possible=_is_like_decibels,
     ),
     "rad/s": Mistake(
         _slower(2.0 * np.pi),

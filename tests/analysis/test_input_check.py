@@ -42,6 +42,7 @@ MADE = {
     "linear gain": lambda r: replace(
         r, gain=10 ** (np.abs(r.gain) / 20.0) * r.gain / np.abs(r.gain)
     ),
+    "decibels as gain": lambda r: times(r, np.abs(20 * np.log10(np.abs(r.gain))) / np.abs(r.gain)),
     "rad/s": lambda r: replace(r, frequency_hz=2.0 * np.pi * r.frequency_hz),
     "position": lambda r: times(r, 1000.0 / swung(r)),
     "acceleration": lambda r: times(r, swung(r)),

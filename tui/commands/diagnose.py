@@ -27,7 +27,9 @@ from tui.places import cache_folder
 
 if TYPE_CHECKING:
     from analysis.diagnosis import Diagnosis
+    from analysis.executor import Executor
     from analysis.paper_diagnosis import PaperDiagnosis
+    from daq.frf import FrequencyResponse
     from sim.unit import Unit
 
 __all__ = ["diagnose"]
@@ -93,6 +95,7 @@ def diagnose(
         # Now, as well as with the answer: it may be a slip, and the answer takes a minute.
         console.note(f"warning: {doubt}")
     with executor_at(cluster) as executor:
+        said += _settings((response, *others), subject, as_is, executor, console)
         result = diagnose_response(
             response, subject, further=others, cache=cache_folder(), executor=executor,
             progress=console.progress,
@@ -106,6 +109,31 @@ def diagnose(
 
         for path in draw_diagnosis(result, plots):
             console.note(f"wrote {path}")
+
+
+def _settings(
+    responses: Sequence[FrequencyResponse],
+    unit: Unit,
+    as_is: bool,
+    executor: Executor | None,
+    console: Console,
+) -> list[str]:
+    """Refuse what is likely swept otherwise than stated, or say it where a cause does as much."""
+    from analysis.estimate import free_axes
+    from analysis.setting_check import search_doubt
+
+    if unit.stages == 1:
+        return []
+    doubt = search_doubt(
+        responses, unit, free_axes(unit), cache=cache_folder(), executor=executor,
+        progress=console.progress,
+    )  # fmt: skip
+    if doubt is None:
+        return []
+    if not doubt.rival and not as_is:
+        raise InputError(f"{doubt.words}; or take it as it stands with --as-is")
+    console.note(f"warning: {doubt.warning}")
+    return [doubt.warning]
 
 
 def _diagnose_paper(
