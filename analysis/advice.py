@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from analysis.answer import Answer, model_name
+from analysis.answer import Answer, model_name, span_of
 from sim.catalogue import CATALOGUE
 from sim.unit import Unit
 
@@ -20,8 +20,6 @@ __all__ = ["Advice", "Stage", "StageVerdict", "advise", "judge_limit", "span_of"
 StageVerdict = Literal["PASS", "FAIL", "UNDECIDED"]
 
 _HALF = 0.5
-_SIGMA = 2.0
-"""Standard deviations on either side that stand for a 95 % interval which is not stated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,15 +91,6 @@ def judge_limit(spans: Sequence[tuple[float, float]], limit: float) -> StageVerd
     if spans and all(low > limit for low, _ in spans):
         return "FAIL"
     return "UNDECIDED"
-
-
-def span_of(number: Mapping[str, Any]) -> tuple[float, float]:
-    """The 95 % interval of a number; two standard deviations on either side if it is not stated."""
-    if number.get("interval95"):
-        low, high = number["interval95"]
-        return float(low), float(high)
-    std = number["std"] or 0.0
-    return max(0.0, number["value"] - _SIGMA * std), number["value"] + _SIGMA * std
 
 
 def _before(answer: Answer) -> str:

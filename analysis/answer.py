@@ -11,7 +11,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeGuard
 
-__all__ = ["CALL_FOR_DIAGNOSIS", "QUANTITIES", "Answer", "State", "accept_model", "model_name"]
+__all__ = [
+    "CALL_FOR_DIAGNOSIS",
+    "QUANTITIES",
+    "Answer",
+    "State",
+    "accept_model",
+    "model_name",
+    "span_of",
+]
 
 Number = Mapping[str, Any]
 """``{"value", "std"}``, with ``"interval95"`` where it is known."""
@@ -24,6 +32,9 @@ CALL_FOR_DIAGNOSIS = "run diagnose before trusting the ratio"
 """End of the warning by which an estimate says that the plain model does not fit."""
 
 PLAIN = "plain model"
+
+_SIGMA = 2.0
+"""Standard deviations on either side that stand for a 95 % interval which is not stated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +66,33 @@ class Answer:
     models: tuple[Mapping[str, Any], ...] = ()
     diagnosed: bool = False
 
+    def over_models(self, name: str) -> Number | None:
+        """A quantity over every model that is left, weighted by its probability.
+
+        Mean and standard deviation of the mixture (Bayesian model averaging, Hoeting et al. 1999);
+        the interval spans those of all models. None where one model is left, or one does not tell
+        the quantity.
+        """
+        told = [model.get(name) for model in self.models]
+        numbers = [number for number in told if number is not None]
+        if len(numbers) < 2 or len(numbers) != len(told):
+            return None
+        weights = [
+            1.0 if model.get("probability") is None else float(model["probability"])
+            for model in self.models
+        ]
+        if (total := sum(weights)) <= 0.0:
+            return None
+        shares = [weight / total for weight in weights]
+        mean = sum(s * n["value"] for s, n in zip(shares, numbers, strict=True))
+        square = sum(
+            s * ((n["std"] or 0.0) ** 2 + (n["value"] - mean) ** 2)
+            for s, n in zip(shares, numbers, strict=True)
+        )
+        spans = [span_of(number) for number in numbers]
+        interval = [min(low for low, _ in spans), max(high for _, high in spans)]
+        return {"value": mean, "std": square**0.5, "interval95": interval}
+
     @property
     def contribution_ratio(self) -> Number | None:
         """Share of stage 1 in the backlash seen at the output; None where no model is in force."""
@@ -74,6 +112,15 @@ class Answer:
     def b_t_deg(self) -> Number | None:
         """Total backlash, degrees at the output; None where no model is in force."""
         return self.numbers.get("b_t_deg")
+
+
+def span_of(number: Mapping[str, Any]) -> tuple[float, float]:
+    """The 95 % interval of a number; two standard deviations on either side if it is not stated."""
+    if number.get("interval95"):
+        low, high = number["interval95"]
+        return float(low), float(high)
+    std = number["std"] or 0.0
+    return max(0.0, number["value"] - _SIGMA * std), number["value"] + _SIGMA * std
 
 
 def accept_model(

@@ -65,8 +65,15 @@ def measurement_row(line: HistoryLine) -> dict[str, Any]:
             words = f"the {kind} is of an earlier edition of the inference ({kept.software})"
             again = "--estimate all makes it anew" if kind == "estimate" else "diagnose once more"
             warnings.append(f"{words}; {again}")
+    over = {name: answer.over_models(name) for name in QUANTITIES}
+    if answer.state == "accepted" and (ratio := over["contribution_ratio"]) is not None:
+        low, high = ratio["interval95"]
+        warnings.append(
+            f"still open: {len(answer.models)} models are left, and over all of them the "
+            f"contribution ratio is {low:.2f} to {high:.2f}",
+        )
     return row | {
-        "answer": {"state": answer.state, "source": answer.source},
+        "answer": {"state": answer.state, "source": answer.source, "over_models": over},
         "warnings": list(dict.fromkeys(warnings)),
         "estimate": line.estimate and _origin(line.estimate) | _plain_numbers(estimate or {}),
         "diagnosis": line.diagnosis and _origin(line.diagnosis) | _verdict(diagnosis or {}),
@@ -171,7 +178,8 @@ class Trends:
     def add(self, row: Mapping[str, Any]) -> None:
         """Take a measurement in."""
         for name in QUANTITIES:
-            number = row[name]
+            # A number of one model of several is known no better than all of them together.
+            number = row[name] and (row["answer"]["over_models"][name] or row[name])
             if number and number.get("std"):
                 key = (row["unit"], row["serial"], name)
                 series = self._series.setdefault(key, _Series())

@@ -22,17 +22,34 @@ class _Shape(BaseModel):
     model_config = ConfigDict(extra="allow", strict=True)
 
 
+_Probability = Annotated[float, Field(ge=0.0, le=1.0 + 1e-9)]
+_Error = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+_MOST_DEG = 360.0
+
+
 class _Number(_Shape):
     value: _Finite
-    std: _Finite | None = None
+    std: _Error | None = None
     interval95: Annotated[list[_Finite], Field(min_length=2, max_length=2)] | None = None
 
 
-class _Open(_Shape):
-    """A number that may not be known."""
+class _Ratio(_Number):
+    """A contribution ratio: 0 to 1, and what a normal distribution has beyond."""
 
-    value: _Finite | None
-    std: _Finite | None = None
+    value: Annotated[float, Field(ge=-0.5, le=1.5)]
+
+
+class _Degrees(_Number):
+    """A backlash, degrees."""
+
+    value: Annotated[float, Field(ge=-_MOST_DEG, le=_MOST_DEG)]
+
+
+class _Open(_Shape):
+    """A contribution ratio that may not be known."""
+
+    value: Annotated[float, Field(ge=-0.5, le=1.5)] | None
+    std: _Error | None = None
 
 
 class _Index(_Shape):
@@ -53,25 +70,25 @@ class _Sweep(_Shape):
 
 class _Model(_Shape):
     causes: _Texts
-    probability: _Finite | None = None
-    contribution_ratio: _Number | None = None
-    b1_deg: _Number | None = None
-    b2_deg: _Number | None = None
-    b_t_deg: _Number | None = None
+    probability: _Probability | None = None
+    contribution_ratio: _Ratio | None = None
+    b1_deg: _Degrees | None = None
+    b2_deg: _Degrees | None = None
+    b_t_deg: _Degrees | None = None
 
 
 class _Said(_Shape):
     """What both kinds may say."""
 
-    b1_deg: _Number | None = None
-    b2_deg: _Number | None = None
-    b_t_deg: _Number | None = None
+    b1_deg: _Degrees | None = None
+    b2_deg: _Degrees | None = None
+    b_t_deg: _Degrees | None = None
     sweeps: list[_Sweep] = []
     warnings: _Texts = []
 
 
 class _Estimate(_Said):
-    contribution_ratio: _Number
+    contribution_ratio: _Ratio
     error_index: _Index | None = None
     refuted: bool | None = None
 
@@ -85,7 +102,7 @@ class _Size(_Shape):
 class _Cause(_Shape):
     effect: _Text
     parameters: dict[str, _Size] = {}
-    probability: _Finite
+    probability: _Probability
     site: _Text = ""
     meaning: _Text = ""
     check: _Text = ""
@@ -93,7 +110,7 @@ class _Cause(_Shape):
 
 class _Rival(_Shape):
     causes: _Texts
-    probability: _Finite
+    probability: _Probability
     remark: _Text | None = None
     site: _Texts = []
 
@@ -157,7 +174,7 @@ class _Diagnosis(_Said):
 class _EstimateLine(_Said):
     """Of an estimate, what a list shows."""
 
-    contribution_ratio: _Number | None = None
+    contribution_ratio: _Ratio | None = None
     refuted: bool | None = None
     failed: _Text | None = None
     warnings: _Texts | None = None  # type: ignore[assignment]
@@ -165,7 +182,7 @@ class _EstimateLine(_Said):
 
 class _CauseLine(_Shape):
     effect: _Text
-    probability: _Finite
+    probability: _Probability
 
 
 class _DiagnosisLine(_Said):

@@ -52,6 +52,19 @@ def diagnosed(verdict, *models):
     }
 
 
+def test_over_models_is_the_mixture_of_all():
+    """0.75 of 0.2 +- 0.01 and 0.25 of 0.6 +- 0.01: 0.3 +- sqrt(0.01^2 + 0.03)."""
+    left = [model(ratio=0.2, probability=0.6), model("cable-stiffness", ratio=0.6, probability=0.2)]
+    found = accept_model(estimated(), diagnosed("consistent", *left)).over_models(
+        "contribution_ratio"
+    )
+    assert found["value"] == pytest.approx(0.3)
+    assert found["std"] == pytest.approx((0.01**2 + 0.03) ** 0.5)
+    assert found["interval95"] == pytest.approx([0.18, 0.62])
+    alone = accept_model(estimated(), diagnosed("consistent", left[0]))
+    assert alone.over_models("contribution_ratio") is None
+
+
 def test_an_explained_diagnosis_replaces_the_estimate_it_refutes():
     answer = accept_model(
         estimated(0.6, warnings=WARNED), diagnosed("explained", model("load-inertia", ratio=0.17))

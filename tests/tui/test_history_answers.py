@@ -17,6 +17,7 @@ EXPLAINED = DIAGNOSIS | {
     "b1_deg": {"value": 0.11, "std": 0.01},
     "b2_deg": {"value": 0.05, "std": 0.002},
     "warnings": ["few levels were held out"],
+    "models": DIAGNOSIS["models"][:1],
 }
 
 
@@ -87,6 +88,46 @@ def test_a_diagnosis_decides_whose_numbers_are_told(run, db, diagnosis, state, r
     out = run("history", "--estimate", "none")[1]
     assert f"diagnosed {diagnosis['verdict']}" in out
     assert ("load-inertia (0.55)" in out) == bool(diagnosis["causes"])
+
+
+def test_a_number_of_one_model_of_several_says_what_is_still_open(run, db):
+    """Two models left at 0.55 and 0.41: the trend knows the ratio as badly as both together."""
+    first, second = DIAGNOSIS["models"]
+    for serial in ("S", "S"):
+        run(*measuring("--serial", serial))
+    diagnosed(db, 1, EXPLAINED | {"models": [first, second]})
+    document = told(run)
+    row = document["measurements"][0]
+    assert row["answer"]["state"] == "accepted"
+    assert row["contribution_ratio"]["value"] == first["contribution_ratio"]["value"]
+    (said,) = [text for text in row["warnings"] if "still open" in text]
+    both = row["answer"]["over_models"]["contribution_ratio"]
+    low, high = both["interval95"]
+    assert f"is {low:.2f} to {high:.2f}" in said
+    ends = [end for m in (first, second) for end in m["contribution_ratio"]["interval95"]]
+    assert [low, high] == [min(ends), max(ends)]
+    (trend,) = [t for t in document["trends"] if t["quantity"] == "contribution_ratio"]
+    assert trend["mean"]["std"] == pytest.approx(both["std"])
+    assert both["std"] > first["contribution_ratio"]["std"]
+    assert "still open" in run("history", "--estimate", "none")[1]
+
+
+@pytest.mark.parametrize("value", ["-5.0", "7.5", "1e300"])
+def test_a_ratio_that_cannot_be_is_refused(run, db, value):
+    run(*measuring("--serial", "S"))
+    diagnosed(db, 1, EXPLAINED)
+    with sqlite3.connect(db) as raw:
+        for place in (
+            "$.contribution_ratio.extended.value",
+            "$.models[0].contribution_ratio.value",
+        ):
+            raw.execute(
+                "UPDATE diagnoses SET summary = json_set(summary, ?, json(?))", (place, value)
+            )
+    raw.close()
+    code, out, err = run("history", "--json", "--estimate", "none")
+    assert (code, out) == (2, "")
+    assert "cannot be read" in err
 
 
 def test_what_was_told_before_points_were_measured_again_is_not_told_whatever_the_clock(run, db):

@@ -96,6 +96,8 @@ def estimate(
             result = replace(result, warnings=(*said, *result.warnings), refuted=True)
     if json:
         document = result.to_json()
+        for text in warnings:
+            console.note(f"warning: {text}")
         console.document(document | {"warnings": warnings + document["warnings"]})
     else:
         from analysis.advice import advise
