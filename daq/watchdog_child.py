@@ -136,6 +136,7 @@ class _Stand:
         self._is_taken = False
         self._is_awake = False
         self._is_done = False
+        self._writer: threading.Thread | None = None
 
     def say(self, line: str) -> None:
         """Say one thing to the session, if it still listens."""
@@ -225,7 +226,15 @@ class _Stand:
 
     def _write(self, text: str, state: SourceState) -> None:
         words = (self._history, self._measurement, text, state)
-        writer = threading.Thread(target=write_down, args=words, daemon=True)
+        earlier = self._writer
+
+        def write() -> None:
+            # In the order in which it came about, however long the history keeps quiet.
+            if earlier is not None:
+                earlier.join()
+            write_down(*words)
+
+        self._writer = writer = threading.Thread(target=write, daemon=True)
         writer.start()
         if not self._is_done:
             return

@@ -7,7 +7,6 @@ on: how many batches were drawn, by which seed, and how many steps were made. It
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ import numpy as np
 
 from analysis.inference.network import Architecture
 from daq.errors import ConfigurationError
+from daq.formats.atomic import replacing
 
 __all__ = ["Checkpoint", "load_checkpoint", "save_checkpoint"]
 
@@ -50,10 +50,8 @@ def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
     arrays: dict[str, Any] = {
         name: np.asarray(w, dtype=np.float16) for name, w in checkpoint.weights.items()
     }
-    part = folder / "posterior.part"
-    with part.open("wb") as stream:
+    with replacing(folder / "posterior.npz") as stream:
         np.savez_compressed(stream, facts=json.dumps(facts), **arrays)
-    os.replace(part, folder / "posterior.npz")
 
 
 def load_checkpoint(folder: Path) -> Checkpoint | None:

@@ -8,7 +8,6 @@ number alone. It learns nothing.
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -21,6 +20,7 @@ from analysis.executor import Executor
 from analysis.family import Family, read_families
 from analysis.inference.plans import Landmarks, draw_plan
 from analysis.inference.prior import DrawnMachine, Prior
+from daq.formats.atomic import replacing
 from daq.plan import SweepPlan
 
 __all__ = ["Batch", "load_batch", "save_batch", "simulate_batch"]
@@ -89,10 +89,8 @@ def simulate_batch(
 def save_batch(file: Path, batch: Batch) -> None:
     """Write a batch; it appears whole or not at all."""
     arrays = {name: getattr(batch, name) for name in Batch.__slots__ if name != "plan"}
-    part = file.with_suffix(".part")
-    with part.open("wb") as stream:
+    with replacing(file) as stream:
         np.savez(stream, plan=json.dumps(asdict(batch.plan)), **arrays)
-    os.replace(part, file)
 
 
 def load_batch(file: Path) -> Batch:
