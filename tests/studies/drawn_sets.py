@@ -13,18 +13,16 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
+from hidden import BANDS_HZ, LEVELS_VPK, reading
 
-from daq.frf import DB_PER_NEPER, FrequencyResponse
+from daq.frf import FrequencyResponse
 from daq.plan import SweepPlan, spaced_frequencies
 from sim.catalogue import CATALOGUE, COMMON, EffectParameter
 from sim.effects import EffectSetting
 from sim.response import simulate
 from sim.unit import Unit, load_unit
 
-BANDS_HZ = {"adss": (100.0, 180.0), "edss": (30.0, 110.0)}
-LEVELS_VPK = (1.5, 2.5, 4.0)
 POINTS = 61
-NOISE_V = 5e-4
 
 KINDS = {"single": 100, "pair": 100, "nothing": 60, "withheld": 60}
 """Kinds of sets, and how many of each a study holds. A withheld cause is hidden, and taken out
@@ -122,7 +120,7 @@ def draw_set(one: StudySet, datasheet: tuple[float, tuple[str, ...]] = DATASHEET
     machine = unit.with_parameters(**{s: known[s] * (1.0 + d) for s, d in deviations.items()})
     plan = SweepPlan(spaced_frequencies(*BANDS_HZ[one.unit], POINTS), LEVELS_VPK)
     swept = simulate(machine, ratio, plan, effects=effects, seed=int(rng.integers(2**31)))
-    return DrawnSet(one, ratio, effects, deviations, _as_read(swept, _stream(one, "reading")))
+    return DrawnSet(one, ratio, effects, deviations, reading(swept, _stream(one, "reading")))
 
 
 def _study_set(seed: int, kind: str, number: int) -> StudySet:
@@ -165,24 +163,3 @@ def _size(p: EffectParameter, unit: Unit, alone: bool, rng: np.random.Generator)
     if p.name == "f_p":
         return float(rng.uniform(0.8, 1.2) * rng.uniform(*BANDS_HZ[unit.name.lower()]))
     return float(np.exp(np.log(low) + np.log(high / low) * rng.uniform(*_SPAN)))
-
-
-def _as_read(response: FrequencyResponse, rng: np.random.Generator) -> FrequencyResponse:
-    """Add reading noise, and count it in the stated error."""
-    noise = NOISE_V / response.source_vpk
-    added = rng.standard_normal((2, len(response))) * noise
-    gain = response.gain + added[0] + 1j * added[1]
-    along = response.gain_std_db / DB_PER_NEPER
-    across = np.radians(response.phase_std_deg)
-    total = np.sqrt(along**2 + across**2 + 2.0 * (noise / np.abs(gain)) ** 2)
-    return FrequencyResponse.from_arrays(
-        response.frequency_hz,
-        response.source_vpk,
-        gain,
-        unit=response.unit,
-        gain_std_db=DB_PER_NEPER * total,
-        direction=response.direction,
-        settle_cycles=response.settle_cycles,
-        integrate_cycles=response.integrate_cycles,
-        provenance={"dc_offset_v": response.dc_offset_v},
-    )
