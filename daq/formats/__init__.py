@@ -1,6 +1,6 @@
 """Exchange formats of a frequency response, chosen by the suffix of the file.
 
-Each format is one module with ``read(path)`` and, where it can be written,
+Each format is one module with ``read(path, reading)`` and, where it can be written,
 ``write(response, path)``; it is imported when a file of its kind is met, so
 that a heavy library is loaded by those who need it. Binary formats are read in
 a child process (`daq.formats.apart`). No format interprets what it reads, and none
@@ -15,9 +15,18 @@ from pathlib import Path
 
 from daq.errors import FileFormatError, InputError
 from daq.formats.believable import disbelief
+from daq.formats.reading import NOTHING_TOLD, Reading
 from daq.frf import FrequencyResponse
 
-__all__ = ["READABLE", "WRITABLE", "check_writable", "read_response", "write_response"]
+__all__ = [
+    "READABLE",
+    "WRITABLE",
+    "NOTHING_TOLD",
+    "Reading",
+    "check_writable",
+    "read_response",
+    "write_response",
+]
 
 READABLE = {
     ".csv": "daq.formats.csv",
@@ -38,17 +47,29 @@ WRITABLE = {suffix: module for suffix, module in READABLE.items() if module != "
 """Module that writes files of each suffix; SDF is the analyser's own and only read."""
 
 
-def read_response(path: str | Path) -> FrequencyResponse:
+def read_response(path: str | Path, reading: Reading = NOTHING_TOLD) -> FrequencyResponse:
     """Read a frequency response from a file; its suffix names the format.
+
+    Parameters
+    ----------
+    reading
+        What the file does not say itself.
+
+    Returns
+    -------
+    FrequencyResponse
+        `daq.formats.reading.remarks_of` tells what was left out or taken for granted.
 
     Raises
     ------
     FileFormatError
         If the file is missing or any part of it is wrong; nothing of it is taken.
     InputError
-        If the suffix is not that of a format that can be read.
+        If the suffix is not that of a format that can be read, or `reading` says something that
+        the file states otherwise or has no use for.
     """
-    response = _read(_module(path, READABLE, "read"), Path(path))
+    path = Path(path)
+    response = reading.completed(_read(_module(path, READABLE, "read"), path, reading), path)
     try:
         found = disbelief("dc_offset_v", [response.dc_offset_v])
     except InputError as error:
@@ -58,12 +79,12 @@ def read_response(path: str | Path) -> FrequencyResponse:
     return response
 
 
-def _read(module: str, path: Path) -> FrequencyResponse:
+def _read(module: str, path: Path, reading: Reading) -> FrequencyResponse:
     if module in _BINARY:
         from daq.formats.apart import read_apart
 
-        return read_apart(module, path)
-    response: FrequencyResponse = import_module(module).read(path)
+        return read_apart(module, path, reading)
+    response: FrequencyResponse = import_module(module).read(path, reading)
     return response
 
 

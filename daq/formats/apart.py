@@ -21,6 +21,7 @@ import numpy as np
 
 from daq.child import child_command, child_environment
 from daq.errors import FileFormatError, InputError, LashbenchError
+from daq.formats.reading import NOTHING_TOLD, Reading
 from daq.formats.record import ARRAYS, response_from, taken_apart
 from daq.frf import FrequencyResponse
 
@@ -33,13 +34,17 @@ _OUTPUT_BYTES = 512 << 20
 _ADVICE = "it is damaged or made to harm; give another copy, or a CSV"
 
 
-def read_apart(module: str, path: Path, *, clock_s: float = 180.0) -> FrequencyResponse:
+def read_apart(
+    module: str, path: Path, reading: Reading = NOTHING_TOLD, *, clock_s: float = 180.0
+) -> FrequencyResponse:
     """What `read` of a format's module makes of a file, read in a child process.
 
     Parameters
     ----------
     module
         Full name of the format's module, such as ``daq.formats.mat``.
+    reading
+        What the file does not say itself.
     clock_s
         When the child is ended, s.
 
@@ -50,7 +55,7 @@ def read_apart(module: str, path: Path, *, clock_s: float = 180.0) -> FrequencyR
     InputError
         If no child can be started.
     """
-    head, rest = _answer_of(module, path, clock_s)
+    head, rest = _answer_of(module, path, reading, clock_s)
     if "refused" in head:
         raise FileFormatError(head["refused"])
     arrays: dict[str, Any] = {}
@@ -60,10 +65,12 @@ def read_apart(module: str, path: Path, *, clock_s: float = 180.0) -> FrequencyR
     return response_from(arrays, head["document"], path)
 
 
-def _answer_of(module: str, path: Path, clock_s: float) -> tuple[dict[str, Any], memoryview]:
+def _answer_of(
+    module: str, path: Path, reading: Reading, clock_s: float
+) -> tuple[dict[str, Any], memoryview]:
     try:
         child = subprocess.Popen(
-            child_command("daq.formats.apart", module, str(path)),
+            child_command("daq.formats.apart", module, str(path), reading.to_json()),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -114,12 +121,13 @@ def main(words: list[str]) -> int:
     Parameters
     ----------
     words
-        Name of the format's module, path of the file.
+        Name of the format's module, path of the file, and perhaps a `Reading` as JSON.
     """
-    module, path = words
+    module, path, *told = words
     _limit()
     try:
-        response = import_module(module).read(Path(path))
+        reading = Reading.from_json(told[0]) if told else NOTHING_TOLD
+        response = import_module(module).read(Path(path), reading)
         arrays, document = taken_apart(response, Path(path))
     except LashbenchError as error:
         return _say(refused=str(error))

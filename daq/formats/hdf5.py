@@ -15,6 +15,7 @@ import numpy as np
 
 from daq.errors import FileFormatError
 from daq.formats.atomic import replacing
+from daq.formats.reading import NOTHING_TOLD, Reading
 from daq.formats.record import ARRAYS, ROW_LIMIT, checked_file, response_from, taken_apart
 from daq.frf import FrequencyResponse
 
@@ -28,7 +29,7 @@ _KIND = "an HDF5 file that lashbench wrote"
 _DOCUMENT_LIMIT_BYTES = 64 << 20
 
 
-def read(path: Path) -> FrequencyResponse:
+def read(path: Path, reading: Reading = NOTHING_TOLD) -> FrequencyResponse:
     """Read an HDF5 file that `write` made.
 
     Raises
@@ -39,6 +40,7 @@ def read(path: Path) -> FrequencyResponse:
     """
     import h5py
 
+    reading.refuse_unused(path, (), "a file that lashbench wrote")
     checked_file(path, _KIND)
     try:
         with h5py.File(path, "r") as file:

@@ -18,6 +18,7 @@ import numpy as np
 
 from daq.errors import FileFormatError
 from daq.formats.atomic import replacing
+from daq.formats.reading import NOTHING_TOLD, Reading
 from daq.formats.record import ARRAYS, checked_file, response_from, taken_apart
 from daq.frf import FrequencyResponse
 
@@ -28,7 +29,7 @@ _TEXT_BYTES = 116
 _KIND = "a MATLAB file that lashbench wrote"
 
 
-def read(path: Path) -> FrequencyResponse:
+def read(path: Path, reading: Reading = NOTHING_TOLD) -> FrequencyResponse:
     """Read a MATLAB file that `write` made.
 
     Raises
@@ -38,6 +39,7 @@ def read(path: Path) -> FrequencyResponse:
     """
     from scipy.io import loadmat
 
+    reading.refuse_unused(path, (), "a file that lashbench wrote")
     content = checked_file(path, _KIND).read_bytes()
     if content[:_TEXT_BYTES] != _head(content):
         raise FileFormatError(

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from daq.errors import FileFormatError
 from daq.formats.believable import check_reading
+from daq.formats.reading import NOTHING_TOLD, Reading, without_dc
 from daq.formats.record import checked_file
 from daq.frf import FrequencyResponse, PointFlag
 
@@ -31,7 +32,7 @@ _REALS = {"float": ">f4", "double": ">f8"}
 _COMPLEX = {"float": ">c8", "double": ">c16"}
 
 
-def read(path: Path) -> FrequencyResponse:
+def read(path: Path, reading: Reading = NOTHING_TOLD) -> FrequencyResponse:
     """Read one saved frequency response.
 
     The file holds no source level: `source_vpk` is NaN. Where a channel was
@@ -43,6 +44,7 @@ def read(path: Path) -> FrequencyResponse:
         If the file is damaged, of another version, or holds anything but one
         frequency response.
     """
+    reading.refuse_unused(path, (), "a file of the analyser")
     content = checked_file(path, _KIND).read_bytes()
     header = _header(path)
     trace = _only_trace(header, path)
@@ -59,8 +61,13 @@ def read(path: Path) -> FrequencyResponse:
     )
     first, last = _span(header, trace, points, path)
     frequency, gain = frequency[first : last + 1], gain[first : last + 1]
-    if not (np.all(np.isfinite(gain)) and np.all(np.isfinite(frequency) & (frequency > 0))):
-        raise FileFormatError(f"{path}: holds values that are no readings; give {_KIND}")
+    wrong = np.flatnonzero(~(np.isfinite(gain) & np.isfinite(frequency) & (frequency >= 0)))
+    if wrong.size:
+        row = int(wrong[0])
+        raise FileFormatError(
+            f"{path}, point {first + row + 1}: {frequency[row]:g} Hz with the gain {gain[row]:g} "
+            "is no reading; save the trace again without it"
+        )
     overloaded = any(channel["overloaded"] for channel in channels)
     response = FrequencyResponse.from_arrays(
         frequency,
@@ -70,6 +77,7 @@ def read(path: Path) -> FrequencyResponse:
         flags=int(PointFlag.OVERLOAD) if overloaded else 0,
         provenance=_provenance(header, trace, channels, path),
     )
+    response = without_dc(response, path)
     check_reading(response, path)
     return response
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +22,11 @@ from numpy.typing import NDArray
 from daq.bounded_text import parse_json
 from daq.errors import FileFormatError
 from daq.formats.atomic import write_text
-from daq.formats.believable import check_reading
-from daq.formats.record import ARRAYS, ROW_LIMIT, checked_file, response_from, taken_apart
-from daq.formats.uff_sets import GENERAL, RESPONSE, data_sets, function, private
+from daq.formats.reading import NOTHING_TOLD, Reading
+from daq.formats.record import ARRAYS, checked_file, response_from, taken_apart
+from daq.formats.uff_foreign import foreign_response
+from daq.formats.uff_functions import RESPONSE, Function, function_of, split_sets
+from daq.formats.uff_sets import GENERAL, function, private, private_text
 from daq.frf import FrequencyResponse
 
 __all__ = ["COMPANION", "read", "write"]
@@ -33,7 +35,6 @@ COMPANION = 9958
 """Number of the data set that holds the response exactly."""
 
 _KIND = "a universal file with frequency response functions (data set 58)"
-_FREQUENCY = 18
 
 
 def write(response: FrequencyResponse, path: Path) -> None:
@@ -53,25 +54,30 @@ def write(response: FrequencyResponse, path: Path) -> None:
     write_text(path, text)
 
 
-def read(path: Path) -> FrequencyResponse:
+def read(path: Path, reading: Reading = NOTHING_TOLD) -> FrequencyResponse:
     """Read a universal file, ours or another program's.
-
-    From another program's file the source level is the value of the third
-    axis where the function has one, and unknown (NaN) otherwise.
 
     Raises
     ------
     FileFormatError
         If the file is damaged, holds no frequency response function or
-        several at the same level, or was altered beside its companion.
+        several that nothing tells apart, or was altered beside its companion.
+    InputError
+        If `reading` says something that this file has no use for.
     """
     content = checked_file(path, _KIND).read_bytes()
-    functions, companion = data_sets(path, content, COMPANION)
-    responses = [f for f in functions if f["func_type"] == RESPONSE]
-    if companion is None:
-        return _foreign(responses, path)
-    response = _exact(companion, path)
-    _check_same(response, responses, path)
+    sets = split_sets(content, path)
+    companion = private_text(sets, COMPANION, path)
+    response = None if companion is None else _exact(companion, path)
+    functions = [
+        function_of(one, number, path)
+        for number, one in enumerate((one for one in sets if one.number == 58), start=1)
+    ]
+    if response is None:
+        reading.refuse_unused(path, ("function", "averages", "columns"), "a universal file")
+        return foreign_response(functions, reading, path)
+    reading.refuse_unused(path, (), "a file that lashbench wrote")
+    _check_same(response, [one for one in functions if one.kind == RESPONSE], path)
     return response
 
 
@@ -85,7 +91,7 @@ def _functions(response: FrequencyResponse) -> Iterator[str]:
         head = _head(part, level)
         # Without a single phase a complex function would state that it is zero.
         gain = part.gain if np.any(part.phase_known) else np.abs(part.gain)
-        yield function(RESPONSE, part.frequency_hz, gain, level, "gain V_o/V_i", "", head)
+        yield function(RESPONSE, part.frequency_hz, gain, level, "gain V_o/V_i", "V/V", head)
         known = np.isfinite(part.gain_std_db)
         if np.any(known):
             yield function(
@@ -143,62 +149,25 @@ def _exact(companion: str, path: Path) -> FrequencyResponse:
         ) from error
 
 
-def _check_same(
-    response: FrequencyResponse, functions: list[Mapping[str, Any]], path: Path
-) -> None:
+def _check_same(response: FrequencyResponse, functions: Sequence[Function], path: Path) -> None:
     """Refuse a file whose functions and companion say different things."""
     usable = np.isfinite(response.gain)
     levels = [level for level in _levels(response) if np.any(usable & _at(response, level))]
     same = len(levels) == len(functions)
     for level, found in zip(levels, functions, strict=False):
         part = response.take(usable & _at(response, level))
-        gain = part.gain if np.iscomplexobj(found["data"]) else np.abs(part.gain)
+        gain = part.gain if np.iscomplexobj(found.values) else np.abs(part.gain)
         same = (
             same
-            and len(found["x"]) == len(part)
-            and np.allclose(found["x"], part.frequency_hz, rtol=1e-5, atol=0.0)
-            and bool(np.all(np.abs(found["data"] - gain) <= 1e-11 * np.abs(gain) + 1e-300))
+            and len(found.x) == len(part)
+            and np.allclose(found.x, part.frequency_hz, rtol=1e-5, atol=0.0)
+            and bool(np.all(np.abs(found.values - gain) <= 1e-11 * np.abs(gain) + 1e-300))
         )
     if not same:
         raise FileFormatError(
             f"{path}: its functions differ from data set {COMPANION}, which holds them exactly; "
             "it was altered: take that data set out to read the functions alone"
         )
-
-
-def _foreign(functions: list[Mapping[str, Any]], path: Path) -> FrequencyResponse:
-    if not functions:
-        raise FileFormatError(f"{path}: holds no frequency response function; give {_KIND}")
-    parts, levels = [], []
-    for found in functions:
-        if found["abscissa_spec_data_type"] not in (0, _FREQUENCY):
-            raise FileFormatError(f"{path}: the abscissa of a function is not a frequency")
-        level = float(found["z_axis_value"])
-        levels.append(level if level > 0 else math.nan)
-        parts.append(found)
-    if len(set(levels)) != len(levels) or (len(levels) > 1 and math.nan in levels):
-        raise FileFormatError(
-            f"{path}: holds {len(levels)} frequency response functions that no source level "
-            "tells apart; give a file with one"
-        )
-    frequency = np.concatenate([found["x"] for found in parts])
-    gain = np.concatenate([np.asarray(found["data"], dtype=complex) for found in parts])
-    known = np.concatenate([np.full(len(f["x"]), np.iscomplexobj(f["data"])) for f in parts])
-    if frequency.size > ROW_LIMIT or not np.all(
-        np.isfinite(gain) & np.isfinite(frequency) & (frequency > 0)
-    ):
-        raise FileFormatError(f"{path}: holds values that are no readings; give {_KIND}")
-    titles = [title for title in (parts[0]["id1"].strip(),) if title not in ("", "NONE")]
-    response = FrequencyResponse.from_arrays(
-        frequency,
-        np.repeat(levels, [len(found["x"]) for found in parts]),
-        gain,
-        unit="unknown",
-        phase_known=known,
-        provenance={"kind": "measured", "file": path.name, "title": " ".join(titles)},
-    )
-    check_reading(response, path)
-    return response
 
 
 def _levels(response: FrequencyResponse) -> list[float]:

@@ -1,14 +1,13 @@
-"""The data sets of a universal file: data set 58 in ASCII out, `pyuff` in, and a private one.
+"""The data sets of a universal file that we write: data set 58 in ASCII, and a private one.
 
-Owns the columns and the delimiters. Written here rather than by `pyuff`, which
-turns an unknown value into zero, cannot write a function of one point and
-hides the cause of a failure; read by it, and checked. What the functions mean
-is none of its business.
+Owns their columns and delimiters. Written here rather than by `pyuff`, which
+turns an unknown value into zero and cannot write a function of one point. What
+the functions mean is none of its business.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.errors import FileFormatError
+from daq.formats.uff_functions import DataSet
 
-__all__ = ["GENERAL", "RESPONSE", "data_sets", "function", "private"]
+__all__ = ["GENERAL", "function", "private", "private_text"]
 
-GENERAL, RESPONSE = 0, 4
-"""Function types: anything, and frequency response."""
+GENERAL = 0
+"""Function type: anything."""
 
 _DELIMITER = "    -1\n"
 _REAL, _COMPLEX = 4, 6
@@ -43,7 +43,7 @@ def function(
     Parameters
     ----------
     kind
-        `GENERAL` or `RESPONSE`.
+        Function type: `GENERAL`, or that of a frequency response.
     frequency_hz, values
         Shape (points,); values real or complex, all finite.
     level_vpk
@@ -86,75 +86,29 @@ def private(number: int, text: str) -> str:
     return f"{_DELIMITER}{number:6d}\n{body}{_DELIMITER}"
 
 
-def data_sets(
-    path: Path, content: bytes, private_number: int
-) -> tuple[list[Mapping[str, Any]], str | None]:
-    """The functions of a file, and the text of its private data set, None if there is none.
+def private_text(sets: Sequence[DataSet], number: int, path: Path) -> str | None:
+    """The text of a private data set, None where there is none.
 
     Raises
     ------
     FileFormatError
-        If a delimiter is missing or a function is damaged or of a form that
-        cannot be read.
+        If a line of it is damaged, or there are several.
     """
-    import pyuff
-
-    if content.count(b"\n") < 2 or not content.lstrip(b"\r\n").startswith(b"    -1"):
-        raise FileFormatError(f"{path}: is not a universal file; its first line should hold -1")
-    try:
-        file = pyuff.UFF(str(path))
-        kinds = [int(kind) for kind in file.get_set_types()]
-    except Exception as error:
-        raise FileFormatError(f"{path}: cannot be read ({_reason(error)})") from error
-    if not kinds or sum(_is_delimiter(line) for line in content.splitlines()) % 2:
-        raise FileFormatError(f"{path}: a data set has no end; the file is cut short")
-    functions = [_function(file, place, path) for place, kind in enumerate(kinds) if kind == 58]
-    texts = _private_texts(content, private_number, path) if private_number in kinds else []
-    if len(texts) > 1:
-        raise FileFormatError(f"{path}: holds data set {private_number} {len(texts)} times")
-    return functions, texts[0] if texts else None
-
-
-def _function(file: Any, place: int, path: Path) -> Mapping[str, Any]:
-    try:
-        found: Mapping[str, Any] = file.read_sets(place)
-        points = len(found["data"])
-        whole = points == found["num_pts"] == len(found["x"]) and points > 0
-    except Exception as error:
-        # pyuff replaces every cause by a sentence of its own.
-        raise FileFormatError(
-            f"{path}: function {place + 1} is damaged or of a form that cannot be read "
-            f"({_reason(error)}); save it as ASCII data set 58"
-        ) from error
-    if not whole:
-        raise FileFormatError(
-            f"{path}: function {place + 1} should have {found['num_pts']} points, found {points}"
-        )
-    return found
-
-
-def _private_texts(content: bytes, number: int, path: Path) -> list[str]:
-    try:
-        lines = content.decode("ascii").splitlines()
-    except UnicodeDecodeError as error:
-        raise FileFormatError(f"{path}: is not ASCII (byte {error.start})") from error
-    texts: list[str] = []
-    for start, line in enumerate(lines):
-        if line.strip() != str(number) or not start or lines[start - 1].strip() != "-1":
-            continue
-        pieces = []
-        for piece in lines[start + 1 :]:
-            if piece.strip() == "-1":
-                break
-            if len(piece) < 3 or piece[0] != "|" or piece[-1] != "|":
-                raise FileFormatError(f"{path}: a line of data set {number} is damaged: {piece!r}")
-            pieces.append(piece[1:-1])
-        texts.append("".join(pieces))
-    return texts
-
-
-def _is_delimiter(line: bytes) -> bool:
-    return line.startswith(b"    -1") and not line[6:].strip()
+    found = [one for one in sets if one.number == number]
+    if not found:
+        return None
+    if len(found) > 1:
+        raise FileFormatError(f"{path}: holds data set {number} {len(found)} times")
+    pieces = []
+    for line in found[0].lines:
+        try:
+            piece = line.decode("ascii").rstrip("\r\n")
+        except UnicodeDecodeError as error:
+            raise FileFormatError(f"{path}: data set {number} is not ASCII") from error
+        if len(piece) < 3 or piece[0] != "|" or piece[-1] != "|":
+            raise FileFormatError(f"{path}: a line of data set {number} is damaged: {piece!r}")
+        pieces.append(piece[1:-1])
+    return "".join(pieces)
 
 
 def _axis(kind: int, label: str, units: str) -> str:
@@ -166,7 +120,3 @@ def _line(text: str) -> str:
     # ASCII, and must not end like a delimiter.
     plain = "".join(sign if " " <= sign <= "~" else "?" for sign in text)
     return f"{' '.join(plain.split()) or 'NONE':<80.80}"
-
-
-def _reason(error: Exception) -> str:
-    return " ".join(str(error).split()) or type(error).__name__

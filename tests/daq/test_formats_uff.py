@@ -31,6 +31,7 @@ def foreign(path, *, levels=(0.0,), **changes) -> None:
             "ordinate_spec_data_type": 0,
             "orddenom_spec_data_type": 0,
             "z_axis_value": level,
+            "z_axis_axis_units_lab": "V peak" if level else "NONE",
             "x": FREQUENCY,
             "data": GAIN.copy(),
         }
@@ -120,7 +121,7 @@ def test_an_even_abscissa_and_single_precision_are_read(tmp_path):
 
 def test_real_functions_have_no_phase(tmp_path):
     path = tmp_path / "other.uff"
-    foreign(path, data=np.abs(GAIN))
+    foreign(path, data=np.abs(GAIN), ordinate_axis_units_lab="V/V")
     response = read_response(path)
     assert not np.any(response.phase_known)
     np.testing.assert_allclose(response.gain, np.abs(GAIN), rtol=1e-11)
@@ -133,7 +134,9 @@ def test_real_functions_have_no_phase(tmp_path):
         ((1.0, 1.0), {}, "no source level tells apart"),
         ((0.0,), {"func_type": 6}, "no frequency response function"),
         ((0.0,), {"abscissa_spec_data_type": 17}, "is not a frequency"),
-        ((0.0,), {"x": np.array([0.0, 1.0, 2.0, 3.0])}, "no readings"),
+        ((0.0,), {"x": np.array([-1.0, 1.0, 2.0, 3.0])}, "is negative"),
+        ((0.0,), {"x": np.array([1.0, 2.0, 2.0, 3.0])}, "point 3: frequency 2 Hz comes twice"),
+        ((0.0,), {"x": np.array([1.0, 3.0, 2.0, 4.0])}, "point 3: frequency 2 Hz is out of order"),
     ],
 )
 def test_what_is_not_one_response_is_refused(tmp_path, levels, changes, fault):

@@ -78,7 +78,9 @@ def test_one_that_was_interrupted_goes_on(tmp_path, monkeypatch):
     [
         (["--unit", "adss"], "--level, --start, --stop, --points is missing"),
         (["--unit", "adss", *SHORT[:-2]], "--points is missing"),
-        (["x.csv", "--unit", "adss", "--level", "2"], "not both"),
+        (["x.csv", "--unit", "adss", "--start", "2"], "not both"),
+        (["x.csv", "--unit", "adss", "--level", "2", "--level", "3"], "give --level once"),
+        (["--unit", "adss", *SHORT, "--function", "2"], "no file that an option could complete"),
         (["x.csv", "--unit", "adss"], "x.csv"),
         (["--unit", "nosuch", *SHORT], "nosuch"),
         (["--unit", "adss", "--recipe", "nosuch"], "nosuch"),

@@ -19,6 +19,7 @@ from daq.store_records import StoredPoint
 from tui.pasted import pasted
 
 if TYPE_CHECKING:
+    from daq.formats import Reading
     from daq.plan import SweepPlan
 
 __all__ = ["Entry", "Recording", "read_recording"]
@@ -66,7 +67,9 @@ class Recording:
         return self.entries[-1].at_s if self.entries else 0.0
 
 
-def read_recording(path: Path, measurement: int | None = None) -> Recording:
+def read_recording(
+    path: Path, measurement: int | None = None, reading: Reading | None = None
+) -> Recording:
     """Read a session from a history or a response file.
 
     Parameters
@@ -75,6 +78,8 @@ def read_recording(path: Path, measurement: int | None = None) -> Recording:
         History of a bench, or a response in any format that can be read.
     measurement
         Which one of a history; the latest with points if left out.
+    reading
+        What a response file does not say itself.
 
     Raises
     ------
@@ -95,9 +100,9 @@ def read_recording(path: Path, measurement: int | None = None) -> Recording:
             f"{path} is a transcript; measure with it as the instrument: "
             f"--instrument {pasted([f'replay:{path}'])}"
         )
-    from daq.formats import read_response
+    from daq.formats import NOTHING_TOLD, read_response
 
-    return _from_response(read_response(path), path)
+    return _from_response(read_response(path, reading or NOTHING_TOLD), path)
 
 
 def _from_history(path: Path, measurement: int | None) -> Recording:

@@ -24,6 +24,7 @@ from tui.options import (
 from tui.output import Console, Injected, readers_may_leave
 from tui.pasted import proposing
 from tui.places import cache_folder
+from tui.reading_options import NO_OPTIONS, ReadingOptions, read_files
 
 if TYPE_CHECKING:
     from analysis.diagnosis import Diagnosis
@@ -46,6 +47,7 @@ def diagnose(
     as_is: bool = False,
     tolerance: Tolerance = None,
     cluster: Cluster = None,
+    given: ReadingOptions = NO_OPTIONS,
     console: Injected,
 ) -> None:
     """Show what the simulation gets wrong, name the cause and extend the model with it.
@@ -70,6 +72,8 @@ def diagnose(
                          else f"{file}: give either a response or --paper, not both")  # fmt: skip
     from sim.unit import load_unit
 
+    if paper and given != NO_OPTIONS:
+        raise InputError("--paper reads no file that an option could complete; leave it out")
     if paper and cluster is not None:
         raise InputError("--cluster is for responses; the paper's numbers are diagnosed here")
     subject = load_unit(unit).with_tolerance(tolerance_shares(tolerance))
@@ -78,9 +82,7 @@ def diagnose(
     if file is None:
         _diagnose_paper(subject, unit, plots, json, console)
         return
-    from daq.formats import read_response
-
-    response, *others = (read_response(path) for path in (file, *further))
+    response, *others = read_files([file, *further], given, console)
     from analysis.diagnosis import diagnose_response
     from analysis.input_check import check_inputs
     from analysis.stated_error import error_doubts, error_notes

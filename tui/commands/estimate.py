@@ -16,9 +16,9 @@ from tui.executors import executor_at
 from tui.options import Cluster, Json, Real, Tolerance, UnitName, tolerance_shares
 from tui.output import Injected
 from tui.places import cache_folder
+from tui.reading_options import NO_OPTIONS, ReadingOptions, read_files
 
 if TYPE_CHECKING:
-    from daq.frf import FrequencyResponse
     from sim.unit import Unit
 
 __all__ = ["estimate"]
@@ -35,6 +35,7 @@ def estimate(
     as_is: bool = False,
     tolerance: Tolerance = None,
     cluster: Cluster = None,
+    given: ReadingOptions = NO_OPTIONS,
     json: Json = False,
     console: Injected,
 ) -> None:
@@ -64,6 +65,8 @@ def estimate(
             raise InputError(
                 "nothing to estimate from; give a response, or both --arf-hz and --rf-hz"
             )
+        if given != NO_OPTIONS:
+            raise InputError("there is no file that an option could complete; leave it out")
         if total_backlash_unknown:
             raise InputError(
                 "--total-backlash-unknown needs a response at several source levels; "
@@ -77,7 +80,8 @@ def estimate(
     else:
         if arf_hz is not None or rf_hz is not None:
             raise InputError(f"{file}: give either a response or --arf-hz and --rf-hz, not both")
-        subject, responses = _unit(unit, tolerance), [_response(path) for path in (file, *further)]
+        subject = _unit(unit, tolerance)
+        responses = read_files([file, *further], given, console)
         from analysis.estimate import estimate_response
         from analysis.input_check import check_inputs
         from analysis.stated_error import error_notes
@@ -112,9 +116,3 @@ def _unit(name_or_path: str, tolerance: Sequence[str] | None) -> Unit:
     from sim.unit import load_unit
 
     return load_unit(name_or_path).with_tolerance(tolerance_shares(tolerance))
-
-
-def _response(file: Path) -> FrequencyResponse:
-    from daq.formats import read_response
-
-    return read_response(file)

@@ -10,11 +10,19 @@ from pathlib import Path
 
 from tui.options import Json
 from tui.output import Injected
+from tui.reading_options import NO_OPTIONS, ReadingOptions, read_file
 
 __all__ = ["extract"]
 
 
-def extract(file: Path, /, *, json: Json = False, console: Injected) -> None:
+def extract(
+    file: Path,
+    /,
+    *,
+    given: ReadingOptions = NO_OPTIONS,
+    json: Json = False,
+    console: Injected,
+) -> None:
     """Read anti-resonance, resonance and damping out of a response, per source level.
 
     Parameters
@@ -22,9 +30,7 @@ def extract(file: Path, /, *, json: Json = False, console: Injected) -> None:
     file
         Response as csv, h5, uff, mat or the analyser's own sdf.
     """
-    from daq.formats import read_response
-
-    response = read_response(file)
+    response = read_file(file, given, console)
     from analysis.resonance import extract as features_of
     from analysis.resonance import summary, to_json
 

@@ -6,18 +6,21 @@ Owns the options of the verb. What is worth simulating ahead is the analysis's.
 from __future__ import annotations
 
 import time
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, cast
 
 from daq.errors import InputError, LashbenchError
 from tui.executors import executor_at
 from tui.measure_options import PlanOptions, swept_plan
 from tui.options import Cluster, Json, Real, Tolerance, UnitName, Whole, tolerance_shares
-from tui.output import Injected
+from tui.output import Console, Injected
 from tui.places import cache_folder
+from tui.reading_options import NO_LAYOUT, LayoutOptions, ReadingOptions, read_file
 
 if TYPE_CHECKING:
     from analysis.observation import Observation
+    from daq.plan import Direction
 
 __all__ = ["prepare"]
 
@@ -39,6 +42,7 @@ def prepare(
     recipe: str | None = None,
     tolerance: Tolerance = None,
     cluster: Cluster = None,
+    layout: LayoutOptions = NO_LAYOUT,
     json: Json = False,
     console: Injected,
 ) -> None:
@@ -51,7 +55,7 @@ def prepare(
     Parameters
     ----------
     file
-        A response of the sweep, in place of the options below.
+        A response of the sweep, in place of the options below, which then complete it.
     level
         Source level in V peak; repeat it for several.
     start
@@ -80,7 +84,7 @@ def prepare(
         settle_cycles, integrate_cycles, offset,
     )  # fmt: skip
     subject = load_unit(unit).with_tolerance(tolerance_shares(tolerance))
-    observation = _observation(file, options, recipe)
+    observation = _observation(file, options, recipe, layout, console)
     from analysis.preparation import prepare_sweep
 
     began, folder = time.perf_counter(), cache_folder()
@@ -119,20 +123,45 @@ def prepare(
         )
 
 
-def _observation(file: Path | None, options: PlanOptions, recipe: str | None) -> Observation:
+def _observation(
+    file: Path | None,
+    options: PlanOptions,
+    recipe: str | None,
+    layout: LayoutOptions,
+    console: Console,
+) -> Observation:
     """The sweep that is meant: that of a response, or one that will be measured."""
     if file is None:
         from analysis.observation import USUAL_NOISE_V, unread
         from daq.recipe import load_recipe
 
+        if layout != NO_LAYOUT:
+            raise InputError("there is no file that an option could complete; leave it out")
         way = None if recipe is None else load_recipe(recipe)
         return unread(swept_plan(options, way), USUAL_NOISE_V)
-    if options.given or recipe is not None:
+    told, sweep = _said_of(file, options, layout)
+    if sweep or recipe is not None:
         raise InputError(f"{file}: give either a response or the options of a sweep, not both")
     from analysis.observation import observe
     from analysis.settled import settled
     from analysis.thinning import thin_all
-    from daq.formats import read_response
 
-    (response,), _ = thin_all([settled(read_response(file))])
+    (response,), _ = thin_all([settled(read_file(file, told, console))])
     return observe(response)
+
+
+def _said_of(
+    file: Path, options: PlanOptions, layout: LayoutOptions
+) -> tuple[ReadingOptions, set[str]]:
+    """What the options say of a file that does not say it, and which can mean a sweep only."""
+    if len(options.levels_vpk) > 1:
+        raise InputError(f"{file}: a file without a level has one; give --level once")
+    of_a_file = {"levels_vpk", "direction", "settle_cycles", "integrate_cycles"}
+    told = ReadingOptions(
+        **asdict(layout),
+        level=str(options.levels_vpk[0]) if options.levels_vpk else None,
+        sweep=cast("Direction | None", options.direction),
+        settle_cycles=options.settle_cycles,
+        integrate_cycles=options.integrate_cycles,
+    )
+    return told, set(options.given) - of_a_file

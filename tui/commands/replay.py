@@ -10,11 +10,19 @@ from pathlib import Path
 from daq.errors import InputError
 from tui.commands.bench import require_terminal
 from tui.options import Real, Whole
+from tui.reading_options import NO_OPTIONS, ReadingOptions
 
 __all__ = ["replay"]
 
 
-def replay(file: Path, /, *, id: Whole | None = None, speed: Real = 1.0) -> int:
+def replay(
+    file: Path,
+    /,
+    *,
+    id: Whole | None = None,
+    speed: Real = 1.0,
+    given: ReadingOptions = NO_OPTIONS,
+) -> int:
     """Show a recorded session as it ran: from a bench's history, or from a response file.
 
     Space pauses, + and - change the speed, full stop and comma jump. Waits of
@@ -33,7 +41,7 @@ def replay(file: Path, /, *, id: Whole | None = None, speed: Real = 1.0) -> int:
         raise InputError(f"--speed {speed:g} must be between 0.001 and 1000000")
     from tui.app.recording import read_recording
 
-    recording = read_recording(file, id)
+    recording = read_recording(file, id, given.reading())
     require_terminal("replay")
     from tui.app.replay import ReplayApp
 

@@ -20,6 +20,7 @@ from tui.options import Tolerance, UnitName, tolerance_shares
 from tui.output import Console, Injected
 from tui.pasted import proposing
 from tui.places import cache_folder, history_path
+from tui.reading_options import NO_OPTIONS, ReadingOptions, read_file
 
 if TYPE_CHECKING:
     from analysis.diagnosis import Diagnosis
@@ -48,6 +49,7 @@ def report(
     tolerance: Tolerance = None,
     diagnose: Annotated[bool | None, Parameter(negative="--no-diagnose")] = None,
     as_is: bool = False,
+    given: ReadingOptions = NO_OPTIONS,
     console: Injected,
 ) -> None:
     """Write a report on one measurement as a single HTML file that prints on A4.
@@ -83,9 +85,13 @@ def report(
     kept: _Kept | None = None
     if not _is_identifier(source, db):
         from analysis.report import file_origin
-        from daq.formats import read_response
 
-        response, origin = read_response(source), file_origin(Path(source))
+        response, origin = read_file(source, given, console), file_origin(Path(source))
+    elif given != NO_OPTIONS:
+        raise InputError(
+            f"measurement {source} is in a history, which says everything; leave out the options "
+            "that complete a file"
+        )
     else:
         kept = _stored(history_path(db), int(source), subject)
         response, origin = kept.response, kept.origin
