@@ -1,15 +1,21 @@
 """Which driver an address is for: the one table of drivers.
 
 Owns the way from an instrument's URL to its driver, for sessions, watchdog and screens alike. A
-new driver is one entry of `DRIVERS`. It talks to no instrument itself.
+new driver is a folder of this floor with a module `driver` in it, whose `DRIVER` is found here.
+It talks to no instrument itself.
 """
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
+import pkgutil
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from daq.driving.entry import Driver
+from daq.transports.address import Address, parse_address
 
 if TYPE_CHECKING:
     from daq.analyser import Analyser
@@ -17,21 +23,17 @@ if TYPE_CHECKING:
     from daq.transports.base import Transport
     from daq.transports.open import TransportFactory
 
-__all__ = ["DRIVERS", "Driver", "check_sweep", "driver_at", "load_all_of", "open_analyser"]
-
-
-@dataclass(frozen=True, slots=True)
-class Driver:
-    """An instrument that can be driven."""
-
-    name: str
-    """For people."""
-    scheme: str
-    """Word and colon before the address, as ``x:GPIB0::11::INSTR``; empty for the preset."""
-    drive: Callable[[Transport], Analyser]
-    """The analyser over an open wire, which is closed with it; imports what it needs."""
-    check_sweep: Callable[..., None]
-    """Refuses a sweep that the instrument cannot be set to; see `check_sweep`."""
+__all__ = [
+    "DRIVERS",
+    "Driver",
+    "check_sweep",
+    "driver_at",
+    "driver_for",
+    "is_simulated",
+    "load_all_of",
+    "open_analyser",
+    "parse_instrument",
+]
 
 
 def _drive_35670a(transport: Transport) -> Analyser:
@@ -52,8 +54,35 @@ def _check_35670a(
     check(plan, slew_vpk_per_s, input_range_vpk, may_repeat=may_repeat)
 
 
-DRIVERS = (Driver("HP/Agilent 35670A", "", _drive_35670a, _check_35670a),)
-"""Every driver there is; the first without a scheme is the preset."""
+def _found() -> tuple[Driver, ...]:
+    import daq
+
+    rooms = sorted(found.name for found in pkgutil.iter_modules(daq.__path__) if found.ispkg)
+    names = [f"daq.{room}.driver" for room in rooms]
+    modules = [importlib.import_module(name) for name in names if importlib.util.find_spec(name)]
+    preset = Driver("HP/Agilent 35670A", "", _drive_35670a, _check_35670a, ("35670A",), 11)
+    return (preset, *(module.DRIVER for module in modules))
+
+
+DRIVERS = _found()
+"""Every driver there is; the one without a scheme is the preset."""
+
+
+def driver_for(identity: str) -> Driver | None:
+    """The driver of an instrument by its answer to ``*IDN?``; None if there is none."""
+    return next((driver for driver in DRIVERS if driver.answers(identity)), None)
+
+
+def parse_instrument(url: str, hosted: tuple[str, ...] = ("sim",)) -> Address:
+    """Where the instrument at a URL is, its driver's GPIB address being the preset.
+
+    Raises
+    ------
+    ConfigurationError
+        If it is no address.
+    """
+    driver, address = driver_at(url)
+    return parse_address(address, hosted, driver.gpib_address)
 
 
 def driver_at(url: str) -> tuple[Driver, str]:
@@ -63,6 +92,11 @@ def driver_at(url: str) -> tuple[Driver, str]:
         if driver.scheme and text.startswith(f"{driver.scheme}:"):
             return driver, text.removeprefix(f"{driver.scheme}:")
     return next(driver for driver in DRIVERS if not driver.scheme), text
+
+
+def is_simulated(url: str) -> bool:
+    """Whether a URL is of an instrument that lives in this program."""
+    return driver_at(url)[1].startswith("sim:")
 
 
 def open_analyser(
@@ -79,7 +113,10 @@ def open_analyser(
     from daq.transports.open import open_transport
 
     driver, address = driver_at(url)
-    return driver.drive(open_transport(address, factories, record=record, fault=fault))
+    transport = open_transport(
+        address, factories, record=record, fault=fault, gpib_address=driver.gpib_address
+    )
+    return driver.drive(transport)
 
 
 def check_sweep(

@@ -9,87 +9,23 @@ The order is derived from the manuals and is UNVERIFIED on an oscilloscope.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from daq.analyser import SourceState
 from daq.dialogue import Dialogue
+from daq.driving.safe_off import Attempt, SafeOff, Step
 from daq.errors import LashbenchError
 from daq.hp35670a_settings import LEVEL
 from daq.scpi import parse_integer, parse_number, parse_string
-from daq.transports.base import Deadline, Transport
+from daq.transports.base import Transport
 
 __all__ = ["SafeOff", "Step", "make_safe", "read_source"]
 
-_REPLY_S = 1.0
 _RESET_S = 5.0
 _BUDGET_S = 12.0
 """Once this is spent every further question gets next to no time; every step is still tried."""
-_LEAST_REPLY_S = 0.05
 _RAMP_MARGIN_S = 0.1
 _LONGEST_RAMP_S = 10.0
 _HIGHEST_VPK = LEVEL.high
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """One thing that was tried, and what came of it."""
-
-    what: str
-    result: str
-    """Reply, "done", or the error in full."""
-    failed: bool
-
-
-@dataclass(frozen=True, slots=True)
-class SafeOff:
-    """What is known of the source after the recipe, and every step that led there."""
-
-    state: SourceState
-    steps: tuple[Step, ...]
-
-    def __str__(self) -> str:
-        failed = "; ".join(f"{step.what}: {step.result}" for step in self.steps if step.failed)
-        return f"source {self.state}" + (f" ({failed})" if failed else "")
-
-
-class _Attempt:
-    """Runs steps, one after the other, and keeps what became of each."""
-
-    def __init__(self, transport: Transport, told: Callable[[float], None] | None) -> None:
-        self.dialogue = Dialogue(transport, reply_s=_REPLY_S)
-        self.dialogue.on_exchange = told
-        self.steps: list[Step] = []
-        self.answered = False
-        self._budget = Deadline.after(_BUDGET_S)
-
-    def act(self, what: str, action: Callable[[], str]) -> str | None:
-        self.dialogue.reply_s = self.bound(_REPLY_S)
-        try:
-            result = action()
-        except LashbenchError as error:
-            self.steps.append(Step(what, str(error), failed=True))
-            return None
-        except Exception as error:  # whatever it is, the next step must still be tried
-            fault = f"{type(error).__name__}: {error}"
-            self.steps.append(Step(what, fault, failed=True))
-            return None
-        self.steps.append(Step(what, result, failed=False))
-        return result
-
-    def bound(self, seconds: float) -> float:
-        return max(_LEAST_REPLY_S, min(seconds, self._budget.remaining_s))
-
-    def send(self, line: str) -> None:
-        def action() -> str:
-            self.dialogue.send(line)
-            return "done"
-
-        self.act(line, action)
-
-    def ask(self, line: str) -> str | None:
-        reply = self.act(line, lambda: self.dialogue.ask(line))
-        self.answered = self.answered or reply is not None
-        return reply
 
 
 def make_safe(transport: Transport, told: Callable[[float], None] | None = None) -> SafeOff:
@@ -107,7 +43,7 @@ def make_safe(transport: Transport, told: Callable[[float], None] | None = None)
         they should; ``unconfirmed`` if the instrument answers but they do not;
         ``unknown`` if it cannot be asked.
     """
-    attempt = _Attempt(transport, told)
+    attempt = Attempt(Dialogue(transport), told, _BUDGET_S)
     _go_quiet(attempt)
     proven = _proof(attempt)
     if not attempt.answered:
@@ -117,11 +53,7 @@ def make_safe(transport: Transport, told: Callable[[float], None] | None = None)
         proven = _proof(attempt)
     if attempt.answered:
         attempt.act("SYST:ERR?", lambda: _drained(attempt))
-    if proven:
-        state = SourceState.CONFIRMED_OFF
-    else:
-        state = SourceState.UNCONFIRMED if attempt.answered else SourceState.UNKNOWN
-    return SafeOff(state, tuple(attempt.steps))
+    return attempt.result(proven)
 
 
 def read_source(dialogue: Dialogue) -> SourceState:
@@ -140,7 +72,7 @@ def read_source(dialogue: Dialogue) -> SourceState:
     return SourceState.UNCONFIRMED if quiet else SourceState.ON
 
 
-def _go_quiet(attempt: _Attempt) -> None:
+def _go_quiet(attempt: Attempt[Dialogue]) -> None:
     """Steps 1 to 8: stop, lower what drives in this mode, fall back to FFT mode, switch off."""
     attempt.act("device clear", lambda: _cleared(attempt))
     attempt.send("ABOR")
@@ -154,12 +86,12 @@ def _go_quiet(attempt: _Attempt) -> None:
     attempt.send("OUTP OFF")
 
 
-def _cleared(attempt: _Attempt) -> str:
+def _cleared(attempt: Attempt[Dialogue]) -> str:
     attempt.dialogue.clear()
     return "done"
 
 
-def _ramp(attempt: _Attempt) -> str:
+def _ramp(attempt: Attempt[Dialogue]) -> str:
     """Wait until the level has come down; only swept sine ramps."""
     dialogue = attempt.dialogue
     if parse_string(dialogue.ask("INST:SEL?")).upper() != "SINE":
@@ -170,13 +102,10 @@ def _ramp(attempt: _Attempt) -> str:
         return "no ramp is set"
     # The level it comes from is not known here, so the highest is taken.
     wait_s = min(_HIGHEST_VPK / rate + _RAMP_MARGIN_S, _LONGEST_RAMP_S)
-    if dialogue.on_exchange is not None:
-        dialogue.on_exchange(wait_s)
-    dialogue.transport.pause(wait_s)
-    return f"{wait_s:.2f} s"
+    return attempt.pause(wait_s)
 
 
-def _proof(attempt: _Attempt) -> bool:
+def _proof(attempt: Attempt[Dialogue]) -> bool:
     """Step 9; every read-back is tried, and each must be right."""
     output = attempt.ask("OUTP?")
     unit = attempt.ask("SOUR:VOLT? UNIT")
@@ -200,7 +129,7 @@ def _proof(attempt: _Attempt) -> bool:
         return False
 
 
-def _reset(attempt: _Attempt) -> str:
+def _reset(attempt: Attempt[Dialogue]) -> str:
     """Fallback: the presets are FFT mode, output off, level and offset 0."""
     dialogue = attempt.dialogue
     dialogue.send("*RST")
@@ -211,5 +140,5 @@ def _reset(attempt: _Attempt) -> str:
     return "done"
 
 
-def _drained(attempt: _Attempt) -> str:
+def _drained(attempt: Attempt[Dialogue]) -> str:
     return ", ".join(str(entry) for entry in attempt.dialogue.drain()) or "empty"

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from daq.analyser import SweepPoint
 from daq.dialogue import Dialogue
+from daq.driving.variance import gain_standard_error
 from daq.errors import InputError
 from daq.frf import PointFlag
 from daq.hp35670a_settings import (
@@ -33,7 +34,6 @@ from daq.hp35670a_settings import (
 from daq.hp35670a_setup import SetUp, Timing, apply_all, prove_axis
 from daq.hp35670a_status import DeviceState, Voltage, polled
 from daq.hp35670a_trace import Picture, nearest_row, read_picture
-from daq.hp35670a_variance import gain_standard_error
 from daq.scpi_settings import Setting
 from daq.transports.base import Deadline
 

@@ -13,9 +13,9 @@ import re
 import time
 from pathlib import Path
 
-from daq.drivers import driver_at
+from daq.drivers import parse_instrument
 from daq.errors import InputError, MeasurementError
-from daq.transports.address import PrologixSerial, PrologixTcp, VisaAddress, parse_address
+from daq.transports.address import PrologixSerial, PrologixTcp, SerialPort, VisaAddress
 from daq.trust import distrust, open_own
 
 __all__ = ["claim", "wire_name"]
@@ -36,8 +36,8 @@ def wire_name(url: str) -> str | None:
     ConfigurationError
         If it is no address.
     """
-    match parse_address(driver_at(url)[1]):
-        case PrologixSerial(device=device):
+    match parse_instrument(url):
+        case PrologixSerial(device=device) | SerialPort(device=device):
             return f"serial {os.path.realpath(device) if os.path.exists(device) else device}"
         case PrologixTcp(host=host, port=port):
             return f"tcp {_host(host)} {port}"

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from sim.adapter_dialects import PROLOGIX_USB, Dialect
-from sim.analyser35670a.exchange import TalkState
-from sim.analyser35670a.instrument import Analyser35670A
+from sim.instrument.bus import Instrument, TalkState
 
 __all__ = ["FakeAdapter"]
 
@@ -61,25 +60,27 @@ class FakeAdapter:
     dialect
         Which make.
     address
-        The instrument's own GPIB address.
+        The instrument's own GPIB address, where it was changed from its preset.
     restart_s
         Overrides the dialect's deafness after a start.
     paced
         Whether a serial line's speed is kept.
     """
 
+    name = "gpib"
+
     def __init__(
         self,
-        instrument: Analyser35670A,
+        instrument: Instrument,
         dialect: Dialect = PROLOGIX_USB,
         *,
-        address: int = 11,
+        address: int | None = None,
         restart_s: float | None = None,
         paced: bool = False,
     ) -> None:
         self._instrument = instrument
         self.dialect = dialect
-        self._own_address = address
+        self._own_address = instrument.gpib_address if address is None else address
         self._restart_s = dialect.restart_s if restart_s is None else restart_s
         self._rate = dialect.bytes_per_s if paced else 0.0
         self.eeprom_writes = 0
@@ -119,6 +120,11 @@ class FakeAdapter:
         self._output += self.dialect.greeting
 
     # The host's end
+
+    def opened(self, now_s: float) -> None:
+        """The line DTR is pulled on opening, and an Uno, Nano or Mega starts anew."""
+        if self.dialect.name == "ar488":
+            self.restart(now_s)
 
     def receive(self, data: bytes, now_s: float) -> None:
         """Bytes from the host; lost while the adapter starts."""

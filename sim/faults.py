@@ -8,7 +8,7 @@ or in the server.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -83,8 +83,8 @@ class Fault:
     struck: int = field(default=0, compare=False)
 
 
-def parse_fault(text: str) -> Fault:
-    """Read ``NAME`` or ``NAME:key=value,key=value``.
+def parse_fault(text: str, catalogue: Mapping[str, FaultKind] | None = None) -> Fault:
+    """Read ``NAME`` or ``NAME:key=value,key=value`` of a model's catalogue, or of the preset's.
 
     Raises
     ------
@@ -92,9 +92,10 @@ def parse_fault(text: str) -> Fault:
         If name, key or value is not one of the catalogue's.
     """
     name, colon, rest = text.strip().partition(":")
-    if name not in CATALOGUE:
-        raise InputError(f"fault {name!r} is not known; use one of: {', '.join(CATALOGUE)}")
-    kind = CATALOGUE[name]
+    known = CATALOGUE if catalogue is None else catalogue
+    if name not in known:
+        raise InputError(f"fault {name!r} is not known; use one of: {', '.join(known)}")
+    kind = known[name]
     given: dict[str, str] = {}
     for part in rest.split(",") if colon else ():
         key, equals, value = (piece.strip() for piece in part.partition("="))

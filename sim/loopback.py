@@ -13,10 +13,11 @@ from urllib.parse import parse_qsl
 
 from daq.errors import BenchTimeout, ConfigurationError, LinkError, ProtocolError
 from daq.transports.base import Deadline, block_of, checked_line
-from sim.analyser35670a import Analyser35670A, Choices, TalkState
-from sim.analyser35670a.pace import ByTheClock, Fast, Pace
 from sim.effects import EffectSetting, parse_effect
-from sim.faults import Fault, FaultBoard, parse_fault
+from sim.faults import Fault
+from sim.instrument.bus import Instrument, TalkState
+from sim.instrument.pace import ByTheClock, Fast, Pace
+from sim.models import Bench, Model, model_of
 from sim.response import SteppedServo
 from sim.unit import Unit
 
@@ -34,7 +35,7 @@ class Loopback:
     """
 
     def __init__(
-        self, instrument: Analyser35670A, pace: Pace | None = None, address: str = "sim:"
+        self, instrument: Instrument, pace: Pace | None = None, address: str = "sim:"
     ) -> None:
         self.address = address
         self.instrument = instrument
@@ -67,6 +68,16 @@ class Loopback:
         """The payload of one definite-length block."""
         message = self._message(deadline)
         return block_of(message, f"{self.address}: the block that answers {self._waiting!r}")
+
+    def read_bytes(self, count: int, deadline: Deadline) -> bytes:
+        """A reply of so many bytes without header or line end."""
+        message = self._message(deadline)
+        if len(message) != count:
+            raise ProtocolError(
+                f"{self.address}: the reply to {self._waiting!r} has {len(message)} bytes, "
+                f"{count} were due"
+            )
+        return message
 
     def serial_poll(self, deadline: Deadline) -> int | None:
         """The status byte."""
@@ -135,14 +146,14 @@ class LoopbackSettings:
 
     ratio: float = _RATIO
     seed: int = 0
-    noise_v: float = Choices().noise_v
+    noise_v: float = Bench().noise_v
     realtime: bool = False
-    options: str = Choices().options
+    options: str | None = None
     effects: tuple[EffectSetting, ...] = ()
     faults: tuple[Fault, ...] = ()
 
 
-def read_loopback_settings(rest: str) -> LoopbackSettings:
+def read_loopback_settings(rest: str, model: Model | None = None) -> LoopbackSettings:
     """Read what follows ``sim:``.
 
     Raises
@@ -150,6 +161,7 @@ def read_loopback_settings(rest: str) -> LoopbackSettings:
     ConfigurationError
         If a key or value is wrong; lists the keys.
     """
+    known = model or model_of("")
     values: dict[str, list[str]] = {}
     if rest and not rest.startswith("?"):
         raise _refusal(rest, "should begin with '?'")
@@ -170,11 +182,11 @@ def read_loopback_settings(rest: str) -> LoopbackSettings:
     return LoopbackSettings(
         ratio=_number(rest, values, "ratio", _RATIO, 1.0),
         seed=int(_number(rest, values, "seed", 0.0, 1e9)),
-        noise_v=_number(rest, values, "noise", Choices().noise_v, 10.0),
+        noise_v=_number(rest, values, "noise", Bench().noise_v, 10.0),
         realtime=speed == "realtime",
-        options=values.get("options", [Choices().options])[0],
+        options=values["options"][0] if "options" in values else None,
         effects=tuple(parse_effect(text) for text in values.get("effect", [])),
-        faults=tuple(parse_fault(text) for text in values.get("fault", [])),
+        faults=tuple(known.parse_fault(text) for text in values.get("fault", [])),
     )
 
 
@@ -202,7 +214,8 @@ def open_loopback(
     unit: Unit,
     ratio: float | None = None,
     effects: Sequence[EffectSetting] = (),
-    progress: Callable[[Analyser35670A], None] | None = None,
+    progress: Callable[[Instrument], None] | None = None,
+    scheme: str = "",
 ) -> Callable[[str], Loopback]:
     """A factory of ``sim:`` transports, each with an instrument of its own.
 
@@ -214,18 +227,24 @@ def open_loopback(
         Used where the address itself says nothing.
     progress
         Called with each new instrument, for whoever wants to look inside.
+    scheme
+        That of the driver, which says what instrument is simulated.
+
+    Raises
+    ------
+    ConfigurationError
+        If no instrument of that driver is simulated.
     """
+    model = model_of(scheme)
 
     def open_one(rest: str) -> Loopback:
-        wanted = read_loopback_settings(rest)
+        wanted = read_loopback_settings(rest, model)
         share = wanted.ratio if "ratio=" in rest or ratio is None else ratio
         if unit.stages == 1 and "ratio=" not in rest and ratio is None:
             share = 1.0
-        instrument = Analyser35670A(
-            SteppedServo(unit, share, wanted.effects or tuple(effects), seed=wanted.seed),
-            Choices(seed=wanted.seed, noise_v=wanted.noise_v, options=wanted.options),
-            FaultBoard(wanted.faults),
-        )
+        bench = Bench(wanted.seed, wanted.noise_v, wanted.options, wanted.faults)
+        servo = SteppedServo(unit, share, wanted.effects or tuple(effects), seed=wanted.seed)
+        instrument = model.build(servo, bench)
         if progress is not None:
             progress(instrument)
         pace: Pace = ByTheClock(instrument) if wanted.realtime else Fast(instrument)

@@ -1,4 +1,4 @@
-"""The simulated analyser on a wire: raw TCP, a Prologix-style TCP bridge, a pseudo-terminal.
+"""A simulated analyser on a wire: raw TCP, a Prologix-style TCP bridge, pseudo-terminals.
 
 Owns the sockets and terminals and the loop that turns all of them, the
 adapters and the instrument in one thread. It listens on 127.0.0.1 only, prints
@@ -16,9 +16,10 @@ from types import TracebackType
 from daq.errors import LinkError
 from sim.adapter import FakeAdapter
 from sim.adapter_dialects import AR488, PROLOGIX_ETHERNET, PROLOGIX_USB, Dialect
-from sim.analyser35670a import Analyser35670A
-from sim.analyser35670a.pace import ByTheClock, Fast, Pace
-from sim.wires import AdapterClient, Listener, RawClient, Terminal
+from sim.instrument.bus import Instrument
+from sim.instrument.pace import ByTheClock, Fast, Pace
+from sim.instrument.serial_line import SerialInstrument, SerialLine
+from sim.wires import AdapterClient, Cable, Listener, RawClient, Terminal
 
 __all__ = ["HOST", "Server"]
 
@@ -41,7 +42,9 @@ class Server:
     tcp, prologix_tcp
         Ports, 0 for any free one, None for none.
     prologix_pty
-        Whether to open a pseudo-terminal.
+        Whether to open a pseudo-terminal with an adapter behind it.
+    serial_pty
+        The instrument again, where a pseudo-terminal is to be its RS-232 interface; else None.
     dialect
         ``"prologix"`` or ``"ar488"``: what the pseudo-terminal and the TCP bridge pretend to be.
 
@@ -53,12 +56,13 @@ class Server:
 
     def __init__(
         self,
-        instrument: Analyser35670A,
+        instrument: Instrument,
         *,
         realtime: bool = True,
         tcp: int | None = None,
         prologix_tcp: int | None = None,
         prologix_pty: bool = False,
+        serial_pty: SerialInstrument | None = None,
         dialect: str = "prologix",
     ) -> None:
         self.instrument = instrument
@@ -67,12 +71,12 @@ class Server:
         self._wake_read, self._wake_write = os.pipe()
         self._selector.register(self._wake_read, selectors.EVENT_READ)
         self._stopping = False
-        self._adapters: list[FakeAdapter] = []
+        self._cables: list[Cable] = []
         self._listeners: list[Listener] = []
         self._clients: list[RawClient | AdapterClient] = []
-        self._terminal: Terminal | None = None
+        self._terminals: dict[str, Terminal] = {}
         self.addresses: dict[str, str] = {}
-        """Where it is served: ``tcp``, ``prologix_tcp``, ``prologix_pty``."""
+        """Where it is served: ``tcp``, ``prologix_tcp``, ``prologix_pty``, ``serial_pty``."""
         try:
             if tcp is not None:
                 self._listen("tcp", tcp, None)
@@ -81,11 +85,18 @@ class Server:
                 self._listen("prologix_tcp", prologix_tcp, self._adapter(bridge, realtime))
             if prologix_pty:
                 cable = AR488 if dialect == "ar488" else PROLOGIX_USB
-                self._terminal = Terminal(self._adapter(cable, realtime))
-                self.addresses["prologix_pty"] = self._terminal.path
+                self._open_terminal("prologix_pty", self._adapter(cable, realtime))
+            if serial_pty is not None:
+                line = SerialLine(serial_pty) if realtime else SerialLine(serial_pty, baud=0)
+                self._cables.append(line)
+                self._open_terminal("serial_pty", line)
         except BaseException:
             self.close()
             raise
+
+    def _open_terminal(self, name: str, cable: Cable) -> None:
+        self._terminals[name] = terminal = Terminal(cable)
+        self.addresses[name] = terminal.path
 
     def _adapter(self, dialect: Dialect, realtime: bool) -> FakeAdapter:
         adapter = FakeAdapter(
@@ -94,7 +105,7 @@ class Server:
             restart_s=None if realtime else _FAST_RESTART_S,
             paced=realtime,
         )
-        self._adapters.append(adapter)
+        self._cables.append(adapter)
         return adapter
 
     def _listen(self, name: str, port: int, adapter: FakeAdapter | None) -> None:
@@ -141,14 +152,15 @@ class Server:
                 self._pace.touch()
                 key.data.gather()
         now_s = time.monotonic()
-        if self._terminal is not None and self._terminal.gather(now_s):
-            self._pace.touch()
+        for terminal in self._terminals.values():
+            if terminal.gather(now_s):
+                self._pace.touch()
         self._pace.advance()
-        for adapter in self._adapters:
-            adapter.pump(now_s)
+        for cable in self._cables:
+            cable.pump(now_s)
         self._work_clients(now_s)
-        if self._terminal is not None:
-            self._terminal.flush(now_s)
+        for terminal in self._terminals.values():
+            terminal.flush(now_s)
         if self.instrument.damage.link_fault("dropped-connection"):
             self._drop_all(now_s)
 
@@ -173,18 +185,19 @@ class Server:
         for client in list(self._clients):
             client.reset()
             self._forget(client)
-        if self._terminal is not None:
-            self._terminal.unplug(now_s)
-            self.addresses["prologix_pty"] = self._terminal.path
+        for name, terminal in self._terminals.items():
+            terminal.unplug(now_s)
+            self.addresses[name] = terminal.path
 
     def _wait_s(self) -> float:
         due = self._pace.wait_s
         wait = _IDLE_S if due is None else min(due, _IDLE_S)
-        busy = any(adapter.busy for adapter in self._adapters)
+        busy = any(cable.busy for cable in self._cables)
         busy = busy or any(client.waiting for client in self._clients)
-        if self._terminal is not None:
-            # It is looked at in turns: the selector would spin on one that nobody has open.
-            lively = self._terminal.lively(time.monotonic())
+        if self._terminals:
+            # They are looked at in turns: the selector would spin on one that nobody has open.
+            now_s = time.monotonic()
+            lively = any(terminal.lively(now_s) for terminal in self._terminals.values())
             return min(wait, _LIVELY_TICK_S if lively else _TICK_S)
         return min(wait, _TICK_S) if busy else wait
 
@@ -196,9 +209,9 @@ class Server:
             self._selector.unregister(listener.wire)
             listener.wire.close()
         self._listeners.clear()
-        if self._terminal is not None:
-            self._terminal.close()
-            self._terminal = None
+        for terminal in self._terminals.values():
+            terminal.close()
+        self._terminals.clear()
         if self._wake_read >= 0:
             self._selector.close()
             os.close(self._wake_read)

@@ -13,12 +13,13 @@ import socket
 import struct
 import tempfile
 from pathlib import Path
+from typing import Protocol
 
 from daq.errors import LinkError
 from sim.adapter import FakeAdapter
-from sim.analyser35670a import Analyser35670A, TalkState
+from sim.instrument.bus import Instrument, TalkState
 
-__all__ = ["AdapterClient", "Listener", "RawClient", "Terminal"]
+__all__ = ["AdapterClient", "Cable", "Listener", "RawClient", "Terminal"]
 
 _CHUNK = 65536
 _LONGEST_LINE = 4_000_000
@@ -37,7 +38,7 @@ class Listener:
         """Who spoke last on a raw socket: the reply is his."""
         self._adapter = adapter
 
-    def accept(self, instrument: Analyser35670A) -> RawClient | AdapterClient | None:
+    def accept(self, instrument: Instrument) -> RawClient | AdapterClient | None:
         """A new client, None if it has gone already."""
         try:
             wire, _address = self.wire.accept()
@@ -105,7 +106,7 @@ class RawClient(_Client):
     whose reply is still due is interrupted (-410) by the next line.
     """
 
-    def __init__(self, wire: socket.socket, instrument: Analyser35670A, listener: Listener) -> None:
+    def __init__(self, wire: socket.socket, instrument: Instrument, listener: Listener) -> None:
         super().__init__(wire)
         self._instrument = instrument
         self._listener = listener
@@ -172,17 +173,45 @@ class AdapterClient(_Client):
         self._flush()
 
 
+class Cable(Protocol):
+    """What may be behind a pseudo-terminal: an adapter, or the instrument's own interface."""
+
+    name: str
+    """Of the terminal."""
+
+    def opened(self, now_s: float) -> None:
+        """Somebody opened the port."""
+        ...
+
+    def receive(self, data: bytes, now_s: float) -> None:
+        """Bytes from the host."""
+        ...
+
+    def take_output(self, now_s: float) -> bytes:
+        """Bytes for the host."""
+        ...
+
+    @property
+    def busy(self) -> bool:
+        """Whether something is under way that time alone may end."""
+        ...
+
+    def pump(self, now_s: float) -> None:
+        """Go on with what is under way."""
+        ...
+
+
 class Terminal:
-    """A pseudo-terminal with an adapter behind it, under a name that stays.
+    """A pseudo-terminal with a cable behind it, under a name that stays.
 
     The name is a link, as udev makes them, because a cable that is pulled and
     plugged in again comes back as another terminal.
     """
 
-    def __init__(self, adapter: FakeAdapter) -> None:
-        self._adapter = adapter
+    def __init__(self, cable: Cable) -> None:
+        self._cable = cable
         self._folder = Path(tempfile.mkdtemp(prefix="lashbench-"))
-        self.path = str(self._folder / "gpib")
+        self.path = str(self._folder / cable.name)
         self._master = -1
         self._open_here = False
         self._away_until = 0.0
@@ -221,13 +250,11 @@ class Terminal:
             return False
         if not self._open_here:
             self._open_here = True
-            if self._adapter.dialect.name == "ar488":
-                # The line DTR is pulled on opening, and an Uno, Nano or Mega starts anew.
-                self._adapter.restart(now_s)
+            self._cable.opened(now_s)
         if not events & select.POLLIN:
             return False
         data = self._read()
-        self._adapter.receive(data, now_s)
+        self._cable.receive(data, now_s)
         self._heard_s = now_s
         return bool(data)
 
@@ -246,8 +273,8 @@ class Terminal:
             raise
 
     def flush(self, now_s: float) -> None:
-        """Send what the adapter has to say, if anybody has the terminal open."""
-        self._out += self._adapter.take_output(now_s)
+        """Send what comes from the cable, if anybody has the terminal open."""
+        self._out += self._cable.take_output(now_s)
         if self._master < 0 or not self._open_here:
             self._out.clear()
             return

@@ -7,8 +7,8 @@ import threading
 from contextlib import contextmanager
 
 from sim.analyser35670a import Analyser35670A, Choices
-from sim.analyser35670a.plant import LinearPlant
 from sim.faults import FaultBoard, parse_fault
+from sim.instrument.plant import LinearPlant
 from sim.response import SteppedServo
 from sim.serve import Server
 from sim.unit import load_unit

@@ -34,8 +34,8 @@ from daq.hp35670a import HP35670A
 from daq.hp35670a_setup import Timing
 from daq.session_events import Finished, Opened, PointStored
 from sim.analyser35670a import Analyser35670A, Choices
-from sim.analyser35670a.plant import LinearPlant, PlantDwell
 from sim.faults import FaultBoard, parse_fault
+from sim.instrument.plant import LinearPlant, PlantDwell
 from sim.loopback import Loopback
 from sim.unit import load_unit
 from tui.bench import bench_session

@@ -39,7 +39,7 @@ from daq.transports.transcript import Replay
 from sim.adapter import FakeAdapter
 from sim.adapter_dialects import AR488, PROLOGIX_USB
 from sim.analyser35670a import Analyser35670A, Choices
-from sim.analyser35670a.plant import LinearPlant
+from sim.instrument.plant import LinearPlant
 from sim.unit import load_unit
 from tui.history_rows import measurement_row
 

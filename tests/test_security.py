@@ -10,7 +10,7 @@ import pytest
 from analysis import diagnosis_figures
 from daq.formats.atomic import file_stem
 from sim.analyser35670a import Analyser35670A, Choices
-from sim.analyser35670a.plant import LinearPlant
+from sim.instrument.plant import LinearPlant
 from sim.serve import Server
 
 ROOT = Path(__file__).parents[1]

@@ -41,11 +41,10 @@ def drives_hardware(url: str) -> bool:
     ConfigurationError
         If it is no address.
     """
-    from daq.drivers import driver_at
-    from daq.transports.address import HostedAddress, ReplayFile, parse_address
+    from daq.drivers import parse_instrument
+    from daq.transports.address import HostedAddress, ReplayFile
 
-    _, address = driver_at(url)
-    return not isinstance(parse_address(address), HostedAddress | ReplayFile)
+    return not isinstance(parse_instrument(url), HostedAddress | ReplayFile)
 
 
 def unit_limits(unit: Unit) -> Limits:
@@ -82,14 +81,14 @@ def connect(
     ConfigurationError, LinkError, InputError
         As `daq.drivers.open_analyser`.
     """
-    from daq.drivers import open_analyser
+    from daq.drivers import driver_at, is_simulated, open_analyser
     from daq.transports.open import TransportFactory
 
     factories: dict[str, TransportFactory] = {}
-    if url.strip().startswith("sim:"):
+    if is_simulated(url):
         from sim.loopback import open_loopback
 
-        factories["sim"] = open_loopback(unit)
+        factories["sim"] = open_loopback(unit, scheme=driver_at(url)[0].scheme)
     return open_analyser(url, factories, record=transcript, fault=fault)
 
 

@@ -19,6 +19,7 @@ __all__ = [
     "PrologixSerial",
     "PrologixTcp",
     "ReplayFile",
+    "SerialPort",
     "VisaAddress",
     "parse_address",
 ]
@@ -30,12 +31,15 @@ FORMS = (
     "GPIB0::11::INSTR",
     "prologix:DEVICE?addr=11",
     "prologix-tcp:HOST:PORT?addr=11",
+    "serial:DEVICE?baud=9600&flow=none",
     "replay:FILE",
 )
 """Every form of URL, by example."""
 
 DEFAULT_GPIB_ADDRESS = 11
-"""The analyser's own preset."""
+"""That of the preset driver's instrument; another driver has its own."""
+BAUD_RATES = (300, 600, 1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
+FLOWS = ("none", "hardware", "software")
 
 _VISA = re.compile(
     r"""
@@ -83,16 +87,28 @@ class PrologixTcp:
 
 
 @dataclass(frozen=True, slots=True)
+class SerialPort:
+    """An instrument's own RS-232 interface on a serial port (or behind a pyserial URL)."""
+
+    device: str
+    baud: int = 9600
+    flow: str = "none"
+    """One of `FLOWS`."""
+
+
+@dataclass(frozen=True, slots=True)
 class ReplayFile:
     """A transcript that answers in an instrument's place."""
 
     path: Path
 
 
-Address = HostedAddress | VisaAddress | PrologixSerial | PrologixTcp | ReplayFile
+Address = HostedAddress | VisaAddress | PrologixSerial | PrologixTcp | SerialPort | ReplayFile
 
 
-def parse_address(url: str, hosted: tuple[str, ...] = ("sim",)) -> Address:
+def parse_address(
+    url: str, hosted: tuple[str, ...] = ("sim",), gpib_address: int = DEFAULT_GPIB_ADDRESS
+) -> Address:
     """Read an instrument URL.
 
     Parameters
@@ -101,6 +117,8 @@ def parse_address(url: str, hosted: tuple[str, ...] = ("sim",)) -> Address:
         One of `FORMS`. VISA names may be in any case, schemes are lower case.
     hosted
         Schemes that the caller itself provides a transport for.
+    gpib_address
+        Taken where an adapter's URL names none.
 
     Raises
     ------
@@ -108,7 +126,7 @@ def parse_address(url: str, hosted: tuple[str, ...] = ("sim",)) -> Address:
         If it has none of the forms; the message says what is wrong and lists them.
     """
     text = url.strip()
-    if "::" in text and not text.startswith(("prologix:", "prologix-tcp:", "replay:")):
+    if "::" in text and not text.startswith(("prologix:", "prologix-tcp:", "serial:", "replay:")):
         return _visa(url, text)
     match = _SCHEME.fullmatch(text)
     if match is None:
@@ -121,9 +139,11 @@ def parse_address(url: str, hosted: tuple[str, ...] = ("sim",)) -> Address:
             raise _refusal(url, "names no file")
         return ReplayFile(Path(rest))
     if scheme == "prologix":
-        return _prologix_serial(url, rest)
+        return _prologix_serial(url, rest, gpib_address)
     if scheme == "prologix-tcp":
-        return _prologix_tcp(url, rest)
+        return _prologix_tcp(url, rest, gpib_address)
+    if scheme == "serial":
+        return _serial(url, rest)
     raise _refusal(url, f"has the unknown scheme {scheme!r}")
 
 
@@ -138,36 +158,57 @@ def _visa(url: str, text: str) -> VisaAddress:
     return VisaAddress(text)
 
 
-def _prologix_serial(url: str, rest: str) -> PrologixSerial:
-    device, gpib_address = _with_gpib_address(url, rest)
+def _prologix_serial(url: str, rest: str, preset: int) -> PrologixSerial:
+    device, gpib_address = _with_gpib_address(url, rest, preset)
     if not device or any(sign.isspace() for sign in device):
         raise _refusal(url, "names no serial device")
     return PrologixSerial(device, gpib_address)
 
 
-def _prologix_tcp(url: str, rest: str) -> PrologixTcp:
-    place, gpib_address = _with_gpib_address(url, rest)
+def _prologix_tcp(url: str, rest: str, preset: int) -> PrologixTcp:
+    place, gpib_address = _with_gpib_address(url, rest, preset)
     match = _HOST_PORT.fullmatch(place)
     if match is None or not 1 <= int(match.group(2)) <= 65535:
         raise _refusal(url, "needs HOST:PORT with a port from 1 to 65535")
     return PrologixTcp(match.group(1).strip("[]"), int(match.group(2)), gpib_address)
 
 
-def _with_gpib_address(url: str, rest: str) -> tuple[str, int]:
+def _serial(url: str, rest: str) -> SerialPort:
+    device, options = _with_options(url, rest, ("baud", "flow"))
+    if not device or any(sign.isspace() for sign in device):
+        raise _refusal(url, "names no serial device")
+    baud, flow = options.get("baud", "9600"), options.get("flow", "none")
+    if baud not in map(str, BAUD_RATES):
+        raise _refusal(url, f"has {baud!r} baud; it is one of {', '.join(map(str, BAUD_RATES))}")
+    if flow not in FLOWS:
+        raise _refusal(url, f"has flow control {flow!r}; it is one of {', '.join(FLOWS)}")
+    return SerialPort(device, int(baud), flow)
+
+
+def _with_gpib_address(url: str, rest: str, preset: int) -> tuple[str, int]:
+    place, options = _with_options(url, rest, ("addr",))
+    value = options.get("addr", str(preset))
+    if not re.fullmatch(r"\d{1,2}", value, re.ASCII) or int(value) > 30:
+        raise _refusal(url, f"has GPIB address {value!r}; it is a number from 0 to 30")
+    return place, int(value)
+
+
+def _with_options(url: str, rest: str, known: tuple[str, ...]) -> tuple[str, dict[str, str]]:
     place, mark, query = rest.partition("?")
-    gpib_address = DEFAULT_GPIB_ADDRESS
-    if mark:
-        try:
-            options = parse_qsl(query, keep_blank_values=True, strict_parsing=True)
-        except ValueError as error:
-            raise _refusal(url, "has nothing readable after '?'") from error
-        if [key for key, _ in options] != ["addr"]:
-            raise _refusal(url, "may have one option only, 'addr'")
-        value = options[0][1]
-        if not re.fullmatch(r"\d{1,2}", value, re.ASCII) or int(value) > 30:
-            raise _refusal(url, f"has GPIB address {value!r}; it is a number from 0 to 30")
-        gpib_address = int(value)
-    return unquote(place), gpib_address
+    if not mark:
+        return unquote(place), {}
+    try:
+        options = parse_qsl(query, keep_blank_values=True, strict_parsing=True)
+    except ValueError as error:
+        raise _refusal(url, "has nothing readable after '?'") from error
+    keys = [key for key, _ in options]
+    if not keys or not set(keys) <= set(known) or len(set(keys)) < len(keys):
+        one = len(known) == 1
+        words = " and ".join(f"{name!r}" for name in known)
+        raise _refusal(
+            url, f"may have {'one option only' if one else 'these options once each'}, {words}"
+        )
+    return unquote(place), dict(options)
 
 
 def _refusal(url: str, fault: str) -> ConfigurationError:

@@ -113,6 +113,14 @@ class Transport(Protocol):
         """The payload of one definite-length block; raises as `read` does."""
         ...
 
+    def read_bytes(self, count: int, deadline: Deadline) -> bytes:
+        """A reply of exactly `count` bytes, without header, any byte among them.
+
+        Raises as `read` does; also `ProtocolError` where the reply is known to have another
+        length.
+        """
+        ...
+
     def serial_poll(self, deadline: Deadline) -> int | None:
         """The status byte, read past the instrument's parser; None if the wire has no such thing.
 

@@ -49,9 +49,9 @@ class Inbox:
         del self._kept[:count]
         return first
 
-    def taken_line(self) -> bytes | None:
-        """The bytes kept up to the first line feed, without it; None if there is none yet."""
-        line = self.taken(self._kept.find(b"\n") + 1)
+    def taken_line(self, end: bytes = b"\n") -> bytes | None:
+        """The bytes kept up to the first line end, without it; None if there is none yet."""
+        line = self.taken(self._kept.find(end) + 1)
         return line[:-1] if line else None
 
     def emptied(self) -> bytes:

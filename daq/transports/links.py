@@ -118,7 +118,7 @@ class SerialLink:
         On opening, if the port does not exist or another program has it.
     """
 
-    def __init__(self, device: str, baud: int = 115200) -> None:
+    def __init__(self, device: str, baud: int = 115200, flow: str = "none") -> None:
         import serial
 
         self.name = device
@@ -129,6 +129,8 @@ class SerialLink:
         options: dict[str, Any] = {"baudrate": baud, "timeout": _SLICE_S, "write_timeout": 2.0}
         if self._is_file:
             options["exclusive"] = True
+            # A pyserial URL stands for another machine's port, which has its own flow control.
+            options |= {"rtscts": flow == "hardware", "xonxoff": flow == "software"}
         try:
             self._port = serial.serial_for_url(device, **options)
         except (*self._faults, ValueError) as error:

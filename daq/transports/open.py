@@ -11,10 +11,12 @@ from pathlib import Path
 
 from daq.errors import LashbenchError
 from daq.transports.address import (
+    DEFAULT_GPIB_ADDRESS,
     HostedAddress,
     PrologixSerial,
     PrologixTcp,
     ReplayFile,
+    SerialPort,
     VisaAddress,
     parse_address,
 )
@@ -36,6 +38,7 @@ def open_transport(
     record: Path | None = None,
     fault: Callable[[str], None] | None = None,
     opening_s: float = _OPENING_S,
+    gpib_address: int = DEFAULT_GPIB_ADDRESS,
 ) -> Transport:
     """Open the transport that a URL names; docs/instrument.md explains the forms.
 
@@ -51,6 +54,8 @@ def open_transport(
         Told if that file takes no more; see `daq.transports.transcript.Recorder`.
     opening_s
         Bound of opening, s.
+    gpib_address
+        Taken where an adapter's URL names none.
 
     Raises
     ------
@@ -64,7 +69,7 @@ def open_transport(
         If the transcript to be recorded cannot be written.
     """
     provided = dict(factories or {})
-    address = parse_address(url, hosted=tuple(provided))
+    address = parse_address(url, tuple(provided), gpib_address)
     transport: Transport
     match address:
         case HostedAddress(scheme=scheme, rest=rest):
@@ -83,6 +88,12 @@ def open_transport(
             transport = open_visa(resource, Deadline.after(opening_s))
         case PrologixSerial() | PrologixTcp():
             transport = _open_prologix(address, url, opening_s)
+        case SerialPort(device=device, baud=baud, flow=flow):
+            from daq.transports.links import SerialLink
+            from daq.transports.stream import StreamTransport
+
+            # RS-232 interfaces of instruments end a reply with CR, with or without LF behind it.
+            transport = StreamTransport(SerialLink(device, baud, flow), url, reply_end=b"\r")
         case ReplayFile(path=path):
             from daq.transports.transcript import Replay
 
@@ -123,6 +134,13 @@ def load_transport(url: str) -> None:
             import daq.transports.links
             import daq.transports.prologix
             import daq.transports.prologix_adapter  # noqa: F401
+
+            serial.Serial()
+        case SerialPort():
+            import serial
+
+            import daq.transports.links
+            import daq.transports.stream  # noqa: F401
 
             serial.Serial()
         case _:

@@ -92,6 +92,15 @@ class PrologixTransport:
 
         return take_block(take)
 
+    def read_bytes(self, count: int, deadline: Deadline) -> bytes:
+        """A reply of so many bytes; they are counted, as any of them may look like an end."""
+        adapter = self._adapter
+        self._fruitless = 0
+        adapter.send(b"++read eoi", deadline)
+        while (data := adapter.inbox.taken(count)) is None:
+            self._wait_for_more(deadline)
+        return data
+
     def _wait_for_more(self, deadline: Deadline, before: int = 0) -> None:
         """Gather bytes of a reply; where the adapter gave up on it, ask for it again.
 

@@ -1,4 +1,4 @@
-"""An instrument on a bare TCP stream: one line feed ends a message, and a reply.
+"""An instrument on a bare stream, TCP or RS-232: one character ends a message, and a reply.
 
 Owns where a reply ends on a wire that has no ends of its own. Such a wire has no
 serial poll and no device clear. It speaks no SCPI.
@@ -17,10 +17,17 @@ __all__ = ["StreamTransport"]
 
 
 class StreamTransport:
-    """Messages over an open link to the instrument itself; see `Transport`."""
+    """Messages over an open link to the instrument itself; see `Transport`.
 
-    def __init__(self, link: Link, address: str) -> None:
+    Parameters
+    ----------
+    reply_end
+        The character that ends a reply. What other line ends stand around it is dropped.
+    """
+
+    def __init__(self, link: Link, address: str, reply_end: bytes = b"\n") -> None:
         self.address = address
+        self._end = reply_end
         self._link = link
         self._waiting = "nothing"
         self._inbox = Inbox(link, "the instrument")
@@ -33,7 +40,7 @@ class StreamTransport:
 
     def read(self, deadline: Deadline) -> str:
         """One text reply, without terminator."""
-        while (line := self._inbox.taken_line()) is None:
+        while (line := self._inbox.taken_line(self._end)) is None:
             self._wait_for_more(deadline)
         try:
             return line.decode("ascii").strip()
@@ -54,6 +61,12 @@ class StreamTransport:
             return part
 
         return take_block(take)
+
+    def read_bytes(self, count: int, deadline: Deadline) -> bytes:
+        """A reply of so many bytes; what follows it is the next reply's."""
+        while (data := self._inbox.taken(count)) is None:
+            self._wait_for_more(deadline)
+        return data
 
     def serial_poll(self, deadline: Deadline) -> None:
         """None: there is no such thing on this wire."""

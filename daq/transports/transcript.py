@@ -86,6 +86,10 @@ class Recorder:
         """The payload of one block."""
         return self._record("block", lambda: self._transport.read_block(deadline))
 
+    def read_bytes(self, count: int, deadline: Deadline) -> bytes:
+        """A reply of so many bytes."""
+        return self._record("bytes", lambda: self._transport.read_bytes(count, deadline))
+
     def serial_poll(self, deadline: Deadline) -> int | None:
         """The status byte."""
         return self._record("poll", lambda: self._transport.serial_poll(deadline))
@@ -173,7 +177,8 @@ class Replay:
     def __init__(self, path: Path) -> None:
         self.address = f"replay:{path}"
         self._path = path
-        self._entries = _entries(path)
+        self.recorded_address, self._entries = _recording(path)
+        """Where the instrument was when the dialogue was recorded."""
         self._next = 0
 
     def write(self, line: str, deadline: Deadline) -> None:
@@ -187,6 +192,11 @@ class Replay:
     def read_block(self, deadline: Deadline) -> bytes:
         """The recorded block."""
         answer = self._answer("block")
+        return answer if isinstance(answer, bytes) else b""
+
+    def read_bytes(self, count: int, deadline: Deadline) -> bytes:
+        """The recorded reply of so many bytes."""
+        answer = self._answer("bytes")
         return answer if isinstance(answer, bytes) else b""
 
     def serial_poll(self, deadline: Deadline) -> int | None:
@@ -235,12 +245,14 @@ _GIVES: dict[str, tuple[type, ...]] = {
     "write": (),
     "read": (str,),
     "block": (bytes,),
+    "bytes": (bytes,),
     "poll": (int, type(None)),
     "clear": (bool,),
 }
 
 
-def _entries(path: Path) -> list[tuple[int, dict[str, Any]]]:
+def _recording(path: Path) -> tuple[str, list[tuple[int, dict[str, Any]]]]:
+    """The address in the first line, and the acts with the lines they stand on."""
     try:
         text = read_text(path, _LIMIT_BYTES, "ascii")
     except (OSError, ValueError) as error:
@@ -255,7 +267,7 @@ def _entries(path: Path) -> list[tuple[int, dict[str, Any]]]:
         )
     for number, entry in documents[1:]:
         _check(path, number, entry)
-    return documents[1:]
+    return str(documents[0][1].get("address", "")), documents[1:]
 
 
 def _document(path: Path, number: int, line: str) -> dict[str, Any]:
@@ -276,11 +288,11 @@ def _check(path: Path, number: int, entry: dict[str, Any]) -> None:
         if entry["raised"] not in _RAISED or not isinstance(entry.get("message"), str):
             raise FileFormatError(f"{path}, line {number}: holds no error that lashbench knows")
         return
-    if act == "block":
+    if act in ("block", "bytes"):
         try:
             base64.b64decode(entry["base64"], validate=True)
         except (KeyError, TypeError, ValueError) as error:
-            raise FileFormatError(f"{path}, line {number}: holds no block") from error
+            raise FileFormatError(f"{path}, line {number}: holds no {act}") from error
     elif act != "write" and not isinstance(entry.get("gave", ...), _GIVES[act]):
         raise FileFormatError(f"{path}, line {number}: holds no answer to a {act}")
 

@@ -113,6 +113,16 @@ class VisaTransport:
         message = self._message(deadline)
         return block_of(message, f"{self.address}: the block that answers {self._waiting!r}")
 
+    def read_bytes(self, count: int, deadline: Deadline) -> bytes:
+        """A reply of so many bytes, which is a whole message."""
+        message = self._message(deadline)
+        if len(message) != count:
+            raise ProtocolError(
+                f"{self.address}: the reply to {self._waiting!r} has {len(message)} bytes, "
+                f"{count} were due"
+            )
+        return message
+
     def serial_poll(self, deadline: Deadline) -> int:
         """The status byte."""
         self._waiting = "serial poll"

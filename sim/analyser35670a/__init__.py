@@ -5,8 +5,8 @@ Owns the instrument as a controller on the bus meets it. It opens no port (see
 """
 
 from sim.analyser35670a.choices import Choices
-from sim.analyser35670a.exchange import Talk, TalkState
 from sim.analyser35670a.instrument import Analyser35670A
-from sim.analyser35670a.plant import LinearPlant, Plant
+from sim.instrument.bus import Talk, TalkState
+from sim.instrument.plant import LinearPlant, Plant
 
 __all__ = ["Analyser35670A", "Choices", "LinearPlant", "Plant", "Talk", "TalkState"]

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from sim.analyser35670a.agenda import Entry, Steps
 from sim.analyser35670a.status import Device, Operation, Questionable
+from sim.instrument.agenda import Entry, Steps
 
 if TYPE_CHECKING:
     from sim.analyser35670a.instrument import Analyser35670A

@@ -8,35 +8,17 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
-from enum import Enum
 
 from sim.analyser35670a.commands import Answer, Hold, Later
 from sim.analyser35670a.errors import ScpiError
 from sim.analyser35670a.tokens import Assembler, Unit
+from sim.instrument.bus import Talk, TalkState
 
-__all__ = ["INPUT_QUEUE_BYTES", "Exchange", "Talk", "TalkState"]
+__all__ = ["INPUT_QUEUE_BYTES", "Exchange"]
 
 INPUT_QUEUE_BYTES = 128
 JOINED_REPLY_BYTES = 256
 """[S] Size of a joined reply at which the parser waits for it to be read before the next query."""
-
-
-class TalkState(Enum):
-    """What became of being told to talk."""
-
-    DATA = "bytes came"
-    WAITING = "a reply is due and not ready"
-    NOTHING = "there is nothing to say"
-
-
-@dataclass(frozen=True, slots=True)
-class Talk:
-    """Bytes sent, and whether EOI came with the last."""
-
-    state: TalkState
-    data: bytes = b""
-    end: bool = False
 
 
 class Exchange:

@@ -10,24 +10,26 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from sim.analyser35670a.agenda import Agenda
 from sim.analyser35670a.calibration import Calibration
 from sim.analyser35670a.choices import Choices
-from sim.analyser35670a.commands import Answer
-from sim.analyser35670a.damage import Damage
+from sim.analyser35670a.commands import Answer, Hold
 from sim.analyser35670a.dispatch import Dispatcher, all_settings, is_query
 from sim.analyser35670a.errors import ErrorQueue, ScpiError
-from sim.analyser35670a.exchange import Exchange, Talk, TalkState
+from sim.analyser35670a.exchange import Exchange
 from sim.analyser35670a.measurement import Measurement
 from sim.analyser35670a.operations import Operations
-from sim.analyser35670a.plant import Plant
 from sim.analyser35670a.settings import Mode, Settings
-from sim.analyser35670a.source import Source, slew_vpk_per_s
+from sim.analyser35670a.source import slew_vpk_per_s
 from sim.analyser35670a.spectrum import Spectrum
 from sim.analyser35670a.status import Device, Event, StatusModel
 from sim.analyser35670a.traces import TraceBoxes
 from sim.analyser35670a.units import volts_peak
 from sim.faults import FaultBoard
+from sim.instrument.agenda import Agenda
+from sim.instrument.bus import Talk, TalkState
+from sim.instrument.damage import Damage
+from sim.instrument.output import Source
+from sim.instrument.plant import Plant
 
 __all__ = ["Analyser35670A"]
 
@@ -95,6 +97,31 @@ class Analyser35670A:
 
     # The bus
 
+    @property
+    def gpib_address(self) -> int:
+        """The address that it comes with."""
+        return 11
+
+    @property
+    def measurements_begun(self) -> int:
+        """Measurements started since it was built."""
+        return self.measurement.started
+
+    @property
+    def points_begun(self) -> int:
+        """Points begun since it was built."""
+        return self.measurement.points_begun
+
+    @property
+    def repeats(self) -> bool:
+        """Whether it measures again and again by itself."""
+        return bool(self.settings.get("INIT:CONT"))
+
+    @property
+    def driven_v(self) -> float:
+        """Largest magnitude of amplitude and offset at the connector now, V; 0 if off."""
+        return max(abs(self.output_vpk), abs(self.source.offset_v))
+
     def listen(self, data: bytes, end: bool = False) -> int:
         """Take bytes, EOI with the last if `end`; how many were taken before the bus stalled."""
         if self.damage.dead:
@@ -161,8 +188,9 @@ class Analyser35670A:
         self._strike()
 
     def _run(self, unit: bytes) -> Answer:
-        hold = self.damage.parser_hold()
-        return hold if hold is not None else self._execute(unit)
+        if self.damage.parser_stuck:
+            return Hold(lambda: not self.damage.parser_stuck)
+        return self._execute(unit)
 
     def _run_reporting(self, unit: bytes) -> None:
         try:

@@ -11,13 +11,13 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 from daq.errors import AnalysisError
-from sim.analyser35670a.agenda import HOLD, Process, Steps
 from sim.analyser35670a.errors import ScpiError
 from sim.analyser35670a.point import Point, take_point
 from sim.analyser35670a.settings import Mode
 from sim.analyser35670a.status import Device, Operation
 from sim.analyser35670a.sweep import Sweep, plan_sweep
 from sim.analyser35670a.units import volts_peak
+from sim.instrument.agenda import HOLD, Process, Steps
 
 if TYPE_CHECKING:
     from sim.analyser35670a.instrument import Analyser35670A

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.hp35670a_variance import normalised_variance
+from daq.driving.variance import normalised_variance
 from sim.analyser35670a.choices import NOISE_REFERENCE_CYCLES
 from sim.analyser35670a.inputs import (
     OVERLOAD_RATIO,
@@ -24,8 +24,8 @@ from sim.analyser35670a.inputs import (
     nearest_range,
     range_vpk,
 )
-from sim.analyser35670a.plant import Dwell
 from sim.analyser35670a.units import Quantity, from_volts_peak, volts_peak
+from sim.instrument.plant import Dwell
 
 if TYPE_CHECKING:
     from sim.analyser35670a.instrument import Analyser35670A

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from sim.analyser35670a.agenda import HOLD, Agenda
-from sim.analyser35670a.pace import ByTheClock, Fast
+from sim.instrument.agenda import HOLD, Agenda
+from sim.instrument.pace import ByTheClock, Fast
 
 
 def test_the_agenda_keeps_order_and_time():

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from daq.drivers import is_simulated
 from daq.errors import InputError
 from tui.app.run_view import RunView
 from tui.followed import following
@@ -101,9 +102,7 @@ class Desk:
     @property
     def simulated(self) -> bool:
         """Whether the instrument is a simulated one, as far as is known."""
-        return self.url.strip().startswith("sim:") or (
-            self.identity is not None and self.identity.simulated
-        )
+        return is_simulated(self.url) or (self.identity is not None and self.identity.simulated)
 
     def choose_unit(self, name: str) -> Unit:
         """Put a unit on the desk, with the sweep that goes with it.

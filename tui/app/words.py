@@ -9,6 +9,7 @@ import math
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING
 
+from daq.drivers import is_simulated
 from tui.app.widgets.traces import FLAG_MARKS
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ def plan_words(plan: SweepPlan, url: str, done: int = 0) -> list[str]:
         f"{highest:g} Hz, {plan.direction}, at {levels_words(plan)} V peak"
     )
     cycles = f"{plan.settle_cycles}+{plan.integrate_cycles} cycles a point"
-    if url.strip().startswith("sim:") and "realtime" not in url:
+    if is_simulated(url) and "realtime" not in url:
         return [
             first,
             f"{cycles}; simulated, faster than the {span_words(total_s)} of a real sweep",

@@ -1,4 +1,4 @@
-"""``lashbench serve``: the simulated 35670A on a wire.
+"""``lashbench serve``: a simulated analyser on a wire.
 
 Owns the options of the verb, the ready line and the two signals that end it.
 """
@@ -25,18 +25,20 @@ def serve(
     unit: UnitName,
     ratio: Real,
     effect: list[str] | None = None,
-    tcp: Annotated[Whole | None, Parameter(help="Raw SCPI on this port.")] = None,
+    tcp: Annotated[Whole | None, Parameter(help="The analyser's language on this port.")] = None,
     prologix_tcp: Annotated[Whole | None, Parameter(help="An adapter on this port.")] = None,
     prologix_pty: bool = False,
+    serial_pty: bool = False,
+    model: str = "35670A",
     speed: Literal["fast", "realtime"] = "realtime",
     fault: list[str] | None = None,
     seed: Whole = 0,
     noise: Real = 0.5e-3,
-    options: str = "1D2",
+    options: str | None = None,
     dialect: Literal["prologix", "ar488"] = "prologix",
     console: Injected,
 ) -> None:
-    """Serve a simulated 35670A with a gimbal behind it until SIGTERM or SIGINT.
+    """Serve a simulated analyser with a gimbal behind it until SIGTERM or SIGINT.
 
     When ready it prints one JSON line with the addresses on stdout. It listens
     on 127.0.0.1 only.
@@ -48,11 +50,15 @@ def serve(
     effect
         Extension of the model, ID:param=value[,param=value]; repeat it for several.
     tcp
-        Port of raw SCPI; 0 picks a free one.
+        Port of the bare language; 0 picks a free one.
     prologix_tcp
         Port of a Prologix-style bridge; 0 picks a free one.
     prologix_pty
         A Prologix-style adapter on a pseudo-terminal.
+    serial_pty
+        The instrument's own RS-232 on a pseudo-terminal, where it has one (SR785).
+    model
+        Which analyser: 35670A or SR785.
     speed
         By the clock, or as fast as it can be computed.
     fault
@@ -66,8 +72,10 @@ def serve(
     dialect
         Which make of adapter.
     """
-    if tcp is None and prologix_tcp is None and not prologix_pty:
-        raise InputError("nothing to serve; give --tcp PORT, --prologix-tcp PORT or --prologix-pty")
+    if tcp is None and prologix_tcp is None and not prologix_pty and not serial_pty:
+        raise InputError(
+            "nothing to serve; give --tcp PORT, --prologix-tcp PORT, --prologix-pty or --serial-pty"
+        )
     for name, port in (("--tcp", tcp), ("--prologix-tcp", prologix_tcp)):
         if port is not None and port not in _PORTS:
             raise InputError(f"{name} {port} is no port; give 0 to 65535, 0 for any free one")
@@ -75,35 +83,44 @@ def serve(
         raise InputError(f"--noise {noise} V must be between 0 and 10 V")
     if seed < 0:
         raise InputError(f"--seed {seed} is negative; give 0 or more")
-    if '"' in options or not options.isprintable() or not options.isascii():
+    if options is not None and not _is_plain(options):
         raise InputError(f"--options {options!r} must be a plain list such as 1D2,1D3")
 
-    from sim.analyser35670a import Analyser35670A, Choices
     from sim.effects import parse_effect
-    from sim.faults import FaultBoard, parse_fault
+    from sim.instrument.serial_line import SerialInstrument
+    from sim.models import Bench, model_named
     from sim.response import SteppedServo
     from sim.serve import Server
     from sim.unit import load_unit
 
-    faults = [parse_fault(text) for text in fault or []]
+    kind = model_named(model)
+    if serial_pty and not kind.has_serial:
+        raise InputError(f"--serial-pty: a {kind.name} has no RS-232 interface to measure over")
+    if options is not None and not kind.has_options:
+        raise InputError(f"--options {options}: a {kind.name} has no options to be listed")
+    faults = [kind.parse_fault(text) for text in fault or []]
     effects = tuple(parse_effect(text) for text in effect or [])
     servo = SteppedServo(load_unit(unit), ratio, effects, seed=seed)
     # The first dwell may compile the engine, for longer than a client waits for a reply.
     servo.dwell(1000.0, 1.0, 0.0, 0, 1)
     servo.rest()
-    choices = Choices(seed=seed, noise_v=noise, options=options)
-    instrument = Analyser35670A(servo, choices, FaultBoard(faults))
+    instrument = kind.build(servo, Bench(seed, noise, options, faults))
     with Server(
         instrument,
         realtime=speed == "realtime",
         tcp=tcp,
         prologix_tcp=prologix_tcp,
         prologix_pty=prologix_pty,
+        serial_pty=instrument if serial_pty and isinstance(instrument, SerialInstrument) else None,
         dialect=dialect,
     ) as server:
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, lambda *_: server.stop())
         # One line, not the indented document of other verbs: readers wait for a line.
         console.data(json.dumps(server.addresses))
-        console.note("serving a simulated 35670A; end it with Ctrl-C")
+        console.note(f"serving a simulated {kind.name}; end it with Ctrl-C")
         server.run()
+
+
+def _is_plain(options: str) -> bool:
+    return options.isascii() and options.isprintable() and '"' not in options

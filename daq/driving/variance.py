@@ -1,7 +1,7 @@
 """The meaning given to the analyser's normalised variance, in one place.
 
-The programming guide names the quantity ``XFR:POW:VAR`` (normalised variance
-of a channel, swept sine only) and does not define it. Everything that reads
+The manuals of the 35670A (``XFR:POW:VAR``) and of the SR785 (``MEAS`` 44 and 45) name the
+normalised variance of a channel in swept sine and do not define it. Everything that reads
 it, or makes it up in simulation, goes through this module. UNVERIFIED on a
 real instrument; docs/instrument.md says how to check it there.
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from daq.hp35670a_variance import gain_standard_error, normalised_variance
+from daq.driving.variance import gain_standard_error, normalised_variance
 
 
 def test_it_is_the_scatter_of_one_cycle_relative_to_the_mean():

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from sim.analyser35670a.commands import Hold
 from sim.faults import Fault, FaultBoard
 
 __all__ = ["Damage"]
@@ -66,11 +65,10 @@ class Damage:
         """A fault that strikes the link, once."""
         return self._link.pop(name, None)
 
-    def parser_hold(self) -> Hold | None:
-        """What the parser waits for if it hangs."""
-        if not self._parser_stuck:
-            return None
-        return Hold(lambda: not self._parser_stuck)
+    @property
+    def parser_stuck(self) -> bool:
+        """Whether the parser hangs until it is freed."""
+        return self._parser_stuck
 
     def free_parser(self) -> None:
         """A device clear frees it."""

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from typing import Protocol
 
-from sim.analyser35670a.instrument import Analyser35670A
+from sim.instrument.bus import Instrument
 
 __all__ = ["ByTheClock", "Fast", "Pace"]
 
@@ -42,19 +42,19 @@ class Fast:
     takes an interest, one sweep beyond its last word.
     """
 
-    def __init__(self, instrument: Analyser35670A) -> None:
+    def __init__(self, instrument: Instrument) -> None:
         self._instrument = instrument
         self._started = 0
 
     def touch(self) -> None:
         """Let continuous sweeps go on."""
-        self._started = self._instrument.measurement.started
+        self._started = self._instrument.measurements_begun
 
     @property
     def _idle(self) -> bool:
         instrument = self._instrument
-        repeats = instrument.measurement.started > self._started + 1
-        return repeats and bool(instrument.settings.get("INIT:CONT"))
+        repeats = instrument.measurements_begun > self._started + 1
+        return repeats and instrument.repeats
 
     def advance(self) -> bool:
         """The next event."""
@@ -62,11 +62,11 @@ class Fast:
 
     def advance_point(self) -> bool:
         """Events up to the end of the next point, or of what is under way without one."""
-        begun = self._instrument.measurement.points_begun
+        begun = self._instrument.points_begun
         moved = False
         while self.advance():
             moved = True
-            if self._instrument.measurement.points_begun > begun + 1:
+            if self._instrument.points_begun > begun + 1:
                 break
         return moved
 
@@ -87,7 +87,7 @@ class ByTheClock:
 
     def __init__(
         self,
-        instrument: Analyser35670A,
+        instrument: Instrument,
         rate: float = 1.0,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
