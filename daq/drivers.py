@@ -155,5 +155,8 @@ def load_all_of(url: str) -> None:
     class Nobody:
         """A wire that is never used: a driver imports its own modules when it is made."""
 
-    nobody: Transport = Nobody()  # type: ignore[assignment]
+        def __init__(self, address: str) -> None:
+            self.address = address
+
+    nobody: Transport = Nobody(address)  # type: ignore[assignment]
     driver.drive(nobody)
