@@ -242,7 +242,7 @@ def open_loopback(
         share = wanted.ratio if "ratio=" in rest or ratio is None else ratio
         if unit.stages == 1 and "ratio=" not in rest and ratio is None:
             share = 1.0
-        bench = Bench(wanted.seed, wanted.noise_v, wanted.options, wanted.faults)
+        bench = Bench(wanted.seed, wanted.noise_v, options=wanted.options, faults=wanted.faults)
         servo = SteppedServo(unit, share, wanted.effects or tuple(effects), seed=wanted.seed)
         instrument = model.build(servo, bench)
         if progress is not None:

@@ -29,11 +29,13 @@ class Bench:
     """What a simulated instrument is asked to be; `options` None stands for all that it may have.
 
     `noise_v` is the noise of the device's output: standard deviation of each component of a
-    reading averaged over 30 cycles, V.
+    reading averaged over 30 cycles, V. `converter_noise` is that of the converter, per component
+    and cycle, relative to the input range.
     """
 
     seed: int = 0
     noise_v: float = 0.5e-3
+    converter_noise: float = 1e-5
     options: str | None = None
     faults: Sequence[Fault] = ()
 

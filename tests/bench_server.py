@@ -5,10 +5,12 @@ import subprocess
 import sys
 import threading
 from contextlib import contextmanager
+from typing import Any
 
 from sim.analyser35670a import Analyser35670A, Choices
 from sim.faults import FaultBoard, parse_fault
 from sim.instrument.plant import LinearPlant
+from sim.models import Bench, model_of
 from sim.response import SteppedServo
 from sim.serve import Server
 from sim.unit import load_unit
@@ -16,13 +18,33 @@ from sim.unit import load_unit
 WIRES = ("tcp", "prologix_tcp", "prologix_pty")
 
 
-def url(name: str, place: str) -> str:
-    """The instrument address of what `serve` names."""
+SERIAL = ("serial_pty",)
+"""What an instrument with RS-232 has beside."""
+
+
+def url(name: str, place: str, driver: str = "") -> str:
+    """The instrument address of what `serve` names, for the driver of that scheme."""
+    lead = f"{driver}:" if driver else ""
     if name == "tcp":
         host, port = place.rsplit(":", 1)
-        return f"TCPIP::{host}::{port}::SOCKET"
+        return f"{lead}TCPIP::{host}::{port}::SOCKET"
+    if name == "serial_pty":
+        return f"{lead}serial:{place}"
     scheme = "prologix-tcp" if name == "prologix_tcp" else "prologix"
-    return f"{scheme}:{place}?addr=11"
+    # Another driver's instrument has another address, which is its driver's preset.
+    return f"{lead}{scheme}:{place}" + ("" if driver else "?addr=11")
+
+
+def wires_of(driver: str) -> tuple[str, ...]:
+    """Every wire over which the instrument of a driver is served."""
+    return WIRES + (SERIAL if model_of(driver).has_serial else ())
+
+
+def simulated(driver: str, plant, faults=(), **bench) -> Any:
+    """The instrument of a driver, noiseless unless told otherwise, in front of a device."""
+    model = model_of(driver)
+    settings = {"noise_v": 0.0, "converter_noise": 0.0} | bench
+    return model.build(plant, Bench(**settings, faults=[model.parse_fault(one) for one in faults]))
 
 
 def linear_analyser(gain, faults=(), **choices) -> Analyser35670A:
@@ -40,15 +62,19 @@ def gimbal_analyser(ratio=0.3, seed=0, faults=(), unit="adss") -> Analyser35670A
 
 
 @contextmanager
-def served(instrument: Analyser35670A, wire: str = "tcp"):
+def served(instrument, wire: str = "tcp", driver: str = ""):
     """Serve in a thread, as fast as can be; yields the instrument's address."""
-    ports = {"tcp": {"tcp": 0}, "prologix_tcp": {"prologix_tcp": 0}}
+    ports = {
+        "tcp": {"tcp": 0},
+        "prologix_tcp": {"prologix_tcp": 0},
+        "serial_pty": {"serial_pty": instrument},
+    }
     wires = ports.get(wire, {"prologix_pty": True})
     with Server(instrument, realtime=False, **wires) as server:
         thread = threading.Thread(target=server.run)
         thread.start()
         try:
-            yield url(wire, server.addresses[wire])
+            yield url(wire, server.addresses[wire], driver)
         finally:
             server.stop()
             thread.join()

@@ -18,7 +18,7 @@ __all__ = [
     "HIGHEST_HZ", "INTEGRATE", "LEAST_INTEGRATE_S", "LEAST_SETTLE_S", "LOWEST_HZ", "MODELS",
     "MOST_POINTS", "LEAST_POINTS", "POINTS", "SETTLE", "SPACING", "START", "STOP", "Numbers",
     "Setting", "check_drive", "level_command", "offset_command", "point_settings",
-    "standing_settings",
+    "shown_settings", "standing_settings",
 ]  # fmt: skip
 
 LOWEST_HZ, HIGHEST_HZ = 1e-3, 102400.0
@@ -185,15 +185,23 @@ def variance_settings(numbers: Numbers) -> list[tuple[Setting, float]]:
     return table
 
 
+_LIVE, _DENSITY = _both("display live", "DISP", 1), _both("PSD units", "PSDU", 1)
+
+
+def shown_settings(numbers: Numbers) -> list[tuple[Setting, float]]:
+    """Whatever the values on the displays depend on while they show the response."""
+    return [(_LIVE, 1), (_DENSITY, 0), *display_settings(numbers)]
+
+
 def standing_settings(numbers: Numbers) -> list[tuple[Setting, float]]:
     """What every measurement is taken with, in the order of sending."""
     table: list[tuple[Setting, float]] = [
         (_choice("display format", "DFMT", 2), 1),
-        (_both("display live", "DISP", 1), 1),
+        (_LIVE, 1),
         *display_settings(numbers),
         (_both("dB units", "UNDB", 3), 0),
         (_both("peak units", "UNPK", 3), 0),
-        (_both("PSD units", "PSDU", 1), 0),  # they spoil a swept sine
+        (_DENSITY, 0),  # they spoil a swept sine
         (_both("phase units", "UNPH", 1), 0),
         (_choice("frequency axis in rpm", "RPMF", 1), 0),
         (_choice("offset correction", "IAOM", 1), 0),  # it would interrupt a sweep

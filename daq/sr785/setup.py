@@ -120,12 +120,14 @@ def enter_swept_sine(dialogue: Dialogue, numbers: Numbers) -> LevelScale:
         If anything does not read back as it should.
     """
     dialogue.recover()
-    for line in ("*CLS", f"*ESE {ENABLED_EVENTS}", f"DSPE {SWEPT}", "*SRE 0"):
+    # Enables that survive a power failure let it show in the next serial poll.
+    for line in ("*CLS", "*PSC 0", f"*ESE {ENABLED_EVENTS}", f"DSPE {SWEPT}", "*SRE 0"):
         dialogue.command(line)
     dialogue.command("SRCO 0")
     dialogue.command("PAUS")
     _confirm_off(dialogue)
     dialogue.command("MGRP 2,0")
+    dialogue.command("DISP 2,1")  # a display that is off-line refuses to be set
     for display in (0, 1):
         # Units of density can be switched in FFT alone, and stay on in swept sine.
         dialogue.command(f"PSDU {display},0")

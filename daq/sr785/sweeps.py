@@ -31,9 +31,10 @@ from daq.sr785.settings import (
     offset_command,
     variance_settings,
 )
-from daq.sr785.setup import SetUp, Timing, apply_all, confirm_all
-from daq.sr785.status import SWEPT, Input, Instrument
+from daq.sr785.setup import SetUp, Timing, apply_all
+from daq.sr785.status import SWEPT
 from daq.sr785.traces import read_axis, read_bin, read_length, read_trace, response_of
+from daq.sr785.watching import Watching
 from daq.transports.base import Deadline
 
 __all__ = ["Guard", "Knowledge", "measure", "quiet"]
@@ -47,14 +48,14 @@ _WORD_EVERY = 12
 """Polls between two looks at the display word itself: a power failure takes its enables away."""
 _LOOK_EVERY = 4
 """Polls between two looks at the data of a running sweep."""
+_MOST_NEW = 20
+"""Points read in one look, so that none waits for long behind others."""
 _HELD_BACK = 1
 """Newest points not believed while a sweep runs."""
 _OFF_AXIS = 0.25
 """Part of a step by which the axis may differ from what was asked for."""
 _STANDS = 1e-4
 """How well what was read early must agree with what stands there in the end."""
-_LEVEL_SLACK_V = 1e-4
-_LEVEL_SHARE = 2e-3
 
 
 @dataclass(slots=True)
@@ -113,7 +114,8 @@ class _Run:
         """Rows that were yielded while the sweep ran."""
         self._next = 0
         self._early = False
-        self._held = PointFlag(0)
+        self._inputs = 0
+        """Input words since the last points were yielded."""
         table = dict(setup.table) | {
             SETTLE: grid.settle_cycles,
             INTEGRATE: grid.integrate_cycles,
@@ -123,6 +125,7 @@ class _Run:
             POINTS: grid.points,
         }
         self._table = list(table.items())
+        self._watching = Watching(dialogue, setup, self._table)
 
     def points(self) -> Iterator[SweepPoint]:
         """Drive the sweep and yield its points."""
@@ -170,21 +173,24 @@ class _Run:
     def _start(self) -> None:
         """Clear the events of earlier; then offset, level, switch and start, each allowed."""
         dialogue, settings = self._dialogue, self._setup.settings
+        dialogue.check("sweep set-up")
         dialogue.command("*CLS")
         dialogue.key_pressed = False
         for line in ("INPS?", "INST?", "DSPS?"):
             dialogue.ask_integer(line)
-        for line in (
-            offset_command(settings.dc_offset_v),
-            level_command("SSAM", settings.source_vpk),
-            "SRCO 1",
-        ):
-            # The last moment to learn that somebody else has the bench by now.
-            self._guard()
-            dialogue.command(line)
-        self._confirm_drive()
+        # The last moments to learn that somebody else has the bench by now.
+        self._guard()
+        dialogue.command(offset_command(settings.dc_offset_v))
+        self._guard()
+        dialogue.command(level_command("SSAM", settings.source_vpk))
+        self._watching.level()
+        self._watching.group()
+        dialogue.check("source level")
+        self._guard()
+        dialogue.command("SRCO 1")
         self._guard()
         dialogue.command("STRT")
+        self._watching.drive()
         # Where the data of an earlier sweep stand until they are written over, nothing can be
         # told to be new before the end. A run of repeats is short and is read in the end.
         last = int(self._rows[-1])
@@ -211,7 +217,7 @@ class _Run:
                 return
             polls += 1
             if polls % _LOOK_EVERY == 0 or pause_s >= _LONGEST_PAUSE_S:
-                self._look_at_state()
+                self._watching.state()
             if deadline.expired:
                 raise dialogue.failure(
                     BenchTimeout(f"sweep: its end was not reported within {bound_s:.3g} s")
@@ -219,39 +225,6 @@ class _Run:
             yield polls
             dialogue.pause(pause_s)
             pause_s = min(1.5 * pause_s, _LONGEST_PAUSE_S)
-
-    def _look_at_state(self) -> None:
-        """Whether somebody paused the sweep, moved a setting or the drive."""
-        dialogue = self._dialogue
-        if Instrument(dialogue.ask_integer("INST?") & 0x60) & Instrument.PAUSED:
-            raise MeasurementError(
-                "the sweep was paused at the front panel or by another program; it ends here"
-            )
-        if dialogue.key_pressed:
-            dialogue.key_pressed = False
-            confirm_all(dialogue, self._table)
-        self._confirm_drive()
-
-    def _confirm_drive(self) -> None:
-        """Raise `InstrumentError` if level, offset or switch moved: no bit tells of it."""
-        dialogue, settings = self._dialogue, self._setup.settings
-        found_v = dialogue.parsed("SSAM?", self._setup.scale.volts)
-        slack_v = max(_LEVEL_SLACK_V, _LEVEL_SHARE * settings.source_vpk)
-        if abs(found_v - settings.source_vpk) > slack_v:
-            raise InstrumentError(
-                f"the source level was set to {settings.source_vpk:g} V peak and reads back "
-                f"{found_v:g} V; the set-up is not what was asked for"
-            )
-        offset = dialogue.ask_number("SOFF?")
-        # Its unit is not known: V or mV.
-        due_v = settings.dc_offset_v
-        if min(abs(offset - due_v), abs(offset - 1000 * due_v) / 1000) > _LEVEL_SLACK_V:
-            raise InstrumentError(
-                f"the source offset was set to {due_v:g} V and reads back {offset:g}; "
-                "the set-up is not what was asked for"
-            )
-        if dialogue.ask_integer("SRCO?") != 1:
-            raise InstrumentError("the source was switched off by somebody; the sweep ends here")
 
     # ------------------------------------------------------------ reading
 
@@ -262,20 +235,22 @@ class _Run:
     def _new_points(self) -> Iterator[SweepPoint]:
         """Points that stand on the display and were not yielded yet."""
         found: list[tuple[int, complex]] = []
-        while self._next + len(found) < self._grid.points - 1:
+        left = self._grid.points - 1 - self._next
+        while len(found) < min(left, _MOST_NEW):
             row = int(self._rows[self._next + len(found)])
             response = self._response(row)
             if np.isnan(response):
                 break
             found.append((row, response))
         # Read after the bins: an overload of the next point may count for these, none is lost.
-        seen = self._flags()
+        seen = self._watching.inputs()
+        self._watching.displays()
         sure = found[: len(found) - _HELD_BACK]
         if not sure:
-            self._held |= seen & PointFlag.OVERLOAD
+            self._inputs |= seen
             return
         variances = self._variances([row for row, _ in sure])
-        flags, self._held = seen | self._held, seen & PointFlag.OVERLOAD
+        flags, self._inputs = self._watching.flags(seen | self._inputs), seen
         for (row, response), pair in zip(sure, variances, strict=True):
             self._told[row] = _Row(response, flags)
             place, self._next = self._next, self._next + 1
@@ -301,12 +276,13 @@ class _Run:
         """Read everything as it stands in the end, compare, and yield what is left."""
         dialogue, grid = self._dialogue, self._grid
         dialogue.command("SRCO 0")
-        flags = self._flags() | self._held
+        flags = self._watching.flags(self._watching.inputs() | self._inputs)
         parts = [read_trace(dialogue, display, grid.points) for display in (0, 1)]
         response = response_of(parts[0], parts[1])
         dialogue.check("sweep")
-        if dialogue.key_pressed:
-            confirm_all(dialogue, self._table)
+        self._watching.keys()
+        self._watching.level()
+        self._watching.displays()
         for row, early in self._told.items():
             if not abs(response[row] - early.response) <= _STANDS * abs(early.response):
                 raise MeasurementError(
@@ -347,20 +323,6 @@ class _Run:
         if not self._knowledge.data_survive:
             return unknown
         return [(float(one), float(two)) for one, two in pairs]
-
-    def _flags(self) -> PointFlag:
-        """Overload and half range since the last look; ranges that were fixed must not move."""
-        bits = self._dialogue.ask_integer("INPS?")
-        flags = PointFlag(0)
-        for channel in (0, 1):
-            seen = Input(bits >> 8 * channel & 0x1E)
-            if seen & (Input.OVERLOAD | Input.FORCED_DOWN):
-                flags |= PointFlag.OVERLOAD
-            if not seen & Input.ABOVE_HALF:
-                flags |= PointFlag.HALF_RANGE_MISSED
-            if seen & Input.RANGED and self._setup.settings.input_range_vpk[channel] is not None:
-                confirm_all(self._dialogue, self._table)
-        return flags
 
     # ------------------------------------------------------------ points
 

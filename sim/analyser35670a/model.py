@@ -19,7 +19,12 @@ def _build(plant: Plant, bench: Bench) -> Instrument:
     from sim.analyser35670a.instrument import Analyser35670A
 
     options = Choices().options if bench.options is None else bench.options
-    choices = Choices(seed=bench.seed, noise_v=bench.noise_v, options=options)
+    choices = Choices(
+        seed=bench.seed,
+        noise_v=bench.noise_v,
+        converter_noise=bench.converter_noise,
+        options=options,
+    )
     return Analyser35670A(plant, choices, bench.board)
 
 

@@ -33,7 +33,8 @@ def _build(plant: Plant, bench: Bench) -> Instrument:
     from sim.sr785.choices import Choices
     from sim.sr785.instrument import SR785
 
-    return SR785(plant, Choices(seed=bench.seed, noise_v=bench.noise_v), bench.board)
+    choices = Choices(seed=bench.seed, noise_v=bench.noise_v, converter_noise=bench.converter_noise)
+    return SR785(plant, choices, bench.board)
 
 
 MODEL = Model("SR785", "sr785", _build, FAULTS, has_serial=True)

@@ -4,17 +4,28 @@ import ast
 from pathlib import Path
 
 import pytest
-from bench_server import linear_analyser, served
+from bench_server import linear_analyser, served, simulated
 from fake_analyser import known_gain
 
 import daq
 from daq.analyser import SourceState
-from daq.drivers import DRIVERS, check_sweep, driver_at, load_all_of, open_analyser
+from daq.drivers import (
+    DRIVERS,
+    check_sweep,
+    driver_at,
+    driver_for,
+    load_all_of,
+    open_analyser,
+    parse_instrument,
+)
 from daq.errors import ConfigurationError, LimitError, LinkError
 from daq.plan import SweepPlan
+from sim.instrument.plant import LinearPlant
+from sim.loopback import Loopback
+from sim.models import models
 
 ROOT = Path(daq.__file__).parents[1]
-INSTRUMENTS = ("daq.hp35670a",)
+INSTRUMENTS = ("daq.hp35670a", "daq.sr785", "sim.analyser35670a", "sim.sr785")
 """How modules of instruments begin."""
 
 
@@ -27,13 +38,47 @@ def imported(path):
             yield from (f"{node.module}.{name.name}" for name in node.names)
 
 
-def test_nobody_but_the_table_names_a_driver():
-    for floor in ("daq", "analysis", "tui"):
+def test_nobody_but_the_tables_names_an_instrument():
+    for floor in ("daq", "sim", "analysis", "tui"):
         for path in (ROOT / floor).rglob("*.py"):
-            if path.name == "drivers.py" or path.name.startswith("hp35670a"):
+            place = path.relative_to(ROOT).with_suffix("").as_posix().replace("/", ".")
+            if place == "daq.drivers" or place.startswith(INSTRUMENTS):
                 continue
             named = [name for name in imported(path) if name.startswith(INSTRUMENTS)]
             assert not named, f"{path} imports {named}"
+
+
+def test_every_driver_has_a_simulated_instrument_of_its_kind():
+    assert {model.scheme for model in models()} == {driver.scheme for driver in DRIVERS}
+    for driver in DRIVERS:
+        instrument = simulated(driver.scheme, LinearPlant(known_gain))
+        assert instrument.gpib_address == driver.gpib_address
+        analyser = driver.drive(Loopback(instrument))
+        assert analyser.identify().model in driver.models
+
+
+@pytest.mark.parametrize(
+    ("identity", "scheme"),
+    [
+        ("HEWLETT-PACKARD,35670A,3340A00123,A.01.11", ""),
+        ("Agilent Technologies,HP35670A,MY1,A.02.00", ""),
+        ("Stanford_Research_Systems,SR785,12345,105", "sr785"),
+        ("Stanford_Research_Systems, sr780 ,12345,2.4", "sr785"),
+        ("Stanford_Research_Systems,SR830,12345,1.07", None),
+        ("35670A", None),
+        ("", None),
+    ],
+)
+def test_an_instrument_is_known_by_its_identity(identity, scheme):
+    found = driver_for(identity)
+    assert (None if found is None else found.scheme) == scheme
+
+
+@pytest.mark.parametrize("driver", DRIVERS, ids=lambda driver: driver.scheme or "preset")
+def test_an_adapter_talks_to_the_address_that_the_instrument_comes_with(driver):
+    lead = f"{driver.scheme}:" if driver.scheme else ""
+    assert parse_instrument(f"{lead}prologix:COM3").gpib_address == driver.gpib_address
+    assert parse_instrument(f"{lead}prologix-tcp:host:1234?addr=3").gpib_address == 3
 
 
 def test_there_is_one_preset_and_no_scheme_twice():

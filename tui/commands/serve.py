@@ -104,7 +104,7 @@ def serve(
     # The first dwell may compile the engine, for longer than a client waits for a reply.
     servo.dwell(1000.0, 1.0, 0.0, 0, 1)
     servo.rest()
-    instrument = kind.build(servo, Bench(seed, noise, options, faults))
+    instrument = kind.build(servo, Bench(seed, noise, options=options, faults=faults))
     with Server(
         instrument,
         realtime=speed == "realtime",

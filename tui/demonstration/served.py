@@ -27,8 +27,7 @@ def served(unit: Unit, ratio: float, effect: EffectSetting, seed: int) -> Iterat
     LinkError
         If no port can be had.
     """
-    from sim.analyser35670a import Analyser35670A, Choices
-    from sim.faults import FaultBoard
+    from sim.models import Bench, model_of
     from sim.response import SteppedServo
     from sim.serve import Server
 
@@ -36,7 +35,7 @@ def served(unit: Unit, ratio: float, effect: EffectSetting, seed: int) -> Iterat
     # The first dwell may compile the engine, for longer than a client waits for a reply.
     servo.dwell(1000.0, 1.0, 0.0, 0, 1)
     servo.rest()
-    instrument = Analyser35670A(servo, Choices(seed=seed), FaultBoard([]))
+    instrument = model_of("").build(servo, Bench(seed=seed))
     with Server(instrument, realtime=False, tcp=0) as server:
         thread = threading.Thread(target=server.run, name="simulated analyser", daemon=True)
         thread.start()

@@ -1,0 +1,313 @@
+"""What a session may rely on from every driver, against the simulated instrument of each.
+
+A driver that is added is tested here without a line of its own.
+"""
+
+import math
+from contextlib import suppress
+
+import pytest
+from bench_server import simulated
+from fake_analyser import known_gain
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from session_runs import of
+
+from daq.analyser import PointSettings, SourceState
+from daq.control import SessionControl
+from daq.drivers import DRIVERS, check_sweep
+from daq.errors import InputError, LashbenchError, LimitError, MeasurementError
+from daq.frf import PointFlag
+from daq.limits import Limits
+from daq.plan import SweepPlan, spaced_frequencies
+from daq.session import Session
+from daq.session_events import PointStored
+from daq.session_request import SessionRequest
+from daq.store_records import MeasurementHeader
+from sim.instrument.plant import LinearPlant
+from sim.loopback import Loopback
+
+OFF = SourceState.CONFIRMED_OFF
+SETTINGS = PointSettings(source_vpk=1.5, settle_cycles=3, integrate_cycles=4, slew_vpk_per_s=0.0)
+GRID = spaced_frequencies(120.0, 160.0, 17)
+PLAN = SweepPlan(GRID, (1.0, 2.0), settle_cycles=3, integrate_cycles=4)
+
+every_driver = pytest.mark.parametrize(
+    "driver", DRIVERS, ids=lambda driver: driver.scheme or "preset"
+)
+
+
+def bench(driver, faults=(), gain=known_gain, **wanted):
+    """An instrument and its driver, prepared."""
+    instrument = simulated(driver.scheme, LinearPlant(gain), faults, **wanted)
+    analyser = driver.drive(Loopback(instrument))
+    return instrument, analyser
+
+
+def prepared(driver, faults=(), **changes):
+    instrument, analyser = bench(driver, faults)
+    analyser.identify()
+    analyser.prepare(100.0, 200.0, PointSettings(**(as_words(SETTINGS) | changes)))
+    return instrument, analyser
+
+
+def as_words(point_settings):
+    return {name: getattr(point_settings, name) for name in PointSettings.__slots__}
+
+
+def right(point, tolerance=1e-4):
+    true = known_gain(point.frequency_hz)
+    return abs(point.gain - true) <= tolerance * abs(true)
+
+
+@every_driver
+@pytest.mark.parametrize(
+    "frequencies",
+    [
+        GRID,
+        tuple(reversed(GRID)),
+        spaced_frequencies(110.0, 190.0, 12, "log"),
+        (150.0,),
+        (130.0, 131.0, 132.0),
+        (150.0, 120.5, 170.0, 121.0),
+    ],
+    ids=["up", "down", "log", "one", "few", "any"],
+)
+def test_points_come_in_the_order_asked_for_and_are_right(driver, frequencies):
+    instrument, analyser = prepared(driver)
+    points = list(analyser.sweep(frequencies))
+    assert len(points) == len(frequencies)
+    for point, asked_hz in zip(points, frequencies, strict=True):
+        assert abs(point.frequency_hz - asked_hz) <= max(1 / 64, 1e-4 * asked_hz)
+        assert right(point)
+        assert not point.flags & (PointFlag.OVERLOAD | PointFlag.SPOILT)
+    assert instrument.driven_v == 0.0
+    assert analyser.make_safe() is OFF
+
+
+@every_driver
+def test_errors_are_as_wide_as_readings_scatter(driver):
+    """30 readings each of one frequency: some 68 % of parts lie within one standard error."""
+    instrument, analyser = bench(driver, noise_v=3e-3, seed=5)
+    analyser.identify()
+    analyser.prepare(100.0, 200.0, PointSettings(1.0, 3, 30, slew_vpk_per_s=0.0))
+    points = [*analyser.sweep(spaced_frequencies(120.0, 160.0, 20))]
+    points += analyser.sweep((130.0, 150.0, 121.0, 133.3, 160.0, 141.0, 155.5, 128.0, 149.0, 139.0))
+    pulls = []
+    for point in points:
+        off = point.gain / known_gain(point.frequency_hz) - 1.0
+        pulls += [
+            20 / math.log(10) * off.real / point.gain_std_db,
+            math.degrees(off.imag) / point.phase_std_deg,
+        ]
+    spread = math.sqrt(sum(pull * pull for pull in pulls) / len(pulls))
+    # 60 parts: by chance outside of this one time in a thousand.
+    assert 0.7 < spread < 1.35
+
+
+@every_driver
+def test_nothing_drives_before_it_was_allowed(driver):
+    """Whoever is asked first may still say no, at any of the questions."""
+
+    class NotNow(Exception):
+        pass
+
+    for allowed in range(0, 40, 3):
+        instrument, analyser = prepared(driver)
+        asked = 0
+
+        def look(instrument=instrument, allowed=allowed):
+            nonlocal asked
+            asked += 1
+            if asked > allowed:
+                raise NotNow
+
+        assert instrument.driven_v == 0.0
+        analyser.on_wait = look
+        with suppress(NotNow):
+            list(analyser.sweep(GRID))
+        analyser.on_wait = None
+        assert analyser.make_safe() is OFF
+        assert instrument.driven_v == 0.0
+
+
+@every_driver
+def test_the_first_refusal_comes_before_the_first_volt(driver):
+    instrument, analyser = prepared(driver)
+    seen = []
+
+    def look():
+        seen.append(instrument.driven_v)
+        raise KeyboardInterrupt
+
+    analyser.on_wait = look
+    with pytest.raises(KeyboardInterrupt):
+        next(analyser.sweep(GRID))
+    assert seen == [0.0]
+
+
+@every_driver
+def test_leaving_a_sweep_early_stops_the_source(driver):
+    instrument, analyser = prepared(driver)
+    points = analyser.sweep(GRID)
+    next(points)
+    points.close()
+    assert instrument.driven_v == 0.0
+    assert analyser.make_safe() is OFF
+    with pytest.raises(MeasurementError, match="not set up"):
+        analyser.sweep(GRID)
+
+
+@every_driver
+@pytest.mark.parametrize("taken", [0, 5, 17])
+def test_somebody_else_can_make_it_safe_at_any_moment(driver, taken):
+    """As a watchdog does: over another wire, knowing nothing."""
+    instrument, analyser = prepared(driver)
+    points = analyser.sweep(GRID)
+    for _ in range(taken):
+        next(points)
+    other = driver.drive(Loopback(instrument))
+    assert other.make_safe() is OFF
+    assert instrument.driven_v == 0.0
+    assert other.source_state() is OFF
+    assert other.make_safe() is OFF
+    with suppress(LashbenchError):
+        list(points)
+    assert instrument.driven_v == 0.0
+
+
+@every_driver
+def test_what_cannot_be_read_is_unknown_and_never_raises(driver):
+    instrument, analyser = prepared(driver, ["dropped-connection:point=1"])
+    points = analyser.sweep(GRID)
+    with pytest.raises(LashbenchError):
+        next(points)
+    assert analyser.make_safe() is SourceState.UNKNOWN
+
+
+@every_driver
+@settings(max_examples=40)
+@given(
+    level=st.floats(),
+    offset=st.floats(),
+    slew=st.floats(),
+    span=st.tuples(st.floats(), st.floats()),
+    ranges=st.tuples(st.none() | st.floats(), st.none() | st.floats()),
+    cycles=st.tuples(st.integers(-5, 100000), st.integers(-5, 100000)),
+)
+def test_settings_are_refused_whole_or_taken_whole(
+    driver, level, offset, slew, span, ranges, cycles
+):
+    instrument, analyser = bench(driver)
+    analyser.identify()
+    wanted = PointSettings(level, *cycles, offset, slew, ranges)
+    told = "nothing was sent"
+    try:
+        analyser.prepare(*span, wanted)
+    except LimitError as error:
+        told = str(error)
+    assert "nothing was sent" in told
+    assert "\n" not in told
+    assert instrument.driven_v == 0.0
+
+
+@every_driver
+def test_a_sweep_that_cannot_be_set_is_refused_before_anything_is_opened(driver):
+    lead = f"{driver.scheme}:" if driver.scheme else ""
+    check_sweep(f"{lead}sim:", PLAN, 10.0, (None, None))
+    for plan, slew, ranges in (
+        (SweepPlan(GRID, (99.0,)), 10.0, (None, None)),
+        (SweepPlan((10.0, 3e5), (1.0,)), 10.0, (None, None)),
+        (PLAN, -1.0, (None, None)),
+        (PLAN, 10.0, (99.0, None)),
+        (SweepPlan(GRID, (1.0,), integrate_cycles=1_000_000), 10.0, (None, None)),
+    ):
+        with pytest.raises((LimitError, InputError)):
+            check_sweep(f"{lead}sim:", plan, slew, ranges)
+
+
+# ------------------------------------------------------------ sessions
+
+
+def request(driver, resume=None, **changes):
+    header = MeasurementHeader("ADSS", "7", PLAN, f"{driver.scheme}:", "lashbench test")
+    header = header if resume is None else None
+    return SessionRequest(header=header, limits=(Limits("bench"),), resume=resume, **changes)
+
+
+def run(session):
+    events, error = [], None
+    try:
+        events.extend(session.run())
+    except LashbenchError as fault:
+        error = fault
+    return events, error
+
+
+@every_driver
+def test_a_session_measures_all_points_with_the_source_off_in_the_end(driver, store):
+    instrument, analyser = bench(driver)
+    events, error = run(Session(analyser, store, request(driver)))
+    assert error is None
+    found = store.measurement(1)
+    assert (found.state, found.source_state, found.points) == ("complete", OFF, PLAN.points)
+    assert all(right(stored.point) for stored in store.points(1))
+    assert instrument.driven_v == 0.0
+    assert len(of(PointStored, events)) == PLAN.points
+
+
+@every_driver
+@pytest.mark.parametrize("after", [0, 1, 12, 20])
+def test_an_ended_session_is_gone_on_with(driver, store, after):
+    instrument, analyser = bench(driver)
+    control = SessionControl()
+    session = Session(analyser, store, request(driver), control)
+    told = []
+    for event in session.run():
+        told += of(PointStored, [event])
+        if len(told) >= after:
+            control.stop("enough")
+    assert instrument.driven_v == 0.0
+    assert store.measurement(1).source_state is OFF
+    kept = [stored.id for stored in store.points(1)]
+    assert kept == [event.stored.id for event in told]
+    _, error = run(Session(driver.drive(Loopback(instrument)), store, request(driver, resume=1)))
+    assert error is None
+    assert store.measurement(1).state == "complete"
+    assert [stored.id for stored in store.points(1)][: len(kept)] == kept
+    assert len(store.points(1)) == PLAN.points
+
+
+def shared_faults():
+    """Faults that instruments of all drivers know and that need no long wait."""
+    return (
+        "dropped-connection:point=15", "overload-burst:point=15", "lost-power:point=15,seconds=0",
+        "garbage-bytes:point=15", "truncated-block:point=15,times=0",
+    )  # fmt: skip
+
+
+@every_driver
+@pytest.mark.parametrize("fault", shared_faults())
+def test_a_fault_loses_nothing_and_leaves_nothing_on(driver, store, fault):
+    instrument, analyser = bench(driver, [fault])
+
+    def reopen():
+        return driver.drive(Loopback(instrument))
+
+    events, error = run(Session(analyser, store, request(driver), reopen=reopen))
+    assert sum(fault.struck for fault in instrument.faults.faults) > 0
+    told = [event.stored for event in of(PointStored, events)]
+    assert store.points(1) == told
+    spoilt = PointFlag.OVERLOAD | PointFlag.SPOILT
+    assert all(right(stored.point) or stored.point.flags & spoilt for stored in told)
+    assert instrument.driven_v == 0.0
+    assert store.measurement(1).source_state is OFF
+    if fault.startswith("overload"):
+        assert error is None
+        assert any(stored.point.flags & PointFlag.OVERLOAD for stored in told)
+        return
+    assert error is not None or len(told) == PLAN.points
+    instrument.faults.disarm()
+    _, error = run(Session(reopen(), store, request(driver, resume=1)))
+    assert error is None
+    assert store.measurement(1).state == "complete"
