@@ -22,7 +22,7 @@ __all__ = [
     "sample_path",
 ]
 
-Kind = Literal["units", "benches", "recipes", "paper", "templates"]
+Kind = Literal["units", "benches", "recipes", "paper", "templates", "profiles"]
 
 
 def _root() -> Path:

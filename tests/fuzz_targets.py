@@ -20,13 +20,15 @@ from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from foreign_files import dtt_xml, files, universal_58, universal_58b
 from responses import measured
 from sdf_files import File
 from wire import MemoryLink, TinyAdapter
 
 from daq.configs import config_path
 from daq.errors import BenchTimeout, InputError, LashbenchError, LinkError, ProtocolError
-from daq.formats import hdf5, read_response, record, sdf, write_response
+from daq.formats import Reading, hdf5, read_response, record, sdf, write_response
+from daq.formats.foreign import dtt
 from daq.limits import load_bench
 from daq.recipe import load_recipe
 from daq.scpi import decode_reals, parse_error, parse_integer, parse_number, parse_string
@@ -70,6 +72,10 @@ def _targets(folder: Path) -> dict[str, Target]:
         "csv": file("x.csv", read_response),
         "hdf5": file("x.h5", hdf5.read),
         "uff": file("x.uff", read_response),
+        "foreign-uff": file("x.unv", lambda path: read_response(path, Reading(function="1"))),
+        "text": file("x.txt", read_response),
+        "guess": file("x.asc", lambda path: read_response(path, Reading(as_guessed=True))),
+        "dtt": file("x.xml", dtt.read),
         "mat": lambda data: read_file(folder / "x.mat", with_its_digest(data), read_response),
         "sdf": file("x.sdf", sdf.read),
         "unit": file("unit.toml", lambda path: load_unit(str(path))),
@@ -94,6 +100,12 @@ def seeds(name: str) -> list[bytes]:
             path = Path(folder) / f"x{suffix}"
             write_response(measured(flags=None), path)
             return [path.read_bytes()]
+    if name in ("text", "guess"):
+        return [_head(file.content) for file in files()]
+    if name == "dtt":
+        return [dtt_xml(listed) for listed in (True, False)]
+    if name == "foreign-uff":
+        return [universal_58(), universal_58b()]
     if name in ("unit", "bench", "recipe"):
         kind: Any = {"unit": "units", "bench": "benches", "recipe": "recipes"}[name]
         return [config_path(kind, "default" if name == "bench" else "adss").read_bytes()]
@@ -139,6 +151,11 @@ def read_file(path: Path, data: bytes, read: Callable[[Path], Any]) -> None:
         told = str(error)
         if "\n" in told or str(path) not in told:
             raise AssertionError(f"a refusal that is no line naming the file: {told!r}") from error
+
+
+def _head(content: bytes) -> bytes:
+    """The first lines of a table, which are as good as all; UTF-16 stays whole."""
+    return content if content[:1] == b"\xff" else b"\n".join(content.split(b"\n")[:40])
 
 
 def with_its_digest(data: bytes) -> bytes:

@@ -1,7 +1,7 @@
 """Where a user's own files lie, by the XDG convention.
 
-Owns the places of history, cache and log; the environment variables
-XDG_DATA_HOME, XDG_CACHE_HOME and XDG_STATE_HOME move them. Nothing is made
+Owns the places of history, profiles, cache and log; the environment variables
+XDG_DATA_HOME, XDG_CACHE_HOME, XDG_CONFIG_HOME and XDG_STATE_HOME move them. Nothing is made
 before it is needed.
 """
 
@@ -12,7 +12,7 @@ from pathlib import Path
 
 from daq.errors import InputError
 
-__all__ = ["cache_folder", "look_at_caches", "history_path", "log_path"]
+__all__ = ["cache_folder", "look_at_caches", "history_path", "log_path", "profiles_folder"]
 
 
 def history_path(given: Path | None, *, create: bool = False) -> Path:
@@ -43,6 +43,13 @@ def history_path(given: Path | None, *, create: bool = False) -> Path:
                 f"{folder}: cannot be made ({error.strerror or error}); give --db FILE"
             ) from error
     return folder / "lashbench.db"
+
+
+def profiles_folder() -> Path:
+    """Where a user's own profiles of foreign files are kept; it may not be there yet."""
+    from platformdirs import user_config_path
+
+    return user_config_path("lashbench", appauthor=False) / "profiles"
 
 
 def cache_folder() -> Path:

@@ -23,7 +23,15 @@ if TYPE_CHECKING:
     from daq.formats.reading import Reading
     from daq.frf import FrequencyResponse
 
-__all__ = ["NO_LAYOUT", "NO_OPTIONS", "LayoutOptions", "ReadingOptions", "read_file", "read_files"]
+__all__ = [
+    "NO_LAYOUT",
+    "NO_OPTIONS",
+    "LayoutOptions",
+    "ReadingOptions",
+    "read_file",
+    "read_files",
+    "tell_remarks",
+]
 
 _GROUP = Group("What a file does not say")
 _PEAK = {"": 1.0, "vpk": 1.0, "vp": 1.0, "vrms": math.sqrt(2.0), "vpp": 0.5}
@@ -101,7 +109,7 @@ class ReadingOptions(LayoutOptions):
             integrate_cycles=self.integrate_cycles,
             averages=self.averages,
             function=self.function,
-            profile=self.profile,
+            profile=own_profile(self.profile),
             columns=named_columns(self.column or ()),
             as_guessed=self.as_guessed,
         )
@@ -158,12 +166,32 @@ def named_columns(settings: Sequence[str]) -> tuple[tuple[str, str], ...]:
 def read_file(path: str | Path, options: ReadingOptions, console: Console) -> FrequencyResponse:
     """Read a response, and tell what its reader left out or took for granted."""
     from daq.formats import read_response
-    from daq.formats.reading import remarks_of
 
     response = read_response(path, options.reading())
-    for text in remarks_of(response):
-        console.note(f"{path}: {text}")
+    tell_remarks(path, response, console)
     return response
+
+
+def tell_remarks(path: str | Path, response: FrequencyResponse, console: Console) -> None:
+    """Tell what the reader of a file left out or took for granted."""
+    from daq.formats.reading import remarks_of
+
+    name = Path(path).name
+    here = response.provenance.get("file", name) == name
+    for text in remarks_of(response):
+        # What was remarked of a file that this one was made of has been told.
+        if here or f"of {name} " in text:
+            console.note(f"{path}: {text}")
+
+
+def own_profile(name: str | None) -> str | None:
+    """The path of a profile of the user's own, where there is one of a name; else the name."""
+    from tui.places import profiles_folder
+
+    if name is None or "/" in name:
+        return name
+    path = profiles_folder() / f"{name}.toml"
+    return str(path) if path.is_file() else name
 
 
 def read_files(

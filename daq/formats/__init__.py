@@ -12,11 +12,15 @@ from __future__ import annotations
 import os
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from daq.errors import FileFormatError, InputError
 from daq.formats.believable import disbelief
 from daq.formats.reading import NOTHING_TOLD, Reading
 from daq.frf import FrequencyResponse
+
+if TYPE_CHECKING:
+    from daq.formats.foreign.text import Layout
 
 __all__ = [
     "READABLE",
@@ -24,6 +28,7 @@ __all__ = [
     "NOTHING_TOLD",
     "Reading",
     "check_writable",
+    "foreign_layout",
     "read_response",
     "write_response",
 ]
@@ -37,14 +42,24 @@ READABLE = {
     ".mat": "daq.formats.mat",
     ".sdf": "daq.formats.sdf",
     ".dat": "daq.formats.sdf",
+    ".txt": "daq.formats.foreign.text",
+    ".tsv": "daq.formats.foreign.text",
+    ".asc": "daq.formats.foreign.text",
+    ".prn": "daq.formats.foreign.text",
+    ".frd": "daq.formats.foreign.text",
+    ".xml": "daq.formats.foreign.dtt",
 }
 """Module that reads files of each suffix."""
 
-_BINARY = frozenset({"daq.formats.hdf5", "daq.formats.mat", "daq.formats.sdf"})
+_BINARY = frozenset(
+    {"daq.formats.hdf5", "daq.formats.mat", "daq.formats.sdf", "daq.formats.foreign.dtt"}
+)
 """Modules whose files are read in a child process: a damaged one can end the process."""
 
-WRITABLE = {suffix: module for suffix, module in READABLE.items() if module != "daq.formats.sdf"}
-"""Module that writes files of each suffix; SDF is the analyser's own and only read."""
+WRITABLE = {suffix: READABLE[suffix] for suffix in (".csv", ".h5", ".hdf5", ".uff", ".unv", ".mat")}
+"""Module that writes files of each suffix; the others belong to other programs."""
+_TEXT = "daq.formats.foreign.text"
+_SDF_MARK = b"B\x00"
 
 
 def read_response(path: str | Path, reading: Reading = NOTHING_TOLD) -> FrequencyResponse:
@@ -69,7 +84,7 @@ def read_response(path: str | Path, reading: Reading = NOTHING_TOLD) -> Frequenc
         the file states otherwise or has no use for.
     """
     path = Path(path)
-    response = reading.completed(_read(_module(path, READABLE, "read"), path, reading), path)
+    response = reading.completed(_read(_reader(path, reading), path, reading), path)
     try:
         found = disbelief("dc_offset_v", [response.dc_offset_v])
     except InputError as error:
@@ -79,6 +94,35 @@ def read_response(path: str | Path, reading: Reading = NOTHING_TOLD) -> Frequenc
     return response
 
 
+def foreign_layout(path: str | Path, reading: Reading = NOTHING_TOLD) -> Layout | None:
+    """How a text of another program is laid out, guesses included; None for any other file.
+
+    Raises
+    ------
+    FileFormatError, InputError
+        As `read_response`, but for a layout that could only be guessed.
+    """
+    path = Path(path)
+    if _reader(path, reading) != _TEXT:
+        return None
+    from daq.formats.foreign.text import layout_of
+
+    return layout_of(path, reading)
+
+
+def _reader(path: Path, reading: Reading) -> str:
+    """The module that reads a file: by its suffix, and by what it holds where that leaves two."""
+    module = _module(path, READABLE, "read")
+    if module == "daq.formats.csv":
+        from daq.formats.csv_text import is_ours
+
+        foreign = reading.profile or reading.columns or reading.as_guessed or not is_ours(path)
+        return _TEXT if foreign else module
+    if path.suffix.lower() == ".dat" and _is_text(path):
+        return _TEXT
+    return module
+
+
 def _read(module: str, path: Path, reading: Reading) -> FrequencyResponse:
     if module in _BINARY:
         from daq.formats.apart import read_apart
@@ -86,6 +130,16 @@ def _read(module: str, path: Path, reading: Reading) -> FrequencyResponse:
         return read_apart(module, path, reading)
     response: FrequencyResponse = import_module(module).read(path, reading)
     return response
+
+
+def _is_text(path: Path) -> bool:
+    """Whether a file whose suffix may mean either is a table as text, not the analyser's own."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(512)
+    except OSError:
+        return False
+    return not head.startswith(_SDF_MARK) and b"\x00" not in head.strip(b"\x00") and bool(head)
 
 
 def write_response(response: FrequencyResponse, path: str | Path) -> None:

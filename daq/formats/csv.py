@@ -72,7 +72,7 @@ def read(path: Path, reading: Reading = NOTHING_TOLD) -> FrequencyResponse:
     """
     reading.refuse_unused(path, (), "a CSV of lashbench's own form")
     table = parsed(text_of(path), path)
-    procedure = procedure_of(table)
+    procedure = procedure_of(table, reading.unit_name)
     check_values(table)
     check_order(table, procedure["direction"])
     phase = table["phase_deg"]

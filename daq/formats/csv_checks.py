@@ -26,12 +26,14 @@ _REPEATED = (
 )
 
 
-def procedure_of(table: Table) -> dict[str, Any]:
-    """Fields of the response that the comments fill, checked."""
+def procedure_of(table: Table, unit_name: str | None = None) -> dict[str, Any]:
+    """Fields of the response that the comments fill, checked; a name of the unit may be told."""
     comments, path = table.comments, table.path
-    if "unit" not in comments:
-        raise FileFormatError(f'{path}: no comment names the unit; add a line # unit = "NAME"')
-    unit, sweep = comments["unit"], comments.get("sweep")
+    if "unit" not in comments and not unit_name:
+        raise FileFormatError(
+            f'{path}: no comment names the unit; add a line # unit = "NAME", or give --unit-name'
+        )
+    unit, sweep = comments.get("unit", unit_name), comments.get("sweep")
     if not isinstance(unit, str) or not unit:
         raise FileFormatError(f"{path}: unit {unit!r} is not a name in quotes")
     if sweep not in (None, "up", "down"):

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from daq.bounded_text import parse_toml, read_bytes
 from daq.errors import FileFormatError
 
-__all__ = ["COLUMNS", "Table", "parsed", "text_of"]
+__all__ = ["COLUMNS", "Table", "is_ours", "parsed", "text_of"]
 
 COLUMNS = ("frequency_hz", "source_vpk", "gain_db", "phase_deg", "gain_std_db")
 """The header, in this order."""
@@ -29,6 +29,10 @@ COLUMNS = ("frequency_hz", "source_vpk", "gain_db", "phase_deg", "gain_std_db")
 _LIMIT_BYTES = 64 << 20
 """Size above which a file is not read; a million readings have less."""
 
+_HEAD_BYTES = 1 << 16
+_KEY = re.compile(
+    r"^#\s*(unit|sweep|settle_cycles|integrate_cycles|from_rest|gain_std_is|kind)\s*=", re.MULTILINE
+)
 _MAY_BE_EMPTY = ("phase_deg", "gain_std_db")
 _PLAIN = re.compile(r"[0-9+\-.eE, \r]*\Z")
 """Characters of which Python makes no number but one that `_NUMBER` is, too."""
@@ -48,6 +52,24 @@ class Table:
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         return self.columns[:, COLUMNS.index(name)]
+
+
+def is_ours(path: Path) -> bool:
+    """Whether a file has a comment key or three columns of this format, or cannot be read at all.
+
+    What is no text in UTF-8 is not: another program wrote it.
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(_HEAD_BYTES)
+    except (OSError, ValueError):
+        return True
+    text = head.decode("utf-8-sig", "replace")
+    if not text.strip() or _KEY.search(text):
+        return True
+    lines = (line.strip() for line in text.split("\n"))
+    header = next((line for line in lines if line and not line.startswith("#")), "")
+    return not header or len({name.strip() for name in header.split(",")} & set(COLUMNS)) > 2
 
 
 def parsed(text: str, path: Path) -> Table:

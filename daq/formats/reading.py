@@ -54,10 +54,10 @@ class Reading:
     function
         Which function of a file that holds several: number, name or degrees of freedom.
     profile
-        How a text of another program is laid out: a name of `daq.formats.text`, or a path.
+        How a text of another program is laid out: a name of `configs/profiles`, or a path.
     columns
         Pairs (quantity, column) that say which column of a foreign file holds what, see
-        `daq.formats.quantities`; they come before what profile and header say.
+        `daq.formats.foreign.quantities`; they come before what profile and header say.
     as_guessed
         Take the layout of a text as it is guessed where neither header nor profile says it.
     """

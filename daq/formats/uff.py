@@ -22,10 +22,11 @@ from numpy.typing import NDArray
 from daq.bounded_text import parse_json
 from daq.errors import FileFormatError
 from daq.formats.atomic import write_text
+from daq.formats.foreign.choosing import foreign_response
+from daq.formats.foreign.functions import RESPONSE, Function
+from daq.formats.foreign.uff_sets import function_of, split_sets
 from daq.formats.reading import NOTHING_TOLD, Reading
 from daq.formats.record import ARRAYS, checked_file, response_from, taken_apart
-from daq.formats.uff_foreign import foreign_response
-from daq.formats.uff_functions import RESPONSE, Function, function_of, split_sets
 from daq.formats.uff_sets import GENERAL, function, private, private_text
 from daq.frf import FrequencyResponse
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.errors import FileFormatError
-from daq.formats.uff_functions import DataSet
+from daq.formats.foreign.uff_sets import DataSet
 
 __all__ = ["GENERAL", "function", "private", "private_text"]
 

@@ -36,6 +36,10 @@ SHARES = {
     "csv": 8,
     "hdf5": 6,
     "uff": 6,
+    "text": 5,
+    "guess": 5,
+    "dtt": 3,
+    "foreign-uff": 5,
     "mat": 0.1,
     "sdf": 7,
     "unit": 7,
@@ -51,7 +55,7 @@ SHARES = {
     "adapter": 4,
 }
 """Of the runs, by target, per cent; a MATLAB file takes a child process each."""
-_INSTRUMENTED = ["daq", "sim", "pyuff", "sdfascii", "tomllib"]
+_INSTRUMENTED = ["daq", "sim", "sdfascii", "tomllib"]
 
 
 @dataclass(frozen=True)

@@ -208,7 +208,7 @@ def test_a_file_that_names_no_kind_counts_as_measured(tmp_path):
     [
         ("", "empty"),
         ("  \n \n", "empty"),
-        (b"\x00\x01\x02" * 50, "zero bytes"),
+        (b"\x00\x01\x02" * 50, "is not text"),
         (b"\x89PNG\r\n\x1a\n\xff\xfe", "not text"),
         ('# unit = "ADSS"\n', "no header"),
         ('# unit = "ADSS"\n' + HEADER, "no rows"),

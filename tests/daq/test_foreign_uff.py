@@ -5,24 +5,13 @@ import math
 import numpy as np
 import pytest
 import pyuff
+from foreign_files import GAIN, HERTZ, binary_58, gain_at, interleaved, text_58
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from daq.errors import FileFormatError, InputError
 from daq.formats import Reading, read_response
 from daq.formats.reading import remarks_of
-
-HERTZ = 20.0 + 0.5 * np.arange(181)
-
-
-def gain_at(hertz):
-    """A linear pair: anti-resonance at 40 Hz, resonance at 70 Hz."""
-    s = 1j * hertz
-    zero = s**2 + 2 * 0.03 * 40 * s + 40**2
-    return 0.5 * zero / (s**2 + 2 * 0.05 * 70 * s + 70**2)
-
-
-GAIN = gain_at(HERTZ)
 
 
 def written(path, **changes):
@@ -34,45 +23,6 @@ def written(path, **changes):
         "x": HERTZ, "data": GAIN,
     }  # fmt: skip
     pyuff.UFF(str(path)).write_sets(known | changes, "add")
-
-
-def text_58(numbers, form, even, points=None, abscissa="Hz", ordinate="NONE", third=(0, "", 0.0)):
-    """A data set 58 in single precision, line by line as the format says."""
-    cells = [f"{value:13.5E}" for value in numbers]
-    rows = ["".join(cells[start : start + 6]) for start in range(0, len(cells), 6)]
-    points = points or len(numbers)
-    return "\n".join(
-        [
-            "    -1", "    58", *["test", "NONE", "NONE", "NONE", "NONE"],
-            "    4         0    0         0       load        12  -3       motr         7   1",
-            f"{form:10d}{points:10d}{int(even):10d}{20:13.5E}{0.5:13.5E}{third[2]:13.5E}",
-            f"{18:10d}    0    0    0 {'Frequency':<20} {abscissa:<20}",
-            f"{0:10d}    0    0    0 {'NONE':<20} {ordinate:<20}",
-            f"{0:10d}    0    0    0 {'NONE':<20} {'NONE':<20}",
-            f"{third[0]:10d}    0    0    0 {'NONE':<20} {third[1] or 'NONE':<20}",
-            *rows, "    -1", "",
-        ]
-    )  # fmt: skip
-
-
-def interleaved(gain=GAIN, hertz=None):
-    parts = [gain.real, gain.imag] if hertz is None else [hertz, gain.real, gain.imag]
-    return np.column_stack(parts).reshape(-1)
-
-
-def binary_58(gain=GAIN, hertz=None, double=True, order="<", stated=None):
-    """A data set 58b, whose closing -1 stands right behind the data."""
-    fields = [] if hertz is None else [("x", f"{order}f4")]
-    fields += [(part, f"{order}f{8 if double else 4}") for part in ("re", "im")]
-    table = np.zeros(len(gain), fields)
-    table["re"], table["im"] = gain.real, gain.imag
-    if hertz is not None:
-        table["x"] = hertz
-    data = table.tobytes()
-    head = text_58([], 6 if double else 5, hertz is None, points=len(gain)).encode()
-    first = f"    58b{1 if order == '<' else 2:6d}     2          11"
-    first += f"{len(data) if stated is None else stated:12d}     0     0           0           0\n"
-    return head[:-7].replace(b"    58\n", first.encode()) + data + b"    -1\n"
 
 
 @pytest.mark.parametrize("hertz", [None, HERTZ])

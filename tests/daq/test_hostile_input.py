@@ -8,6 +8,7 @@ import tracemalloc
 from pathlib import Path
 
 import pytest
+from foreign_files import dtt_xml, universal_58
 from fuzz_targets import seeds, targets
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -24,6 +25,7 @@ APART = ("mat",)
 NAMES = (
     "csv", "hdf5", "uff", "mat", "sdf", "unit", "bench", "recipe", "transcript", "history",
     "block", "replies", "address", "prologix", "analyser", "adapter",
+    "text", "guess", "dtt", "foreign-uff",
 )  # fmt: skip
 DEEP, BIG = b"[" * 100_000, b"9" * 5000
 TOML = (
@@ -32,7 +34,29 @@ TOML = (
     b"a = {a" + b".a" * 500_000 + b" = 1}", b'\\"' * 400_000, b'"a=".' * 100_000 + b"a = 1",
 )  # fmt: skip
 JSON = (DEEP, b'{"a":' * 100_000, b'{"act": "poll", "gave": ' + BIG + b"}", b"[" * 40 + b"]" * 40)
+TABLES = [
+    mark * 300_000 + b"\n1,2,3\n2,3,4\n"
+    for mark in (b"x", b"(", b"1", b"1,", b'"', b"[a ", b"a (", b"\t", b" ", b"+1e5", b"dB(1dB,")
+] + [
+    b"f\tx\n" + b"(1dB,2" * 50_000,
+    b"1\t" + b"1.1e+1," * 50_000,
+    b"1 2\n" * 200_000,
+    b"%a\n" * 200_000,
+]
 HOSTILE = {
+    "text": TABLES,
+    "guess": TABLES,
+    "foreign-uff": [
+        b"    -1\n" * 100_000,
+        b"    -1\n    58\n" + b"x\n" * 200_000,
+        b"    -1\n    58b     1     2          11  2000000000\n" + b"x\n" * 20,
+        universal_58().replace(b"       181", b"   3999999"),
+    ],
+    "dtt": [
+        b"<LIGO_LW>" * 20_000,
+        b"<LIGO_LW " + b"a='1' " * 100_000,
+        dtt_xml().replace(b">181<", b">3999999<"),
+    ],
     "csv": [b"# " + line for line in TOML] + [b"x" * 1_000_000],
     "unit": TOML,
     "bench": TOML,

@@ -1,7 +1,7 @@
-"""A frequency response out of the functions that another program put into a universal file.
+"""A frequency response out of the functions that another program put into a file.
 
 Owns which functions are taken, what their axes say, and what is refused because they do not say
-it. The functions are those of `daq.formats.uff_functions`.
+it. The functions are those of `daq.formats.foreign.functions`.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.errors import FileFormatError
-from daq.formats.quantities import Columns, checked_quantity, response_of
+from daq.formats.foreign.functions import COHERENCE, RESPONSE, Axis, Function
+from daq.formats.foreign.quantities import Columns, checked_quantity, response_of
+from daq.formats.foreign.unit_words import frequency_in, gain_in, level_in, phase_in
 from daq.formats.reading import Reading, remarked
 from daq.formats.record import ROW_LIMIT
-from daq.formats.uff_functions import COHERENCE, RESPONSE, Axis, Function
-from daq.formats.unit_words import frequency_in, gain_in, level_in, phase_in
 from daq.frf import FrequencyResponse
 
 __all__ = ["foreign_response"]

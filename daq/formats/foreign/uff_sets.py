@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.errors import FileFormatError
+from daq.formats.foreign.functions import Axis, Function
 
-__all__ = ["COHERENCE", "RESPONSE", "Axis", "DataSet", "Function", "function_of", "split_sets"]
-
-RESPONSE, COHERENCE = 4, 6
-"""Function types: frequency response, and coherence."""
+__all__ = ["DataSet", "function_of", "split_sets"]
 
 _HEAD_LINES = 11
 _MOST_POINTS = 4_000_000
@@ -45,15 +43,6 @@ _LAYOUT = {
 
 
 @dataclass(frozen=True, slots=True)
-class Axis:
-    """What an axis holds: the format's number of the quantity, and its label and unit as text."""
-
-    kind: int = 0
-    label: str = ""
-    unit: str = ""
-
-
-@dataclass(frozen=True, slots=True)
 class DataSet:
     """A data set: its number, the rest of its first line, and what follows up to its end."""
 
@@ -61,35 +50,6 @@ class DataSet:
     head: str
     lines: tuple[bytes, ...]
     binary: bytes | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Function:
-    """One function. `number` counts the functions of the file from 1."""
-
-    number: int
-    kind: int
-    titles: tuple[str, ...]
-    response: str
-    reference: str
-    names: tuple[str, str]
-    abscissa: Axis
-    ordinate: Axis
-    denominator: Axis
-    third: Axis
-    third_value: float
-    x: NDArray[np.float64] = field(repr=False)
-    values: NDArray[Any] = field(repr=False)
-
-    @property
-    def degrees_of_freedom(self) -> str:
-        """Response over reference, such as ``1:+X/2:+Z``."""
-        return f"{self.response}/{self.reference}"
-
-    @property
-    def title(self) -> str:
-        """The first line of description that says something."""
-        return next((title for title in self.titles if title not in ("", "NONE")), "")
 
 
 def split_sets(content: bytes, path: Path) -> list[DataSet]:
