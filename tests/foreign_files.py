@@ -168,8 +168,9 @@ def files() -> Iterable[ForeignFile]:
          ";Scopy version,v1.4\n;Tool,Network Analyzer\n"
          "Frequency(Hz),Amplitude(dB),Phase(°)\n" + rows(HERTZ, DB, DEG), NOTHING_TOLD),
         ("FRA4PicoScope", "fra4pico.csv",
-         "Frequency (Log Hz), Gain (dB), Phase (deg)\n" + rows(HERTZ, DB, DEG),
-         told(("frequency_hz", "1"))),
+         "Frequency Log(Hz), Gain (dB), Phase (deg)\n"
+            + rows(np.log10(HERTZ), DB, DEG, form="{:.12g}"),
+         told(("frequency_log10_hz", "1"))),
         ("Ono Sokki, kHz", "kilo.csv", "Freq (kHz),Mag (dB),Phase (deg)\n"
          + rows(HERTZ / 1e3, DB, DEG, form="{:.12g}"), NOTHING_TOLD),
     ]  # fmt: skip

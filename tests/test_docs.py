@@ -74,6 +74,7 @@ def test_everything_that_a_page_prints_can_be_run(page, history, tmp_path, monke
     if not printed:
         return
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
     (tmp_path / "data" / "lashbench").mkdir(parents=True)
     if any("--resume 12" in text for _, text in printed):
         shutil.copy(history, tmp_path / "data" / "lashbench")

@@ -1,5 +1,7 @@
 """Tables of other programs: read by header, profile or option, or refused with the options."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from foreign_files import DB, DEG, GAIN, HERTZ, dtt_xml, files, rows, told
@@ -34,8 +36,11 @@ def test_a_file_of_a_program_is_read_rightly_or_says_what_to_tell(file, tmp_path
     assert any("as frequency_" in text for text in remarks_of(response))
 
 
-def test_there_are_files_of_many_programs():
+def test_the_page_of_tried_files_names_each_program():
+    page = (Path(__file__).parents[2] / "docs" / "foreign-files.md").read_text()
     assert len(FILES) >= 30
+    for file in FILES:
+        assert f"| {file.program} |" in page
 
 
 def test_every_profile_is_of_some_use():

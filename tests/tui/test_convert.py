@@ -1,11 +1,18 @@
 """`lashbench convert`, and the options that say what a file does not say."""
 
 import json
+import os
+import pty
+import shlex
+import subprocess
+import sys
+from contextlib import suppress
 from itertools import permutations
 from pathlib import Path
 
 import numpy as np
 import pytest
+from foreign_files import DB, DEG, GAIN, HERTZ, rows
 from responses import measured, same
 
 from daq.configs import sample_path
@@ -88,3 +95,77 @@ def test_rows_at_0_hz_of_any_format_are_left_out_and_said(tmp_path, capsys):
     assert "the row at 0 Hz of x.csv left out" in told.err
     assert main(["extract", str(sample_path("adss-sweep")), "--json"]) == 0
     assert capsys.readouterr().out == told.out
+
+
+@pytest.fixture
+def guessed(tmp_path):
+    """A table whose header names no units."""
+    path = tmp_path / "x.txt"
+    path.write_text("freq Gain Phase\n" + rows(HERTZ, DB, DEG, mark=" "))
+    return path
+
+
+def test_without_an_output_a_file_is_shown_as_it_would_be_read(guessed, tmp_path, capsys):
+    before = sorted(tmp_path.iterdir())
+    assert main(["convert", str(guessed)]) == 0
+    told = capsys.readouterr()
+    assert "gain_db (guessed)" in told.out
+    assert "source level not known: give --level" in told.out
+    assert max(len(line) for line in told.out.replace(str(guessed), "x").splitlines()) <= 80
+    pasted = told.err.split("if that is right: ")[1].splitlines()[0]
+    out = tmp_path / "y.h5"
+    assert main(shlex.split(pasted.replace("OUT", str(out)))[1:]) == 0
+    np.testing.assert_allclose(read_response(out).gain, GAIN, rtol=1e-6)
+    out.unlink()
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_a_guess_is_written_only_where_a_person_confirms_it(guessed, tmp_path, capsys):
+    out = tmp_path / "y.h5"
+    assert main(["convert", str(guessed), str(out)]) == 2
+    assert "--as-guessed" in capsys.readouterr().err
+    assert not out.exists()
+    for answer, code in ((b"n\n", 2), (b"\n", 2), (b"y\n", 0)):
+        assert typed(["convert", str(guessed), str(out)], answer) == code
+        assert out.exists() == (code == 0)
+
+
+def typed(words, answer: bytes) -> int:
+    """The exit code of a command on a terminal, whose question is answered."""
+    here, there = pty.openpty()
+    command = [sys.executable, "-m", "tui.cli", *words]
+    with subprocess.Popen(command, stdin=there, stdout=there, stderr=there) as child:
+        os.close(there)
+        said = b""
+        while b"[y/N]" not in said:
+            said += os.read(here, 4096)
+        os.write(here, answer)
+        with suppress(OSError):
+            while os.read(here, 4096):
+                pass
+    os.close(here)
+    return child.returncode
+
+
+def test_a_layout_is_kept_as_a_profile_of_ones_own(guessed, tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    columns = ["--column", "frequency_hz=freq", "--column", "gain_db=2", "--column", "phase_deg=3"]
+    words = ["convert", str(guessed), str(tmp_path / "y.h5"), *columns]
+    assert main([*words, "--save-profile", "Not Good"]) == 2
+    assert main([*words, "--save-profile", "mine"]) == 0
+    assert main(["convert", str(guessed), str(tmp_path / "z.h5"), "--profile", "mine"]) == 0
+    np.testing.assert_array_equal(
+        read_response(tmp_path / "z.h5").gain, read_response(tmp_path / "y.h5").gain
+    )
+    assert main(["extract", str(guessed), "--profile", "mine", "--level", "2", "--json"]) == 0
+    assert main(["convert", str(tmp_path / "y.h5"), "--save-profile", "mine"]) == 2
+    capsys.readouterr()
+
+
+def test_what_was_remarked_of_the_original_is_told_once(guessed, tmp_path, capsys):
+    out = tmp_path / "y.csv"
+    words = ["--as-guessed", "--level", "1", "--unit-name", "ADSS"]
+    assert main(["convert", str(guessed), str(out), *words]) == 0
+    assert "read: column 1 'freq' as frequency_hz" in capsys.readouterr().err
+    assert main(["extract", str(out)]) == 0
+    assert "column 1" not in capsys.readouterr().err

@@ -48,7 +48,7 @@ def convert(
     out
         File to write: csv, h5, uff or mat by its suffix. If left out, only what is read is shown.
     save_profile
-        Keep how the table is laid out under this name, for --profile.
+        Keep the layout of the table as a profile of this name.
     """
     from daq.formats import check_writable, foreign_layout, read_response, write_response
     from daq.formats.foreign.profiles import profile_path

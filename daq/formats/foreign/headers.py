@@ -51,6 +51,7 @@ _WORDS = (
     ),
 )
 """Words of a header, and the kind of column that they mean; the first that is there counts."""
+_LOGARITHM = frozenset(("log", "log10", "lg"))
 _ANGULAR = frozenset(("omega", "ω", "w"))
 
 
@@ -72,6 +73,8 @@ def meaning_of(header: str) -> Meaning:
         return Meaning(_kind_of(plain.lower()), plain.lower())
     name, unit = _parted(plain)
     kind = _kind(name)
+    if kind == "frequency" and _words(name) & _LOGARITHM:
+        return Meaning(kind)
     if kind:
         return Meaning(kind, _quantity(kind, unit))
     quantity = _by_unit(unit)
@@ -93,6 +96,9 @@ def settled_unit(kind: str, header: str, values: NDArray[Any]) -> str | None:
         return f"gain_{kind}"
     if name and not _kind(name):
         return _by_unit(unit)
+    if kind == "frequency" and _words(f"{name} {unit}") & _LOGARITHM:
+        small = bool(known.size) and float(np.max(known)) < 10.0
+        return "frequency_log10_hz" if small else "frequency_hz"
     if unit and plain_unit(unit) not in ("", "-"):
         return None
     if kind == "frequency":

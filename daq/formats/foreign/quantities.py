@@ -30,6 +30,7 @@ _FREQUENCY = {
     "frequency_rad_s": 0.5 / math.pi,
     "frequency_rpm": 1.0 / 60.0,
 }
+_LOGARITHM = "frequency_log10_hz"
 _VOLTS = {"vpk": 1.0, "vrms": _RMS, "vpp": 0.5}
 _SOURCE = {f"source_{unit}": factor for unit, factor in _VOLTS.items()}
 _INPUT = {f"input_{unit}": factor for unit, factor in _VOLTS.items()}
@@ -42,6 +43,7 @@ QUANTITIES: Mapping[str, str] = {
     "frequency_khz": "frequency, kHz",
     "frequency_rad_s": "frequency, rad/s",
     "frequency_rpm": "frequency, revolutions a minute",
+    "frequency_log10_hz": "frequency, decimal logarithm of Hz",
     "gain_db": "magnitude, 20 log10 |V_o/V_i|",
     "gain": "magnitude |V_o/V_i|, linear",
     "gain_real": "real part of V_o/V_i",
@@ -164,7 +166,7 @@ def response_of(columns: Columns, reading: Reading) -> FrequencyResponse:
         If a quantity is missing or there twice, or a value is none that it can have; names the
         row.
     """
-    frequency = columns.one_of(_FREQUENCY)
+    frequency = _frequency(columns)
     if frequency is None:
         raise FileFormatError(
             f"{columns.path}: no column is the frequency; say which: --column frequency_hz=COLUMN"
@@ -192,6 +194,19 @@ def response_of(columns: Columns, reading: Reading) -> FrequencyResponse:
         response = remarked(response, *remarks)
     _believed(columns, response)
     return without_dc(_in_order(columns, response, reading), columns.path)
+
+
+def _frequency(columns: Columns) -> NDArray[np.float64] | None:
+    """The frequency in Hz; None where no column is one."""
+    frequency = columns.one_of(_FREQUENCY)
+    if _LOGARITHM not in columns.held:
+        return frequency
+    if frequency is not None:
+        raise FileFormatError(f"{columns.path}: two columns are the frequency; give one of them")
+    logarithm = columns.real(_LOGARITHM)
+    for row in np.flatnonzero(np.abs(logarithm) > 12.0):
+        columns.refuse(row, f"a frequency of 10^{logarithm[row]:g} Hz is none")
+    return np.asarray(10.0**logarithm)
 
 
 def coherence_errors(
