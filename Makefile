@@ -116,5 +116,5 @@ $(LOWEST)/.ready: pyproject.toml | $(READY)
 	@$(LOWEST)/bin/uv pip compile --quiet --resolution lowest-direct --python $(LOWEST)/bin/python \
 	  --output-file $(LOWEST)/lowest.txt pyproject.toml
 	@$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST)/bin/python \
-	  --requirement $(LOWEST)/lowest.txt --editable . pytest pytest-xdist hypothesis
+	  --requirement $(LOWEST)/lowest.txt --editable . pytest pytest-xdist hypothesis pyuff
 	@touch $@

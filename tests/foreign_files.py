@@ -10,8 +10,11 @@ from __future__ import annotations
 import base64
 from collections.abc import Iterable
 from dataclasses import dataclass
+from io import BytesIO
 
+import h5py
 import numpy as np
+from scipy.io import savemat
 
 from daq.formats import NOTHING_TOLD, Reading
 
@@ -260,3 +263,18 @@ def universal_58() -> bytes:
 def universal_58b() -> bytes:
     """The same in binary."""
     return binary_58()
+
+
+NAMED = told(("frequency_hz", "f"), ("gain_complex", "H"))
+"""What must be said of `arrays`."""
+
+
+def arrays(suffix: str) -> bytes:
+    """A MATLAB or HDF5 file of variables f and H."""
+    buffer = BytesIO()
+    if suffix == "mat":
+        savemat(buffer, {"f": HERTZ, "H": GAIN})
+    else:
+        with h5py.File(buffer, "w") as file:
+            file["f"], file["H"] = HERTZ, GAIN
+    return buffer.getvalue()

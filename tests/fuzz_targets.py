@@ -20,7 +20,7 @@ from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from foreign_files import dtt_xml, files, universal_58, universal_58b
+from foreign_files import NAMED, arrays, dtt_xml, files, universal_58, universal_58b
 from responses import measured
 from sdf_files import File
 from wire import MemoryLink, TinyAdapter
@@ -76,6 +76,8 @@ def _targets(folder: Path) -> dict[str, Target]:
         "text": file("x.txt", read_response),
         "guess": file("x.asc", lambda path: read_response(path, Reading(as_guessed=True))),
         "dtt": file("x.xml", dtt.read),
+        "foreign-mat": file("y.mat", lambda path: read_response(path, NAMED)),
+        "foreign-h5": file("y.h5", lambda path: read_response(path, NAMED)),
         "mat": lambda data: read_file(folder / "x.mat", with_its_digest(data), read_response),
         "sdf": file("x.sdf", sdf.read),
         "unit": file("unit.toml", lambda path: load_unit(str(path))),
@@ -104,6 +106,8 @@ def seeds(name: str) -> list[bytes]:
         return [_head(file.content) for file in files()]
     if name == "dtt":
         return [dtt_xml(listed) for listed in (True, False)]
+    if name.startswith("foreign-") and name != "foreign-uff":
+        return [arrays(name.removeprefix("foreign-"))]
     if name == "foreign-uff":
         return [universal_58(), universal_58b()]
     if name in ("unit", "bench", "recipe"):

@@ -30,7 +30,7 @@ _DOCUMENT_LIMIT_BYTES = 64 << 20
 
 
 def read(path: Path, reading: Reading = NOTHING_TOLD) -> FrequencyResponse:
-    """Read an HDF5 file that `write` made.
+    """Read an HDF5 file that `write` made, or another program's by the names of data sets.
 
     Raises
     ------
@@ -40,10 +40,16 @@ def read(path: Path, reading: Reading = NOTHING_TOLD) -> FrequencyResponse:
     """
     import h5py
 
-    reading.refuse_unused(path, (), "a file that lashbench wrote")
     checked_file(path, _KIND)
     try:
         with h5py.File(path, "r") as file:
+            if "document" not in file:
+                from daq.formats.foreign.arrays import response_in_h5
+
+                used = ("averages", "profile", "columns", "as_guessed")
+                reading.refuse_unused(path, used, "an HDF5 file of another program")
+                return response_in_h5(file, reading, path)
+            reading.refuse_unused(path, (), "a file that lashbench wrote")
             document = _document(file, path)
             arrays = {name: _array(file, name, path) for name in ARRAYS}
     except (OSError, KeyError, RuntimeError, ValueError, TypeError) as error:

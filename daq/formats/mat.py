@@ -26,11 +26,12 @@ __all__ = ["read", "write"]
 
 _TEXT_BYTES = 116
 """Length of the free text that a file of this kind starts with."""
+_MARK = b"lashbench, sha256"
 _KIND = "a MATLAB file that lashbench wrote"
 
 
 def read(path: Path, reading: Reading = NOTHING_TOLD) -> FrequencyResponse:
-    """Read a MATLAB file that `write` made.
+    """Read a MATLAB file that `write` made, or another program's by the names of variables.
 
     Raises
     ------
@@ -39,11 +40,17 @@ def read(path: Path, reading: Reading = NOTHING_TOLD) -> FrequencyResponse:
     """
     from scipy.io import loadmat
 
-    reading.refuse_unused(path, (), "a file that lashbench wrote")
     content = checked_file(path, _KIND).read_bytes()
+    if _MARK not in content[:_TEXT_BYTES]:
+        from daq.formats.foreign.arrays import response_in_mat
+
+        used = ("averages", "profile", "columns", "as_guessed")
+        reading.refuse_unused(path, used, "a MATLAB file of another program")
+        return response_in_mat(content, reading, path)
+    reading.refuse_unused(path, (), "a file that lashbench wrote")
     if content[:_TEXT_BYTES] != _head(content):
         raise FileFormatError(
-            f"{path}: is damaged, or another program wrote it; give {_KIND}, or a CSV"
+            f"{path}: is damaged, or another program saved it again; give {_KIND}, or a CSV"
         )
     try:
         found = loadmat(BytesIO(content), variable_names=[*ARRAYS, "document"])

@@ -41,6 +41,8 @@ SHARES = {
     "dtt": 3,
     "foreign-uff": 5,
     "mat": 0.1,
+    "foreign-mat": 0.1,
+    "foreign-h5": 0.1,
     "sdf": 7,
     "unit": 7,
     "bench": 7,
@@ -147,7 +149,6 @@ def inside(name: str, words: Sequence[str]) -> None:
         # Readers are imported when they are used, which would be too late here.
         for module in ("csv", "hdf5", "uff", "mat", "sdf"):
             import_module(f"daq.formats.{module}")
-        import_module("pyuff")
         import_module("sdfascii")
         from fuzz_targets import targets
     logging.disable()
