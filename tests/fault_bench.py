@@ -15,7 +15,6 @@ from typing import Any
 import fault_child
 from bench_server import url as url_of
 
-from sim.analyser35670a import Analyser35670A
 from sim.serve import Server
 
 
@@ -94,16 +93,18 @@ class Child:
 class Served:
     """A server of the instrument in a thread, which can be unplugged."""
 
-    def __init__(self, instrument: Analyser35670A, wire: str) -> None:
+    def __init__(self, instrument: Any, wire: str, driver: str = "") -> None:
         name = "prologix_pty" if wire == "ar488_pty" else wire
         ports: dict[str, Any] = {"tcp": 0}
         if name == "prologix_tcp":
             ports["prologix_tcp"] = 0
         if name == "prologix_pty":
             ports["prologix_pty"] = True
+        if name == "serial_pty":
+            ports["serial_pty"] = instrument
         dialect = "ar488" if wire == "ar488_pty" else "prologix"
         self._server = Server(instrument, realtime=False, dialect=dialect, **ports)
-        self.url = url_of(name, self._server.addresses[name])
+        self.url = url_of(name, self._server.addresses[name], driver)
         host, port = self._server.addresses["tcp"].split(":")
         self.raw = host, int(port)
         self._thread: threading.Thread | None = threading.Thread(target=self._server.run)

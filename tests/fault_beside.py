@@ -25,12 +25,18 @@ from frozen_files import Freezer
 from daq.store import Store
 
 _SECOND_S = 30.0
-_MEDDLING = (
+_MEDDLING = {"": (
     b"*IDN?", b"SOUR:VOLT 4 VPK", b"SOUR:VOLT?", b"*RST", b"SYST:PRES", b"ABOR", b"*CLS",
     b"INST:SEL FFT", b"SOUR:VOLT:OFFS 2", b"SYST:ERR?", b"FREQ:MAN 60", b"INIT:CONT ON",
     b"\xff\x00garbage", b"CALC1:DATA?", b"STAT:QUES:VOLT?", b"*SRE 255", b"FORM:DATA ASC",
     b"SWE:CYCL 1", b"SOUR:VOLT 0 VPK",
-)  # fmt: skip
+), "sr785": (
+    b"*IDN?", b"SSAM 4000 mV", b"SSAM?", b"*RST", b"PAUS", b"STRT", b"CONT", b"*CLS", b"MGRP 2,0",
+    b"SOFF 2 V", b"*ESR?", b"SSTR 2,60 Hz", b"SRPT 2,1", b"\xff\x00garbage", b"DSPY? 0", b"INPS?",
+    b"*SRE 255", b"PSDU 2,1", b"SNPS 2,30", b"SSAM 0 mV", b"SRCO 0", b"OUTX 1", b"DISP 2,0",
+    b"MEAS 0,44", b"VIEW 1,0", b"SSAL 2", b"SARS 2,1", b"DSPS?", b"SSTY 2,1",
+)}  # fmt: skip
+"""What another program may say to the instrument of each driver."""
 
 
 class Beside:
@@ -55,6 +61,7 @@ class Beside:
         self._start_second = start_second
         self._wrong = wrong
         self._delay_s = case.delay_s
+        self._meddling = _MEDDLING[case.driver]
         self._chance = random.Random(case.seed)
         self._over = threading.Event()
         self.child: Child | None = None
@@ -108,7 +115,7 @@ class Beside:
             for _ in range(self._chance.randrange(1, 4)):
                 if self._over.is_set():
                     return
-                wire.sendall(self._chance.choice(_MEDDLING) + b"\n")
+                wire.sendall(self._chance.choice(self._meddling) + b"\n")
                 with suppress(TimeoutError):
                     wire.recv(100)
 

@@ -1,8 +1,8 @@
 """What may go wrong in one run of the fault campaign, drawn at random; nothing is done here.
 
-A case is a wire, a fault of the instrument, a disturbance on this side, or
-both at once. The first cases go through every fault in every phase and every
-disturbance once on every wire that it can strike; the rest are drawn.
+A case is a driver and a wire, a fault of the instrument, a disturbance on this side, or
+both at once. The first cases go through every fault and every disturbance once on every wire
+of every driver that it can strike, and every fault in every phase; the rest are drawn.
 """
 
 from __future__ import annotations
@@ -12,11 +12,20 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 
-from sim.faults import CATALOGUE, PHASES
+from sim.faults import PHASES
+from sim.models import model_of, models
 
 WIRES = ("loopback", "tcp", "prologix_tcp", "prologix_pty", "ar488_pty")
-LEVELS_VPK, POINTS = (1.0, 2.0), 7
-"""The plan: so many points at each level."""
+BENCHES = tuple(
+    (model.scheme, wire)
+    for model in models()
+    for wire in WIRES + (("serial_pty",) if model.has_serial else ())
+)
+"""Schemes of drivers, each with every wire that its instrument has."""
+LEVELS_VPK = (1.0, 2.0)
+_POINTS, _MORE_POINTS = 7, 11
+_TRIAL_POINTS = 12
+"""Points that other drivers than the preset may take for the trial point."""
 
 DISTURBANCES = {
     "sigint": "Ctrl-C",
@@ -61,6 +70,8 @@ class Case:
     """One run."""
 
     number: int
+    driver: str
+    """Scheme of the driver."""
     wire: str
     fault: str | None
     """As `sim.faults.parse_fault` reads it."""
@@ -77,13 +88,23 @@ class Case:
         """Without its parameters."""
         return self.fault.partition(":")[0] if self.fault else None
 
+    @property
+    def points(self) -> int:
+        """Of each level; enough for a sweep that the instrument runs by itself."""
+        return points_of(self.driver)
+
     def __str__(self) -> str:
-        parts = [self.wire]
+        parts = [self.driver or "preset", self.wire]
         if self.fault:
             parts.append(self.fault)
         if self.disturbance:
             parts.append(f"{self.disturbance} after {self.after} points + {self.delay_s:.3f} s")
         return f"{self.number}: " + ", ".join(parts)
+
+
+def points_of(driver: str) -> int:
+    """Points of each level in the plan."""
+    return _MORE_POINTS if driver else _POINTS
 
 
 def draw_cases(count: int, seed: int) -> Iterator[Case]:
@@ -92,21 +113,32 @@ def draw_cases(count: int, seed: int) -> Iterator[Case]:
     wanted = _every_one_once()
     chance.shuffle(wanted)
     for number in range(1, count + 1):
-        wire, name, phase, disturbance = wanted.pop() if wanted else _any(chance)
+        driver, wire, name, phase, disturbance = wanted.pop() if wanted else _any(chance)
         yield Case(
             number=number,
+            driver=driver,
             wire=wire,
-            fault=None if name is None else _fault(name, phase, chance),
+            fault=None if name is None else _fault(driver, name, phase, chance),
             disturbance=disturbance,
-            after=chance.randrange(0, 2 * POINTS),
+            after=chance.randrange(0, 2 * points_of(driver)),
             delay_s=chance.choice((0.0, chance.uniform(0.0, 0.03), chance.uniform(0.0, 0.3))),
             seed=chance.randrange(1 << 30),
         )
 
 
-def _every_one_once() -> list[tuple[str, str | None, str | None, str | None]]:
-    faults = [(w, n, p, None) for w, n, p in product(WIRES, CATALOGUE, PHASES)]
-    others = [(w, None, None, d) for w, d in product(WIRES, DISTURBANCES) if can_strike(d, w)]
+_Kind = tuple[str, str, str | None, str | None, str | None]
+
+
+def _every_one_once() -> list[_Kind]:
+    faults: list[_Kind] = []
+    for place, (driver, wire) in enumerate(BENCHES):
+        for number, name in enumerate(model_of(driver).faults):
+            faults.append((driver, wire, name, PHASES[(place + number) % len(PHASES)], None))
+    others = [
+        (driver, wire, None, None, one)
+        for (driver, wire), one in product(BENCHES, DISTURBANCES)
+        if can_strike(one, wire)
+    ]
     return [*faults, *others]
 
 
@@ -115,22 +147,23 @@ def can_strike(disturbance: str, wire: str) -> bool:
     return wire != "loopback" or disturbance not in NEEDS_WIRE
 
 
-def _any(chance: random.Random) -> tuple[str, str | None, str | None, str | None]:
-    wire = chance.choice(WIRES)
+def _any(chance: random.Random) -> _Kind:
+    driver, wire = chance.choice(BENCHES)
     disturbance = chance.choice([d for d in DISTURBANCES if can_strike(d, wire)])
     kind = chance.choice(("fault", "disturbance", "both"))
-    name = None if kind == "disturbance" else chance.choice(list(CATALOGUE))
-    return wire, name, chance.choice(PHASES), None if kind == "fault" else disturbance
+    name = None if kind == "disturbance" else chance.choice(list(model_of(driver).faults))
+    return driver, wire, name, chance.choice(PHASES), None if kind == "fault" else disturbance
 
 
-def _fault(name: str, phase: str | None, chance: random.Random) -> str:
+def _fault(driver: str, name: str, phase: str | None, chance: random.Random) -> str:
     if name in ("missing-option", "calibration-failure"):  # these know one moment only
         return name
-    point = 0 if phase == "prepare" else chance.randrange(1, 2 * POINTS + 1)
+    point = 0 if phase == "prepare" else chance.randrange(1, 2 * points_of(driver) + 1)
+    point += _TRIAL_POINTS if driver and point else 0
     words = [f"phase={phase}", f"point={point}", f"times={chance.choice((1, 1, 1, 2, 0))}"]
     words.append(f"skip={chance.choice((0, 0, chance.randrange(40)))}")
     if name in _SECONDS:
         words.append(f"seconds={chance.choice(_SECONDS[name])}")
-    if CATALOGUE[name].size is not None:
+    if model_of(driver).faults[name].size is not None:
         words.append(f"size={chance.randrange(1, 40)}")
     return f"{name}:{','.join(words)}"

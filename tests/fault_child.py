@@ -24,17 +24,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from bench_server import simulated
 from fake_analyser import known_gain
-from fault_cases import LEVELS_VPK, POINTS, Case
+from fault_cases import LEVELS_VPK, Case
 from frozen_files import hold
 
 from daq.control import SessionControl
+from daq.drivers import driver_at
 from daq.errors import LashbenchError
-from daq.hp35670a import HP35670A
-from daq.hp35670a_setup import Timing
 from daq.session_events import Finished, Opened, PointStored
-from sim.analyser35670a import Analyser35670A, Choices
-from sim.faults import FaultBoard, parse_fault
 from sim.instrument.plant import LinearPlant, PlantDwell
 from sim.loopback import Loopback
 from sim.unit import load_unit
@@ -72,15 +70,15 @@ def true_gain(frequency_hz: float, source_vpk: float) -> complex:
     return known_gain(frequency_hz) * (1.0 + 0.1 * source_vpk)
 
 
-def instrument_of(fault: str | None) -> tuple[Analyser35670A, FaultBoard]:
+def instrument_of(fault: str | None, driver: str = "") -> tuple[Any, Any]:
     """A noiseless instrument with the device behind it, and the board of its faults."""
-    board = FaultBoard([parse_fault(fault)] if fault else [])
-    return Analyser35670A(Graded(), Choices(noise_v=0.0, converter_noise=0.0), board), board
+    instrument = simulated(driver, Graded(), [fault] if fault else [])
+    return instrument, instrument.faults
 
 
-def drives(instrument: Analyser35670A) -> bool:
+def drives(instrument: Any) -> bool:
     """What is true of the source, whatever anybody says of it."""
-    return abs(instrument.output_vpk) > 0.0 or abs(instrument.source.offset_v) > 0.0
+    return instrument.driven_v > 0.0
 
 
 def preload() -> None:
@@ -100,14 +98,14 @@ def measure(pipe: Any, url: str, db: str, resume: int, case: Case, plain: bool) 
         small_disk(place.parent)
     trouble = Trouble(disturbance, case, place, pipe)
     unit, instrument, board = load_unit("adss"), None, None
-    if url == "sim:":
-        instrument, board = instrument_of(None if plain else case.fault)
+    if case.wire == "loopback":
+        instrument, board = instrument_of(None if plain else case.fault, case.driver)
         replace_instrument(instrument)
     began, finished, error = time.monotonic(), None, None
     control = SessionControl()
     try:
         request = session_request(
-            PlanOptions() if resume else options(), "adss", unit, url, place,
+            PlanOptions() if resume else options(case.points), "adss", unit, url, place,
             recipe=None, bench="default", resume=resume or None, remeasure=None, run_in=None,
             remarks={"serial": "", "operator": "", "notes": ""},
         )  # fmt: skip
@@ -183,27 +181,36 @@ def _verdict(
     }
 
 
-def options() -> PlanOptions:
+def options(points: int) -> PlanOptions:
     """The plan of every run."""
-    return PlanOptions(LEVELS_VPK, 130.0, 170.0, POINTS, settle_cycles=3, integrate_cycles=4)
+    return PlanOptions(LEVELS_VPK, 130.0, 170.0, points, settle_cycles=3, integrate_cycles=4)
 
 
 def shorten_waits() -> None:
     """The same outcomes as with the driver's own limits, sooner."""
     import daq.hp35670a
     import daq.hp35670a_safe
+    import daq.hp35670a_setup
+    import daq.sr785.analyser
+    import daq.sr785.safe
+    import daq.sr785.setup
     import daq.store_file
 
-    daq.hp35670a.Timing = lambda: Timing(reply_s=1.0, block_s=1.5, overhead_s=3.0)
+    short = {"reply_s": 1.0, "block_s": 1.5, "overhead_s": 3.0}
+    timing = daq.hp35670a_setup.Timing
+    daq.hp35670a.Timing = lambda: timing(**short)
     daq.hp35670a_safe._BUDGET_S = 4.0
+    other = daq.sr785.setup.Timing
+    daq.sr785.analyser.Timing = lambda: other(**short, serial_block_s=1.5, point_s=0.1)
+    daq.sr785.safe._BUDGET_S = daq.sr785.safe._RESET_S = 4.0
     daq.store_file._BUSY_S = BUSY_S
 
 
-def replace_instrument(instrument: Analyser35670A) -> None:
+def replace_instrument(instrument: Any) -> None:
     """Let ``sim:`` mean this one."""
     import tui.bench
 
-    tui.bench.connect = lambda url, unit, transcript=None, fault=None: HP35670A(
+    tui.bench.connect = lambda url, unit, transcript=None, fault=None: driver_at(url)[0].drive(
         Loopback(instrument)
     )
 

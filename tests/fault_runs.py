@@ -23,7 +23,7 @@ from typing import Any
 import fault_child
 from fault_bench import Child, Programs, Served
 from fault_beside import Beside
-from fault_cases import LEVELS_VPK, POINTS, Case
+from fault_cases import LEVELS_VPK, Case
 from frozen_files import Freezer, freezer_of
 
 from daq.bench_lock import BenchLock
@@ -46,7 +46,6 @@ _COLLEAGUES = b"This is a colleague's.\n"
 _RESUMES = 3
 """Sessions within which a measurement must be complete once everything is mended; a starved
 machine may lose one to a time-out."""
-_TOTAL = len(LEVELS_VPK) * POINTS
 
 
 @dataclass
@@ -103,7 +102,7 @@ class Run:
         self._db = folder / ("disk" if case.disturbance == "full-disk" else ".") / "bench.db"
         self._db.parent.mkdir(exist_ok=True)
         self._folder = folder
-        self.instrument, self._board = fault_child.instrument_of(case.fault)
+        self.instrument, self._board = fault_child.instrument_of(case.fault, case.driver)
         self._served: Served | None = None
         self._freezer: Freezer | None = None
         self.outcome = Outcome(case)
@@ -116,7 +115,7 @@ class Run:
         """The whole run."""
         try:
             if self._case.wire != "loopback":
-                self._served = Served(self.instrument, self._case.wire)
+                self._served = Served(self.instrument, self._case.wire, self._case.driver)
             child = self._first()
             if self._case.disturbance == "full-disk" and not self._db.exists():
                 self._db = self._folder / "bench.db"
@@ -203,7 +202,8 @@ class Run:
         self._lock.unlink(missing_ok=True)
 
     def _start(self, resume: int, *, plain: bool) -> Child:
-        url = "sim:" if self._served is None else self._served.url
+        lead = f"{self._case.driver}:" if self._case.driver else ""
+        url = f"{lead}sim:" if self._served is None else self._served.url
         return self._programs.start(url, str(self._db), resume, self._case, plain)
 
     def _wake(self, child: Child, after_s: float) -> None:
@@ -322,10 +322,10 @@ class Run:
         """Whatever was broken is mended; the measurement goes on to its end."""
         self._board.disarm()
         if self.instrument.damage.dead or self._case.fault_name == "missing-option":
-            self.instrument, self._board = fault_child.instrument_of(None)
+            self.instrument, self._board = fault_child.instrument_of(None, self._case.driver)
         if self._served is not None:
             self._served.unplug()
-            self._served = Served(self.instrument, self._case.wire)
+            self._served = Served(self.instrument, self._case.wire, self._case.driver)
         measurement, told = first.measurement, list(first.told)
         for number in range(1, _RESUMES + 1):
             self.outcome.resumes = number
@@ -342,9 +342,10 @@ class Run:
         if self._served is not None and self._drives():
             self.wrong("the source drives after the next session")
         self.judge_points(measurement, told)
+        total = len(LEVELS_VPK) * self._case.points
         with Store(self._db) as store:
-            if measurement and len(store.points(measurement)) != _TOTAL:
-                self.wrong(f"{len(store.points(measurement))} of {_TOTAL} points after going on")
+            if measurement and len(store.points(measurement)) != total:
+                self.wrong(f"{len(store.points(measurement))} of {total} points after going on")
 
     def _go_on(self, measurement: int) -> Child:
         child = self._start(measurement, plain=True)

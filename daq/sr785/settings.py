@@ -15,10 +15,10 @@ from daq.errors import LimitError
 from daq.scpi import parse_number
 
 __all__ = [
-    "HIGHEST_HZ", "INTEGRATE", "LEAST_INTEGRATE_S", "LEAST_SETTLE_S", "LOWEST_HZ", "MODELS",
-    "MOST_POINTS", "LEAST_POINTS", "POINTS", "SETTLE", "SPACING", "START", "STOP", "Numbers",
-    "Setting", "check_drive", "level_command", "offset_command", "point_settings",
-    "shown_settings", "standing_settings",
+    "HIGHEST_HZ", "INTEGRATE", "LEAST_INTEGRATE_S", "LEAST_POINTS", "LEAST_SETTLE_S", "LOWEST_HZ",
+    "MODELS", "MOST_POINTS", "POINTS", "SETTLE", "SPACING", "START", "STOP", "SWEEP_SETTINGS",
+    "Numbers", "Setting", "check_drive", "display_settings", "level_command", "offset_command",
+    "point_settings", "shown_settings", "standing_settings", "variance_settings",
 ]  # fmt: skip
 
 LOWEST_HZ, HIGHEST_HZ = 1e-3, 102400.0
@@ -185,6 +185,10 @@ def variance_settings(numbers: Numbers) -> list[tuple[Setting, float]]:
     return table
 
 
+_AUTO_LEVEL = _choice("automatic level", "SSAL", 2)
+_AUTO_RESOLUTION = _both("automatic resolution", "SARS", 1)
+SWEEP_SETTINGS = (START, STOP, SPACING, POINTS, _AUTO_LEVEL, _AUTO_RESOLUTION)
+"""What bins mean depends on these."""
 _LIVE, _DENSITY = _both("display live", "DISP", 1), _both("PSD units", "PSDU", 1)
 
 
@@ -216,8 +220,8 @@ def standing_settings(numbers: Numbers) -> list[tuple[Setting, float]]:
         ]
     return [
         *table,
-        (_choice("automatic level", "SSAL", 2), 0),
-        (_both("automatic resolution", "SARS", 1), 0),  # it skips points and hides it
+        (_AUTO_LEVEL, 0),
+        (_AUTO_RESOLUTION, 0),  # it skips points and hides it
         (_both("repeat sweep", "SRPT", 1), 0),  # the source goes off after a single sweep only
         (_SETTLE_TIME, LEAST_SETTLE_S),
         (_INTEGRATE_TIME, LEAST_INTEGRATE_S),

@@ -244,7 +244,7 @@ class _Run:
             found.append((row, response))
         # Read after the bins: an overload of the next point may count for these, none is lost.
         seen = self._watching.inputs()
-        self._watching.displays()
+        self._watching.readings()
         sure = found[: len(found) - _HELD_BACK]
         if not sure:
             self._inputs |= seen
@@ -281,8 +281,7 @@ class _Run:
         response = response_of(parts[0], parts[1])
         dialogue.check("sweep")
         self._watching.keys()
-        self._watching.level()
-        self._watching.displays()
+        self._watching.readings()
         for row, early in self._told.items():
             if not abs(response[row] - early.response) <= _STANDS * abs(early.response):
                 raise MeasurementError(

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from daq.errors import InstrumentError, MeasurementError
 from daq.frf import PointFlag
 from daq.sr785.dialogue import Dialogue
-from daq.sr785.settings import Setting, shown_settings
+from daq.sr785.settings import SWEEP_SETTINGS, Setting, shown_settings
 from daq.sr785.setup import SetUp, confirm_all
 from daq.sr785.status import Input, Instrument
 
@@ -44,9 +44,19 @@ class Watching:
             self._dialogue.key_pressed = False
             confirm_all(self._dialogue, self._table)
 
-    def displays(self) -> None:
-        """Raise `InstrumentError` if a display does not show what was asked for."""
+    def readings(self) -> None:
+        """Raise `InstrumentError` if the bins are not what was asked for."""
         confirm_all(self._dialogue, shown_settings(self._setup.numbers))
+        for setting, value in self._table:
+            if setting in SWEEP_SETTINGS:
+                question = setting.questions[0]
+                found = self._dialogue.parsed(question, setting.value_of)
+                if not setting.accepts(value, found):
+                    raise InstrumentError(
+                        f"{setting.name} was set to {value:g} and {question} reads back "
+                        f"{setting.shown(found)}; somebody changed the sweep while it ran"
+                    )
+        self.level()
 
     def group(self) -> None:
         """Raise `InstrumentError` if this is not swept sine: another group drives at once."""

@@ -25,10 +25,10 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tests"))
 
-from fault_cases import DISTURBANCES, WIRES, Case, draw_cases  # noqa: E402
+from fault_cases import BENCHES, DISTURBANCES, Case, draw_cases  # noqa: E402
 from fault_runs import Campaign, Outcome  # noqa: E402
 
-from sim.faults import CATALOGUE  # noqa: E402
+from sim.models import models  # noqa: E402
 
 PAGE = ROOT / "docs" / "reliability.md"
 BEGIN, END = "<!-- campaign begins -->", "<!-- campaign ends -->"
@@ -44,6 +44,7 @@ def main() -> int:
     words.add_argument("--minutes", type=float, default=1e6, help="begin no run after that")
     words.add_argument("--only", type=int, help="only the run of that number")
     words.add_argument("--kind", help="only runs with that fault or disturbance")
+    words.add_argument("--driver", help="only runs of the driver with that scheme")
     words.add_argument("--on", action="store_true", help="only runs not kept, or not well, yet")
     words.add_argument("--write", action="store_true", help="write the table into the docs")
     given = words.parse_args()
@@ -52,6 +53,8 @@ def main() -> int:
         cases = [case for case in cases if case.number == given.only]
     if given.kind is not None:
         cases = [case for case in cases if given.kind in (case.fault_name, case.disturbance)]
+    if given.driver is not None:
+        cases = [case for case in cases if case.driver == given.driver]
     # A shell's background job is started with Ctrl-C ignored, and so would be its programs.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     kept = ROOT / "build" / f"faults-{given.seed}.jsonl"
@@ -101,13 +104,14 @@ def recorded(kept: Path) -> list[Outcome]:
 
 def table(outcomes: Sequence[Outcome], seed: int, repeated: int) -> list[str]:
     """What came of it, one row for each fault and each disturbance."""
-    wires = Counter(outcome.case.wire for outcome in outcomes)
+    benches = Counter((outcome.case.driver, outcome.case.wire) for outcome in outcomes)
+    shown = [f"{driver or '35670a'} {wire} {benches[driver, wire]}" for driver, wire in BENCHES]
     broken = sum(bool(outcome.wrongs) for outcome in outcomes)
     stopped = [o.stopped_s for o in outcomes if o.stopped_s is not None]
     off = [o.off_after_s for o in outcomes if o.off_after_s is not None]
     lines = [
         f"{len(outcomes)} runs, seed {seed}; "
-        f"{', '.join(f'{wire} {wires[wire]}' for wire in WIRES)}. "
+        f"{', '.join(shown)}. "
         f"Runs with a broken promise: {broken}; runs made again: {repeated}. Longest session: "
         f"{max(o.elapsed_s for o in outcomes):.0f} s by the clock, "
         f"{max(o.elapsed_s - o.starved_s for o in outcomes):.0f} s without the waiting for a "
@@ -120,7 +124,8 @@ def table(outcomes: Sequence[Outcome], seed: int, repeated: int) -> list[str]:
         "to be | broken |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
-    for name in (*CATALOGUE, *DISTURBANCES):
+    names = dict.fromkeys(name for model in models() for name in model.faults)
+    for name in (*names, *DISTURBANCES):
         mine = [o for o in outcomes if name in (o.case.fault_name, o.case.disturbance)]
         if mine:
             lines.append(_row(name, mine))

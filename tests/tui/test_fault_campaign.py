@@ -1,11 +1,11 @@
-"""Fourteen runs of the fault campaign; `make faults` runs hundreds."""
+"""Twenty runs of the fault campaign, over all drivers; `make faults` runs hundreds."""
 
 from concurrent.futures import ThreadPoolExecutor
 from itertools import chain
 from types import SimpleNamespace
 
 import pytest
-from fault_cases import DISTURBANCES, WIRES, Case, can_strike, draw_cases
+from fault_cases import BENCHES, DISTURBANCES, Case, can_strike, draw_cases
 from fault_child import drives, instrument_of, options, true_gain
 from fault_runs import Campaign, Run, Stopwatch
 
@@ -18,33 +18,40 @@ from daq.plan import SweepPlan
 from daq.session_events import PointStored
 from daq.store import Store
 from daq.store_records import MeasurementHeader
-from sim.faults import CATALOGUE, PHASES, parse_fault
+from sim.faults import PHASES
 from sim.loopback import Loopback
+from sim.models import model_of, models
 from sim.unit import load_unit
 from tui.bench import bench_session
 from tui.measure_options import session_request
 
 KINDS = (
-    ("tcp", None, "sigint"),
-    ("prologix_tcp", None, "kill"),
-    ("loopback", None, "full-disk"),
-    ("tcp", None, "read-only"),
-    ("loopback", None, "held-briefly"),
-    ("tcp", None, "intruder"),
-    ("tcp", None, "birth"),
-    ("tcp", None, "watchdog"),
-    ("loopback", None, "frozen-sigterm"),
-    ("loopback", None, "lock-link"),
-    ("tcp", None, "foreign-cache"),
-    ("ar488_pty", "truncated-block:phase=read-out,point=2", None),
-    ("tcp", "dropped-connection:phase=sweep,point=5", None),
-    ("loopback", "hardware-error:phase=sweep,point=9", None),
+    ("", "tcp", None, "sigint"),
+    ("", "prologix_tcp", None, "kill"),
+    ("", "loopback", None, "full-disk"),
+    ("", "tcp", None, "read-only"),
+    ("", "loopback", None, "held-briefly"),
+    ("", "tcp", None, "intruder"),
+    ("", "tcp", None, "birth"),
+    ("", "tcp", None, "watchdog"),
+    ("", "loopback", None, "frozen-sigterm"),
+    ("", "loopback", None, "lock-link"),
+    ("", "tcp", None, "foreign-cache"),
+    ("", "ar488_pty", "truncated-block:phase=read-out,point=2", None),
+    ("", "tcp", "dropped-connection:phase=sweep,point=5", None),
+    ("", "loopback", "hardware-error:phase=sweep,point=9", None),
+    ("sr785", "tcp", None, "sigint"),
+    ("sr785", "serial_pty", None, "kill"),
+    ("sr785", "prologix_tcp", None, "intruder"),
+    ("sr785", "ar488_pty", "truncated-block:phase=read-out,point=14", None),
+    ("sr785", "tcp", "lost-power:phase=sweep,point=15,seconds=0.3", None),
+    ("sr785", "loopback", "key-pressed:phase=sweep,point=15", None),
 )
 
 
-def case(number, wire, fault, disturbance):
+def case(number, driver, wire, fault, disturbance):
     after = 5 if fault is None else 2
-    return Case(number, wire, fault, disturbance, after=after, delay_s=0.0, seed=number)
+    return Case(number, driver, wire, fault, disturbance, after=after, delay_s=0.0, seed=number)
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +74,11 @@ def test_what_was_meant_to_go_wrong_did(outcomes):
     for outcome in outcomes:
         struck = outcome.fault_struck if outcome.case.fault else outcome.disturbed
         assert struck, outcome.case
-    by_kind = {(o.case.wire, o.case.fault_name, o.case.disturbance): o.code for o in outcomes}
+    by_kind = {
+        (o.case.wire, o.case.fault_name, o.case.disturbance): o.code
+        for o in outcomes
+        if o.case.driver == ""
+    }
     assert by_kind["tcp", None, "sigint"] == 130
     assert by_kind["tcp", None, "birth"] is None
     assert by_kind["tcp", None, "watchdog"] == 0
@@ -87,7 +98,7 @@ def test_a_level_that_another_program_set_ends_it_before_a_point_is_stored(tmp_p
     monkeypatch.setattr("tui.bench.connect", lambda *_: connected)
     db, unit, stored, said = tmp_path / "bench.db", load_unit("adss"), [], []
     request = session_request(
-        options(), "adss", unit, "sim:", db,
+        options(7), "adss", unit, "sim:", db,
         recipe=None, bench="default", resume=None, remeasure=None, run_in=None,
         remarks={"serial": "", "operator": "", "notes": ""},
     )  # fmt: skip
@@ -110,7 +121,7 @@ def test_a_level_that_another_program_set_ends_it_before_a_point_is_stored(tmp_p
 
 
 def test_the_judge_sees_a_source_that_drives_and_is_called_off(tmp_path):
-    run = Run(None, case(1, "tcp", None, "sigint"), tmp_path)
+    run = Run(None, case(1, "", "tcp", None, "sigint"), tmp_path)
     run.instrument.source.offset_v = 1.0
     verdict = {"code": 0, "said": "", "source": "confirmed-off", "driving": None, "struck": False}
     run.judge_end(SimpleNamespace(verdict=verdict, measurement=1, told=[]))
@@ -118,7 +129,7 @@ def test_the_judge_sees_a_source_that_drives_and_is_called_off(tmp_path):
 
 
 def test_the_judge_sees_points_that_are_lost_changed_or_wrong(tmp_path):
-    run = Run(None, case(1, "loopback", None, None), tmp_path)
+    run = Run(None, case(1, "", "loopback", None, None), tmp_path)
     right = SweepPoint(150.0, true_gain(150.0, 1.0))
     spoilt = SweepPoint(160.0, 9.0 + 0j, flags=PointFlag.SPOILT)
     with Store(tmp_path / "bench.db", create=True) as store:
@@ -150,14 +161,14 @@ def test_the_judge_counts_no_waiting_for_a_processor_but_every_other():
 def test_five_hundred_runs_go_through_everything_and_are_the_same_again():
     cases = list(draw_cases(520, 3))
     assert cases == list(draw_cases(520, 3)) != list(draw_cases(520, 4))
-    struck = {(c.wire, c.fault_name, c.disturbance) for c in cases}
-    for wire in WIRES:
-        for name in CATALOGUE:
-            assert (wire, name, None) in struck
+    struck = {(c.driver, c.wire, c.fault_name, c.disturbance) for c in cases}
+    for driver, wire in BENCHES:
+        for name in model_of(driver).faults:
+            assert (driver, wire, name, None) in struck
         for name in DISTURBANCES:
-            assert ((wire, None, name) in struck) == can_strike(name, wire)
-    phased = {(c.fault_name, p) for c in cases if c.fault for p in PHASES if p in c.fault}
-    assert len(phased) >= 3 * (len(CATALOGUE) - 2)
+            assert ((driver, wire, None, name) in struck) == can_strike(name, wire)
+    phased = {(c.driver, c.fault_name, p) for c in cases if c.fault for p in PHASES if p in c.fault}
+    assert len(phased) >= sum(3 * (len(model.faults) - 2) for model in models())
     for one in cases:
         if one.fault is not None:
-            parse_fault(one.fault)
+            model_of(one.driver).parse_fault(one.fault)
