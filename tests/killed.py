@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from daq.analyser import SourceState
-from daq.hp35670a import HP35670A
+from daq.drivers import open_analyser
 from daq.store import Store
-from daq.transports.open import open_transport
 
 PROGRAM = """
 import sys
@@ -114,7 +113,7 @@ def wait_for_watchdog(db: Path, measurement: int, seconds: float = 30.0) -> str:
 
 def source_state(url: str) -> SourceState:
     """What the instrument says of its source now."""
-    analyser = HP35670A(open_transport(url))
+    analyser = open_analyser(url)
     try:
         return analyser.source_state()
     finally:

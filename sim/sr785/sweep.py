@@ -139,7 +139,7 @@ class Sweep:
                 return
 
     def _points(self) -> Steps:
-        instrument, skip = self._instrument, 0
+        instrument, skip, passed = self._instrument, 0, 0
         order = list(range(len(self.axis_hz)))
         if instrument.settings.get("SSTR") > instrument.settings.get("SSTP"):
             order.reverse()
@@ -168,8 +168,9 @@ class Sweep:
             yield instrument.choices.point_overhead_s
             self.bins[row] = self.points_begun, point
             instrument.status.put("DSPS", Display.NEW | Display.NEW << 8)
-            skip = self._skips(order, place, skip)
-            place = min(place + 1 + skip, max(place + 1, len(order) - 1))
+            skip = self._skips(order, place, passed, skip)
+            after = min(place + 1 + skip, max(place + 1, len(order) - 1))
+            place, passed = after, after - place - 1
         self.never_ends = instrument.faults.take("stuck-measuring-bit") is not None
 
     def _judge(self, point: Point) -> None:
@@ -184,15 +185,15 @@ class Sweep:
         self._instrument.status.put("INPS", bits)
         self._instrument.input_now = bits
 
-    def _skips(self, order: list[int], place: int, before: int) -> int:
-        """Points that auto resolution leaves out next, filling those left out before."""
+    def _skips(self, order: list[int], place: int, passed: int, before: int) -> int:
+        """Points that auto resolution leaves out next, filling those left out on the way here."""
         get = self._instrument.settings.get
-        last = place - 1 - before
+        last = place - 1 - passed
         if not get("SARS") or last < 0:
             return 0
         old, new = self.bins[order[last]][1], self.bins[order[place]][1]
-        for step in range(1, before + 1):
-            share = step / (before + 1)
+        for step in range(1, passed + 1):
+            share = step / (passed + 1)
             mixed = (1 - share) * old.amplitudes + share * new.amplitudes
             self.interpolated[order[last + step]] = Point(
                 old.frequency_hz, mixed, old.variances, old.integrated_s, old.above_half,

@@ -15,12 +15,14 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
-from bench_server import linear_analyser, served
+from bench_server import linear_analyser, served, simulated, wires_of
 from fake_analyser import known_gain
 from frozen_files import can_be_held, started
 
 from daq.analyser import SourceState
+from daq.drivers import DRIVERS
 from daq.store import Store
+from sim.instrument.plant import LinearPlant
 
 LASHBENCH = str(Path(sys.executable).with_name("lashbench"))
 SWEEP = ["--level", "2", "--start", "130", "--stop", "170", "--points", "2500"]
@@ -28,6 +30,7 @@ QUICK = ["--settle-cycles", "3", "--integrate-cycles", "4", "--yes"]
 SILENT_S = 60.0
 """More than any session is silent before it is taken over, on a busy machine, too."""
 
+EVERY_WIRE = [(driver.scheme, wire) for driver in DRIVERS for wire in wires_of(driver.scheme)]
 needs_holding = pytest.mark.skipif(not can_be_held(), reason="needs seccomp on Linux")
 
 
@@ -36,7 +39,7 @@ def words(url, db):
 
 
 def drives(instrument):
-    return abs(instrument.output_vpk) > 0.0
+    return instrument.driven_v > 0.0
 
 
 def wait_for(what, seconds=SILENT_S):
@@ -160,9 +163,10 @@ def test_without_a_sign_of_life_of_a_watchdog_nothing_is_driven(db):
 
 
 @pytest.mark.slow
-def test_a_session_that_stands_still_loses_the_bench_and_learns_it(db):
-    instrument = linear_analyser(known_gain)
-    with served(instrument) as url, measuring(url, db) as process:
+@pytest.mark.parametrize("driver", [driver.scheme for driver in DRIVERS])
+def test_a_session_that_stands_still_loses_the_bench_and_learns_it(db, driver):
+    instrument = simulated(driver, LinearPlant(known_gain))
+    with served(instrument, driver=driver) as url, measuring(url, db) as process:
         wait_for(lambda: drives(instrument))
         os.kill(process.pid, signal.SIGSTOP)
         assert wait_for(lambda: not drives(instrument)) < 40.0
@@ -367,10 +371,10 @@ print(sorted(set(sys.modules) - before), state)
 """
 
 
-@pytest.mark.parametrize("wire", ["tcp", "prologix_tcp", "prologix_pty"])
-def test_a_watchdog_loads_nothing_when_it_is_needed(tmp_path, wire):
+@pytest.mark.parametrize(("driver", "wire"), EVERY_WIRE)
+def test_a_watchdog_loads_nothing_when_it_is_needed(tmp_path, driver, wire):
     db = tmp_path / "bench.db"
-    with served(linear_analyser(known_gain), wire) as url:
+    with served(simulated(driver, LinearPlant(known_gain)), wire, driver) as url:
         short = ["--level", "1", "--start", "130", "--stop", "170", "--points", "2", *QUICK]
         place = ["--unit", "adss", "--instrument", "sim:", "--db", str(db)]
         subprocess.run([LASHBENCH, "measure", *place, *short], check=True, capture_output=True)

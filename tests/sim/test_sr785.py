@@ -1,0 +1,542 @@
+"""The simulated SR785 as any controller meets it: its language, its buffers, its words, its sweep.
+
+Expected values are those of the manual, as docs/sr785.md has them; none of this knows the driver.
+"""
+
+import math
+import struct
+
+import numpy as np
+import pytest
+from fake_analyser import known_gain
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sim.faults import FaultBoard
+from sim.instrument.bus import TalkState
+from sim.instrument.plant import LinearPlant
+from sim.sr785 import SR785, Choices
+from sim.sr785.model import MODEL
+
+INST, DISP, MAV, ESB, SRQ, IFC = 1, 2, 16, 32, 64, 128
+FILLER = -3.4028235e38
+
+
+class Bench:
+    """A controller on the bus, with a clock of its own."""
+
+    def __init__(self, faults=(), gain=known_gain, **choices):
+        wanted = {"noise_v": 0.0, "converter_noise": 0.0} | choices
+        board = FaultBoard([MODEL.parse_fault(fault) for fault in faults])
+        self.wall_s = 0.0
+        self.box = SR785(LinearPlant(gain), Choices(**wanted), board, clock=lambda: self.wall_s)
+
+    def send(self, line):
+        self.box.listen(line.encode("latin-1"), end=True)
+        self.rest()
+
+    def rest(self, seconds=0.02):
+        """Let commands be worked off."""
+        self.box.agenda.run_until(self.box.agenda.now_s + seconds)
+
+    def take(self, limit=None):
+        found = bytearray()
+        while True:
+            talk = self.box.talk(limit)
+            found += talk.data
+            if talk.end or talk.state is not TalkState.DATA:
+                return bytes(found)
+
+    def ask(self, line):
+        self.send(line)
+        return self.take().decode("latin-1").removesuffix("\n")
+
+    def events(self):
+        return int(self.ask("*ESR?"))
+
+    def swept(self, points=12, **settings):
+        """Sweep to the end."""
+        lines = {
+            "MGRP": "2,3", "MEAS": "2,47", "VIEW": "2,3", "UNDB": "2,0", "SSTR": "2,100",
+            "SSTP": "2,200", "SSTY": "2,0", "SNPS": f"2,{points}", "SSAM": "1 V", "SRCO": "1",
+        } | settings  # fmt: skip
+        for name, value in lines.items():
+            self.send(f"{name} {value}")
+        assert self.events() & 0x3C == 0
+        self.send("*CLS")
+        self.send("STRT")
+        self.rest(200.0)
+
+    def trace(self, display=0):
+        return [float(word) for word in self.ask(f"DSPY? {display}").split(",")]
+
+
+@pytest.fixture
+def bench():
+    made = Bench()
+    assert made.events() == 128  # it was just switched on
+    return made
+
+
+# ------------------------------------------------------------ language
+
+
+def test_who_it_is(bench):
+    assert bench.ask("*IDN?").startswith("Stanford_Research_Systems,SR785,")
+
+
+@pytest.mark.parametrize(
+    "line", ["SSTR?0", "sstr ? 0", " SSTR?  0 ", "SSTR? 0;", ";;SSTR?0", "SsTr ?0"]
+)
+def test_blanks_and_case_do_not_matter(bench, line):
+    assert float(bench.ask(line)) == 100.0
+
+
+@pytest.mark.parametrize(
+    ("line", "hertz"),
+    [("SSTR2,51.2 k", 51200.0), ("SSTR 2, 5E2", 500.0), ("SSTR 2,500mHz", 0.5),
+     ("SSTR 2,.5khz", 500.0), ("SSTR 2,500 H", 500.0)],
+)  # fmt: skip
+def test_the_beginning_of_a_unit_is_enough(bench, line, hertz):
+    bench.send("MGRP 2,3")
+    bench.send(line)
+    assert bench.events() == 0
+    assert float(bench.ask("SSTR? 1")) == pytest.approx(hertz)
+
+
+@pytest.mark.parametrize(
+    ("line", "event"),
+    [
+        ("FOOO 1", 32), ("SSTR", 32), ("SSTR 2,1,2", 32), ("SSTR 2,ten", 32), ("STRT 1", 32),
+        ("SSTR 2,1 furlong", 32), ("SSTR 2,1e9", 16), ("SSTR 3,100", 16), ("MGRP 2,9", 16),
+        ("MEAS 0,11", 16),
+        ("SNPS 2,9", 16), ("SNPS 2,2049", 16), ("SSAM 5001 mV", 16), ("SOFF 6", 16),
+    ],
+)  # fmt: skip
+def test_what_is_refused_sets_a_bit_and_changes_nothing(bench, line, event):
+    questions = "SSTR? 0", "SNPS? 0", "MEAS? 0", "SSAM?", "SOFF?", "MGRP? 1"
+    bench.send("MGRP 2,3")
+    before = [bench.ask(question) for question in questions]
+    bench.send(line)
+    assert bench.events() == event
+    assert before == [bench.ask(question) for question in questions]
+
+
+def test_a_refused_question_is_not_answered(bench):
+    for line in ("FOOO?", "SSTR? 2", "DSPY? 0,9999", "STRT?"):
+        bench.send(line)
+        assert bench.box.talk().state is TalkState.NOTHING
+    assert bench.events() & 48
+
+
+def test_questions_in_one_line_are_answered_one_by_one(bench):
+    bench.send("SRCO?;MGRP? 0;*STB?")
+    replies = [bench.box.talk() for _ in range(3)]
+    assert [reply.data for reply in replies] == [b"0\n", b"0\n", b"16\n"]
+    assert all(reply.end for reply in replies)
+
+
+def test_settings_of_swept_sine_need_its_group_and_a_live_display(bench):
+    bench.send("SSTR 2,300")
+    assert bench.events() == 16
+    bench.send("MGRP 2,3")
+    bench.send("SSTR 2,300")
+    assert bench.events() == 0
+    bench.send("DISP 0,0")
+    bench.send("SSTR 2,400")
+    assert bench.events() == 16
+    assert bench.ask("SSTR? 0") == "300"
+
+
+def test_a_level_comes_with_the_index_of_its_unit(bench):
+    bench.send("MGRP 2,3")
+    for line, reply in (("SSAM 500 mV", "500,0"), ("SSAM .5 V", "0.5,1"), ("SSAM -20dB", "-20,2")):
+        bench.send(line)
+        assert bench.ask("SSAM?") == reply
+    assert bench.events() == 0
+
+
+def test_amplitude_and_offset_share_five_volts(bench):
+    bench.send("MGRP 2,3")
+    bench.send("SSAM 4 V")
+    bench.send("SOFF 1.5")
+    assert bench.events() == 16
+    bench.send("SOFF -1")
+    bench.send("SSAM 4.5 V")
+    assert bench.events() == 16
+    assert bench.ask("SSAM?") == "4,1"
+
+
+# ------------------------------------------------------------ interfaces and buffers
+
+
+def test_replies_go_where_outx_says_whoever_asked(bench):
+    bench.send("OUTX 1")
+    bench.send("SRCO?")
+    assert bench.box.talk().state is TalkState.NOTHING
+    assert bench.box.serial_out() == b"0\r"
+    bench.box.serial_in(b"*IDN?\r\nOUTX 0\nSRCO?\r")
+    bench.rest(1.0)
+    assert bench.box.serial_out().startswith(b"Stanford")
+    assert bench.take() == b"0\n"
+
+
+def test_a_line_ends_with_line_feed_or_eoi_on_the_bus(bench):
+    bench.box.listen(b"SRCO?\n")
+    bench.rest()
+    assert bench.take() == b"0\n"
+    bench.box.listen(b"SRCO?")
+    bench.rest()
+    assert bench.box.talk().state is TalkState.NOTHING
+    bench.box.listen(b" ", end=True)
+    bench.rest()
+    assert bench.take() == b"0\n"
+
+
+def test_more_than_256_characters_empty_both_buffers(bench):
+    bench.send("*IDN?")
+    bench.box.listen(b"SRCO?;" * 50, end=True)
+    bench.rest(10.0)
+    assert bench.box.talk().state is TalkState.NOTHING
+    assert bench.events() & 8
+    for _ in range(10):
+        bench.send("*IDN?")
+    bench.box.device_clear()
+    assert bench.events() & 4
+    assert int(bench.ask("ERRS? 0")) == 1
+
+
+def test_the_bus_is_free_only_when_nothing_executes(bench):
+    bench.box.listen(b"SRCO 0", end=True)
+    assert not bench.box.serial_poll() & IFC
+    bench.rest()
+    assert bench.box.serial_poll() & IFC
+    assert int(bench.ask("*STB?")) & IFC == 0
+
+
+def test_a_reset_keeps_it_busy_for_twelve_seconds(bench):
+    bench.send("MGRP 2,3")
+    bench.send("*RST")
+    bench.box.listen(b"MGRP? 0", end=True)
+    bench.rest(11.0)
+    assert bench.box.talk().state is TalkState.WAITING
+    bench.rest(2.0)
+    assert bench.take() == b"0\n"
+
+
+def test_a_device_clear_empties_the_buffers_and_lets_a_sweep_go_on():
+    bench = Bench()
+    bench.swept(points=40)
+    bench.send("STRT")
+    bench.send("*IDN?")
+    bench.box.device_clear()
+    assert bench.box.talk().state is TalkState.NOTHING
+    assert bench.box.sweep.running
+    assert bench.box.driven_v == 1.0
+
+
+# ------------------------------------------------------------ status
+
+
+def test_words_are_read_whole_or_bit_by_bit_and_cleared_so(bench):
+    bench.swept()
+    assert bench.ask("DSPS? 4") == "1"
+    assert bench.ask("DSPS? 4") == "0"
+    assert int(bench.ask("DSPS?")) & (1 << 12)
+    assert bench.ask("DSPS?") == "0"
+
+
+def test_an_enabled_bit_shows_in_the_poll_and_requests_service(bench):
+    bench.send("DSPE 16")
+    bench.send("*SRE 2")
+    assert bench.box.serial_poll() == IFC
+    bench.swept()
+    assert bench.box.service_request
+    assert bench.box.serial_poll() == IFC | DISP | SRQ
+    assert bench.box.serial_poll() == IFC | DISP
+    bench.ask("DSPS?")
+    assert bench.box.serial_poll() == IFC
+
+
+def test_enables_survive_a_power_cycle_only_if_told_so(bench):
+    bench.send("*ESE 48")
+    bench.box.power_on()
+    assert bench.ask("*ESE?") == "0"
+    bench.send("*PSC 0")
+    bench.send("*ESE 48")
+    bench.box.power_on()
+    assert bench.ask("*ESE?") == "48"
+
+
+# ------------------------------------------------------------ sweep and source
+
+
+def test_a_sweep_measures_what_is_there():
+    bench = Bench()
+    bench.swept(points=21, VIEW="0,3")
+    bench.send("VIEW 1,4")
+    frequencies = [float(bench.ask(f"DBIN? 0,{row}")) for row in range(21)]
+    assert frequencies == pytest.approx(np.linspace(100, 200, 21))
+    real, imaginary = bench.trace(0), bench.trace(1)
+    assert bench.ask("DSPN? 0") == "22"
+    assert len(real) == 22
+    assert real[-1] == pytest.approx(FILLER)
+    for hz, one, other in zip(frequencies, real, imaginary, strict=False):
+        assert complex(one, other) == pytest.approx(known_gain(hz), rel=1e-5)
+
+
+def test_bins_ascend_whichever_way_it_sweeps():
+    bench = Bench()
+    bench.swept(SSTR="2,200", SSTP="2,100")
+    assert float(bench.ask("DBIN? 0,0")) == 100.0
+    down = bench.trace()
+    bench.swept()
+    assert bench.trace() == pytest.approx(down, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("view", "shown"),
+    [
+        (0, lambda z: abs(z)), (1, lambda z: abs(z)), (2, lambda z: abs(z) ** 2),
+        (3, lambda z: z.real), (4, lambda z: z.imag),
+        (5, lambda z: math.degrees(math.atan2(z.imag, z.real))),
+    ],
+)  # fmt: skip
+def test_views_are_those_of_the_manual(view, shown):
+    bench = Bench()
+    bench.swept(VIEW=f"2,{view}")
+    for row, hz in enumerate(np.linspace(100, 200, 12)):
+        assert float(bench.ask(f"DSPY? 0,{row}")) == pytest.approx(shown(known_gain(hz)), rel=1e-5)
+
+
+def test_decibels_and_radians_where_they_are_asked_for():
+    bench = Bench()
+    bench.swept(VIEW="2,0", UNDB="2,1")
+    assert float(bench.ask("DSPY? 0,0")) == pytest.approx(20 * math.log10(abs(known_gain(100))))
+    bench.send("UNPH 2,1")
+    bench.send("VIEW 0,5")
+    z = known_gain(100)
+    assert float(bench.ask("DSPY? 0,0")) == pytest.approx(math.atan2(z.imag, z.real), rel=1e-5)
+
+
+def test_a_nyquist_trace_is_pairs_y_first_in_binary_and_x_first_in_text():
+    bench = Bench()
+    bench.swept(VIEW="2,7")
+    z = known_gain(100)
+    assert [float(word) for word in bench.ask("DSPY? 0,0").split(",")] == pytest.approx(
+        [z.real, z.imag], rel=1e-5
+    )
+    bench.send("DSPB? 0,0")
+    assert struct.unpack("<2f", bench.take()) == pytest.approx((z.imag, z.real), rel=1e-5)
+    bench.send("DSPB? 0")
+    assert len(bench.take()) == 8 * 13
+
+
+def test_binary_is_what_text_says_without_header_or_end():
+    bench = Bench()
+    bench.swept()
+    text = bench.trace()
+    bench.send("DSPB? 0")
+    data = bench.take()
+    assert len(data) == 4 * 13
+    assert struct.unpack("<13f", data) == pytest.approx(text, rel=1e-6)
+
+
+def test_a_transfer_keeps_the_bus_busy_and_is_given_up_after_a_second():
+    bench = Bench()
+    bench.swept()
+    bench.send("DSPB? 0")
+    assert not bench.box.serial_poll() & IFC
+    assert len(bench.box.talk(8).data) == 8
+    bench.wall_s += 0.9
+    assert len(bench.box.talk(8).data) == 8
+    bench.wall_s += 1.1
+    assert bench.box.serial_poll() & IFC
+    assert bench.box.talk().state is TalkState.NOTHING
+    assert bench.ask("ERRS? 0") == "1"
+
+
+def test_binary_does_not_go_to_rs232(bench):
+    bench.swept()
+    bench.send("OUTX 1")
+    bench.send("DSPB? 0")
+    assert bench.box.serial_out() == b""
+    bench.send("OUTX 0")
+    assert bench.events() == 16
+
+
+@pytest.mark.parametrize(
+    ("settle", "integrate", "hz", "seconds"),
+    [((1, 0.0078125), (1, 0.015625), 100.0, 0.01 + 0.02),
+     ((1, 0.0078125), (1, 0.015625), 1000.0, 0.008 + 0.016),
+     ((30, 0.0078125), (60, 0.015625), 100.0, 0.9),
+     ((1, 0.5), (1, 1.0), 100.0, 1.5),
+     ((1, 0.0078125), (1, 0.0234375), 100.0, 0.01 + 0.03)],
+)  # fmt: skip
+def test_a_point_takes_cycles_or_time_whichever_is_longer_in_whole_cycles(
+    settle, integrate, hz, seconds
+):
+    bench = Bench(point_overhead_s=0.0, command_s=1e-6)
+    bench.swept(
+        points=10, SSTR=f"2,{hz}", SSTP=f"2,{hz * 1.0001}", SSCY=f"2,{settle[0]}",
+        SSTM=f"2,{settle[1]}", SICY=f"2,{integrate[0]}", SITM=f"2,{integrate[1]}",
+        A1RG="0", A2RG="0",
+    )  # fmt: skip
+    bench.send("STRT")
+    begun_s = bench.box.agenda.now_s
+    while bench.box.sweep.running:
+        bench.rest(0.001)
+    assert bench.box.agenda.now_s - begun_s == pytest.approx(10 * seconds, rel=0.02, abs=0.03)
+
+
+def test_the_source_drives_only_while_it_sweeps():
+    bench = Bench()
+    assert bench.box.driven_v == 0.0
+    bench.swept(points=40)
+    assert bench.box.driven_v == 0.0
+    bench.send("STRT")
+    assert bench.box.driven_v == 1.0
+    bench.send("PAUS")
+    assert bench.box.driven_v == 0.0
+    assert int(bench.ask("INST?")) & 32
+    begun = bench.box.points_begun
+    bench.rest(5.0)
+    assert bench.box.points_begun <= begun + 1
+    bench.send("CONT")
+    assert bench.box.driven_v == 1.0
+    bench.send("SRCO 0")
+    assert bench.box.driven_v == 0.0
+
+
+def test_fft_drives_as_soon_as_it_is_entered_with_the_switch_on():
+    bench = Bench()
+    bench.swept(S1AM="2 V")
+    assert bench.box.driven_v == 0.0
+    bench.send("MGRP 2,0")
+    assert bench.box.driven_v == 2.0
+    bench.send("SRCO 0")
+    assert bench.box.driven_v == 0.0
+
+
+def test_a_ramp_takes_its_time():
+    bench = Bench()
+    bench.swept(points=40, SRMP="1", SRAT="0.5")
+    bench.send("STRT")
+    bench.rest(1.0)
+    assert 0.4 < bench.box.driven_v < 0.6
+    bench.rest(2.0)
+    assert bench.box.driven_v == 1.0
+    bench.send("PAUS")
+    bench.rest(1.0)
+    assert 0.4 < bench.box.driven_v < 0.6
+
+
+def test_a_change_of_the_grid_throws_the_data_away_and_begins_anew():
+    bench = Bench()
+    bench.swept(points=40)
+    bench.send("STRT")
+    bench.rest(1.0)
+    begun = bench.box.measurements_begun
+    bench.send("SICY 2,3")
+    assert bench.box.measurements_begun == begun
+    bench.send("SNPS 2,20")
+    assert bench.box.measurements_begun == begun + 1
+    bench.rest(100.0)
+    assert bench.ask("DSPN? 0") == "21"
+
+
+def test_an_input_range_that_is_too_small_clips_and_says_so():
+    bench = Bench(gain=lambda hz: 0.5)
+    bench.swept(A2RG="0", I2RG="-12 dBVpk")
+    bits = int(bench.ask("INPS?"))
+    assert bits >> 8 & 4
+    assert not bits & 4
+    assert 0.25 < bench.trace()[0] < 0.45
+
+
+def test_autorange_goes_up_alone_unless_it_tracks():
+    for tracking, step in (("0", 0), ("1", -20)):
+        bench = Bench(gain=lambda hz: 0.1)
+        bench.swept(A2RG="1", I2RG="0 dBVpk", I2AR=tracking)
+        assert bench.ask("I2RG?") == f"{step},0"
+
+
+def test_automatic_resolution_skips_points_and_does_not_say_so():
+    bench = Bench()
+    bench.swept(points=60, SARS="2,1", SFST="2,3", SSKP="2,10")
+    taken = len(bench.box.sweep.bins)
+    assert taken < 40
+    assert all(value > FILLER * 0.99 for value in bench.trace()[:-1])
+
+
+def test_automatic_level_holds_the_channel_and_respects_the_maximum():
+    bench = Bench(gain=lambda hz: 0.25)
+    bench.swept(SSAL="2", SSRF="500 mV", SMAX="5 V", MEAS="2,43", VIEW="2,1", UNPK="2,1")
+    assert bench.trace()[0] == pytest.approx(0.5, rel=0.15)
+    bench.send("SSAL 0")
+    bench.swept(SSAL="2", SMAX="1 V", MEAS="2,43", VIEW="2,1", UNPK="2,1")
+    assert bench.trace()[0] == pytest.approx(0.25, rel=0.01)
+
+
+def test_psd_units_are_switched_in_fft_and_spoil_a_swept_sine():
+    bench = Bench()
+    bench.send("PSDU 0,1")
+    bench.swept()
+    assert bench.trace()[0] != pytest.approx(known_gain(100).real, rel=0.1)
+    bench.send("*RST")
+    bench.rest(13.0)
+    assert bench.ask("PSDU? 0") == "1"
+
+
+def test_the_normalised_variance_is_that_of_a_cycle():
+    bench = Bench(noise_v=1e-3, seed=4)
+    bench.swept(points=40, MEAS="2,45", VIEW="2,1", SICY="2,100")
+    relative = 1e-3 * math.sqrt(30) / np.abs([known_gain(hz) for hz in np.linspace(100, 200, 40)])
+    assert np.median(bench.trace()[:-1] / (2 * relative**2)) == pytest.approx(1.0, rel=0.15)
+
+
+def test_a_unit_holds_characters_of_an_old_code_page():
+    bench = Bench()
+    bench.swept(MEAS="2,42", VIEW="2,2", PSDU="2,1")
+    bench.send("UNIT? 0")
+    assert bench.take() == b"Vpk\xfd/\xfbHz\n"
+
+
+def test_an_sr780_has_other_numbers():
+    bench = Bench(model="SR780")
+    assert "SR780" in bench.ask("*IDN?")
+    bench.send("MGRP 2,3")
+    assert bench.events() & 16
+    bench.send("MGRP 2,2")
+    bench.send("MEAS 2,36")
+    assert bench.events() == 0
+
+
+# ------------------------------------------------------------ anything at all
+
+
+@settings(max_examples=150)
+@given(st.binary(max_size=300) | st.text("SRCOMGP?2,;0 \n*ESVY", max_size=80).map(str.encode))
+def test_whatever_comes_it_comes_back_to_its_senses(data):
+    bench = Bench()
+    bench.box.listen(data, end=True)
+    bench.rest(30.0)
+    bench.take()
+    bench.box.device_clear()
+    bench.send("OUTX 0;*CLS")
+    assert bench.events() == 0
+    assert bench.ask("*IDN?").startswith("Stanford")
+
+
+@pytest.mark.parametrize("fault", sorted(MODEL.faults))
+def test_every_fault_strikes(fault):
+    bench = Bench([f"{fault}:point=0"])
+    try:
+        bench.swept(points=10)
+        bench.send("DSPB? 0")
+        bench.take()
+    except (AssertionError, ValueError):
+        pass  # that is what a fault does to a controller
+    for link in ("dropped-connection", "adapter-reset"):
+        bench.box.damage.link_fault(link)
+    assert bench.box.faults.faults[0].struck > 0
