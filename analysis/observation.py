@@ -219,7 +219,7 @@ def _levels(number: int, response: FrequencyResponse) -> Iterator[_Level]:
     if np.any(np.isnan(response.source_vpk)):
         raise AnalysisError(
             "the response does not say at which source level it was swept, and a servo with play "
-            "answers differently at each; write the level into it (docs/how-to/foreign-files.md)"
+            "answers differently at each; give --level V (docs/how-to/foreign-files.md)"
         )
     response = settled(response)
     usable = ((response.flags & (PointFlag.SPOILT | PointFlag.OVERLOAD)) == 0) & (

@@ -65,6 +65,14 @@ def _bode100(mark: str = ",", decimal: str = ".") -> str:
     return text + (body.replace(".", decimal) if decimal != "." else body)
 
 
+def _bode100_2016() -> str:
+    head = (
+        "---Measurement Setup---\nDevice Type: Bode100\nSource Level (dBm): 4\nProbe CH1: 10:1\n\n"
+    )
+    names = "Frequency (Hz), TR1: Gain (Real), TR1: Gain (Imag), TR1: Gain (dB), TR2: Gain (Degree)"
+    return head + names + "\n" + rows(HERTZ, GAIN.real, GAIN.imag, DB, DEG, mark=", ")
+
+
 def _siglent() -> str:
     head = "".join(f"Setting {k},{k}\n" for k in range(24)) + "Model,SDS1104X-E\n\n"
     names = "Frequency(Hz),CH2 Amplitude(dB),CH2 Phase(Deg),CH3 Amplitude(dB),CH3 Phase(Deg)\n"
@@ -129,7 +137,13 @@ def files() -> Iterable[ForeignFile]:
     text: list[tuple[str, str, str, Reading]] = [
         ("Bode Analyzer Suite", "bode100.csv", _bode100(), NOTHING_TOLD),
         ("Bode Analyzer Suite, German", "bode100_de.csv", _bode100(";", ","), NOTHING_TOLD),
-        ("Siglent SDS", "siglent.csv", _siglent(), Reading(profile="siglent")),
+        ("Bode 100, older CSV", "bode100_2016.csv", _bode100_2016(), NOTHING_TOLD),
+        ("LTspice, one step", "ltspice_step.txt",
+         _ltspice(True).replace("\n", "\nStep Information: Hu=40  (Step: 1/1)\n", 1), NOTHING_TOLD),
+        ("Rows that end in a separator", "ends.csv",
+         "Frequency (Hz);Gain (dB);Phase (deg);\n"
+         + rows(HERTZ, DB, DEG, mark=";").replace("\n", ";\n"), NOTHING_TOLD),
+        ("Siglent SDS", "siglent.csv", _siglent(), Reading(profile="siglent-ch2")),
         ("Digilent WaveForms", "waveforms.csv", _waveforms(), Reading(profile="waveforms")),
         ("Moku FRA", "moku.csv", _moku(), NOTHING_TOLD),
         ("Keysight InfiniiVision FRA", "keysight.csv", _keysight(), NOTHING_TOLD),
@@ -173,7 +187,7 @@ def files() -> Iterable[ForeignFile]:
         ("FRA4PicoScope", "fra4pico.csv",
          "Frequency Log(Hz), Gain (dB), Phase (deg)\n"
             + rows(np.log10(HERTZ), DB, DEG, form="{:.12g}"),
-         told(("frequency_log10_hz", "1"))),
+         NOTHING_TOLD),
         ("Ono Sokki, kHz", "kilo.csv", "Freq (kHz),Mag (dB),Phase (deg)\n"
          + rows(HERTZ / 1e3, DB, DEG, form="{:.12g}"), NOTHING_TOLD),
     ]  # fmt: skip

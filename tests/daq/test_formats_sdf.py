@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from sdf_files import HP_35665A, HP_35670A, VOLT, Channel, File
 
 from daq.errors import FileFormatError, InputError
-from daq.formats import read_response, sdf, write_response
+from daq.formats import Reading, read_response, sdf, write_response
+from daq.formats.reading import remarks_of
 from daq.frf import PointFlag
 
 
@@ -138,3 +139,21 @@ def test_the_format_is_only_read(tmp_path):
     response = read_response(saved(tmp_path, File()))
     with pytest.raises(InputError, match="cannot write"):
         write_response(response, tmp_path / "new.dat")
+
+
+def test_a_line_at_0_hz_is_left_out_and_the_level_told(tmp_path):
+    path = tmp_path / "TRACE1.DAT"
+    path.write_bytes(File(first=0.0).content())
+    response = read_response(path, Reading(level_vpk=2.5, unit_name="ADSS", direction="up"))
+    np.testing.assert_allclose(response.frequency_hz, [2.5, 5.0, 7.5])
+    assert remarks_of(response) == ["the row at 0 Hz of TRACE1.DAT left out"]
+    np.testing.assert_array_equal(response.levels_vpk, [2.5])
+    assert (response.unit, response.direction) == ("ADSS", "up")
+    write_response(response, tmp_path / "known.csv")
+    np.testing.assert_allclose(read_response(tmp_path / "known.csv").gain, response.gain)
+
+
+def test_a_dat_file_of_text_is_a_table(tmp_path):
+    path = tmp_path / "t.dat"
+    path.write_text("Frequency (Hz) Gain (dB)\n10 -3\n20 -4\n30 -5\n")
+    np.testing.assert_allclose(read_response(path).gain_db, [-3, -4, -5])

@@ -73,6 +73,11 @@ def meaning_of(header: str) -> Meaning:
         return Meaning(_kind_of(plain.lower()), plain.lower())
     name, unit = _parted(plain)
     kind = _kind(name)
+    if kind == "gain":
+        # A part of a complex gain, which stands in the place of its unit: Gain (Real), Gain (deg).
+        part = _kind(unit)
+        kind = part if part in ("real", "imag") else "phase" if phase_in(unit) else kind
+        unit = "" if part in ("real", "imag") else unit
     if kind == "frequency" and _words(name) & _LOGARITHM:
         return Meaning(kind)
     if kind:

@@ -99,7 +99,9 @@ def _by_headers(found: dict[str, Assigned], table: Table, path: Path) -> None:
         others = [k for k in gains if names_another_unit(table.names[k])]
         gains = [k for k in gains if k not in others] or gains
         complexes = [k for k in gains if table.columns[k].dtype.kind == "c"]
-        if len(parts[0]) == len(parts[1]) == 1 and len(gains) != 1:
+        # Parts tell the phase, too, where no column does.
+        alone = len(gains) != 1 or not (kinds.get("phase") or _has(found, "phase"))
+        if len(parts[0]) == len(parts[1]) == 1 and alone and not _has(found, "phase"):
             _add(found, table, "real", parts[0], path)
             _add(found, table, "imag", parts[1], path)
             return

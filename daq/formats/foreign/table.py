@@ -46,6 +46,7 @@ _LONG = r"[+-]?[0-9]\.[0-9]+[eE][+-]?[0-9]+"
 _PAIR = re.compile(rf"\t\s*({_LONG}),({_LONG})(?=\s*(?:\t|\Z))")
 _PAIRS = {"polar": ("magnitude (dB)", "phase (deg)"), "cartesian": ("real", "imag")}
 """What the halves of a pair are, as circuit simulators write complex numbers in one cell."""
+_STEP = re.compile(r"\s*Step Information:")
 _THOUSANDS = re.compile(r"[+-]?[0-9]{1,3},[0-9]{3}\Z")
 
 
@@ -227,7 +228,8 @@ def _header(
     lines: Sequence[str], form: _Form, width: int, pairs: str
 ) -> tuple[tuple[str, ...], frozenset[int]]:
     """Names of the columns, and which of the lines above the table they are."""
-    filled = [k for k, line in enumerate(lines) if line.strip()]
+    # A circuit simulator names the step of a parameter below the header.
+    filled = [k for k, line in enumerate(lines) if line.strip() and not _STEP.match(line)]
     if not filled:
         return ("",) * width, frozenset()
     last = _names(lines[filled[-1]], form, width, pairs)
