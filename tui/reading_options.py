@@ -101,6 +101,13 @@ class ReadingOptions(LayoutOptions):
         ):
             if value is not None and value < least:
                 raise InputError(f"{name} {value} is not a whole number of {least} or more")
+        for name, text in (
+            ("--function", self.function),
+            ("--profile", self.profile),
+            ("--unit-name", self.unit_name),
+        ):
+            if text is not None and not text.strip():
+                raise InputError(f"{name} is empty; give a name, or leave it out")
         return Reading(
             unit_name=self.unit_name,
             level_vpk=None if self.level is None else level_vpk(self.level),

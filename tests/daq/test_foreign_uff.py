@@ -51,6 +51,20 @@ def test_binary_data_may_look_like_an_end_and_state_a_wrong_length(tmp_path, sta
     np.testing.assert_array_equal(read_response(path).gain, fake)
 
 
+def test_a_binary_function_of_another_machine_is_refused_with_the_cure(tmp_path):
+    path = tmp_path / "b.uff"
+    for old, new in ((b"58b     1     2", b"58b     1     3"), (b"58b     1", b"58b     3")):
+        path.write_bytes(binary_58().replace(old, new))
+        with pytest.raises(FileFormatError, match="save it as ASCII data set 58"):
+            read_response(path)
+
+
+def test_the_number_of_a_set_need_not_be_aligned(tmp_path):
+    path = tmp_path / "b.uff"
+    path.write_bytes(binary_58().replace(b"    58b     1     2          11", b"58b 1 2 11"))
+    np.testing.assert_allclose(read_response(path).gain, GAIN)
+
+
 def test_a_binary_function_that_is_cut_or_changed_is_refused(tmp_path):
     path = tmp_path / "b.uff"
     content = binary_58()

@@ -66,6 +66,8 @@ def test_what_a_file_does_not_say_is_told(tmp_path, capsys):
         (["--averages", "0"], "--averages 0"),
         (["--column", "gain_db"], "is not QUANTITY=COLUMN"),
         (["--function", "1"], "--function says nothing of"),
+        (["--function", ""], "--function is empty"),
+        (["--profile="], "--profile is empty"),
     ],
 )
 def test_what_contradicts_a_file_or_means_nothing_is_refused(tmp_path, capsys, words, fault):

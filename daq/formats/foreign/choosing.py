@@ -52,7 +52,7 @@ def foreign_response(
     if not responses:
         found = f"; it holds {_listed(functions)}" if functions else ""
         raise FileFormatError(
-            f"{path}: holds no frequency response function (type 4 of data set 58){found}"
+            f"{path}: holds no frequency response function{found}"
         )
     chosen = _chosen(responses, functions, reading, path)
     if sum(len(one.x) for one in chosen) > ROW_LIMIT:

@@ -26,6 +26,7 @@ _MOST_POINTS = 4_000_000
 _DIRECTIONS = ("", "+X", "+Y", "+Z", "+RX", "+RY", "+RZ")
 _DELIMITER = re.compile(rb"[ \t]*-1[ \t]*\r?\n?\Z")
 _DELIMITER_BEHIND_DATA = re.compile(rb"[\r\n]*    -1[ \t]*(\r?\n|\r|\Z)")
+_NUMBERED = re.compile(r"\s{0,6}([0-9]{1,6})([bB]?)(.*)\Z")
 _NUMBERS = re.compile(r"[0-9+\-.E\s]*\Z")
 _BARE_EXPONENT = re.compile(r"(?<=[0-9.])([+-][0-9]{3})(?=\s|\Z)")
 _REAL_SINGLE, _REAL_DOUBLE, _COMPLEX_SINGLE, _COMPLEX_DOUBLE = 2, 4, 5, 6
@@ -186,8 +187,9 @@ class _Layout:
                     yield _number(cell, self.place)
 
     def from_binary(self, block: bytes, head: str) -> NDArray[np.float64]:
-        order = {1: "<", 2: ">"}.get(_whole(head, 1, 7, f"{self.place}: byte order"))
-        if order is None or _whole(head, 7, 13, f"{self.place}: number format") not in (2,):
+        words = head.split()
+        order = {"1": "<", "2": ">"}.get(words[0]) if words else None
+        if order is None or words[1:2] != ["2"]:
             raise FileFormatError(
                 f"{self.place} is binary in a form of DEC or IBM machines, or of none; "
                 "save it as ASCII data set 58"
@@ -238,16 +240,14 @@ def _line(content: bytes, at: int) -> tuple[bytes, int]:
 def _one_set(content: bytes, at: int, path: Path, number: int) -> tuple[DataSet, int]:
     """The data set whose number stands at a byte, and where the next line begins."""
     line, at = _line(content, at)
-    text = line.decode("latin-1").rstrip("\r\n")
-    try:
-        kind = int(text[:6])
-    except ValueError:
+    numbered = _NUMBERED.match(line.decode("latin-1").rstrip("\r\n"))
+    if numbered is None:
         raise FileFormatError(
             f"{path}: data set {number} has no number, or an end is missing before it"
-        ) from None
-    rest = text[6:]
+        )
+    kind, rest = int(numbered[1]), numbered[3]
     lines: list[bytes] = []
-    if rest[:1].lower() == "b" and kind == 58:
+    if numbered[2] and kind == 58:
         for _ in range(_HEAD_LINES):
             line, at = _line(content, at)
             lines.append(line)
@@ -265,7 +265,8 @@ def _binary(
     content: bytes, at: int, head: str, lines: list[bytes], place: str
 ) -> tuple[bytes, int]:
     """The bytes of a binary set, and where the line behind its end begins."""
-    stated = _whole(head, 25, 37, f"{place}: number of bytes") if head[25:37].strip() else 0
+    words = head.split()
+    stated = _whole(words[3], 0, 12, f"{place}: number of bytes") if len(words) > 3 else 0
     end = at + stated
     if stated > 0 and (found := _DELIMITER_BEHIND_DATA.match(content, end)):
         return content[at:end], found.end()
