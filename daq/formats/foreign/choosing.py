@@ -51,9 +51,7 @@ def foreign_response(
     responses = [one for one in functions if one.kind == RESPONSE]
     if not responses:
         found = f"; it holds {_listed(functions)}" if functions else ""
-        raise FileFormatError(
-            f"{path}: holds no frequency response function{found}"
-        )
+        raise FileFormatError(f"{path}: holds no frequency response function{found}")
     chosen = _chosen(responses, functions, reading, path)
     if sum(len(one.x) for one in chosen) > ROW_LIMIT:
         raise FileFormatError(f"{path}: holds more than {ROW_LIMIT} points")
