@@ -33,25 +33,8 @@ __all__ = [
     "load_all_of",
     "open_analyser",
     "parse_instrument",
+    "stranger",
 ]
-
-
-def _drive_35670a(transport: Transport) -> Analyser:
-    from daq.hp35670a import HP35670A
-
-    return HP35670A(transport)
-
-
-def _check_35670a(
-    plan: SweepPlan,
-    slew_vpk_per_s: float,
-    input_range_vpk: tuple[float | None, float | None],
-    *,
-    may_repeat: bool,
-) -> None:
-    from daq.hp35670a_setup import check_sweep as check
-
-    check(plan, slew_vpk_per_s, input_range_vpk, may_repeat=may_repeat)
 
 
 def _found() -> tuple[Driver, ...]:
@@ -60,8 +43,7 @@ def _found() -> tuple[Driver, ...]:
     rooms = sorted(found.name for found in pkgutil.iter_modules(daq.__path__) if found.ispkg)
     names = [f"daq.{room}.driver" for room in rooms]
     modules = [importlib.import_module(name) for name in names if importlib.util.find_spec(name)]
-    preset = Driver("HP/Agilent 35670A", "", _drive_35670a, _check_35670a, ("35670A",), 11)
-    return (preset, *(module.DRIVER for module in modules))
+    return tuple(sorted((module.DRIVER for module in modules), key=lambda driver: driver.scheme))
 
 
 DRIVERS = _found()
@@ -71,6 +53,24 @@ DRIVERS = _found()
 def driver_for(identity: str) -> Driver | None:
     """The driver of an instrument by its answer to ``*IDN?``; None if there is none."""
     return next((driver for driver in DRIVERS if driver.answers(identity)), None)
+
+
+def stranger(identity: str, asked: str) -> str:
+    """What to do about an instrument that is not the one its driver drives; a clause.
+
+    Parameters
+    ----------
+    identity
+        What it answers to ``*IDN?``.
+    asked
+        Scheme of the driver that was to drive it.
+    """
+    driver = driver_for(identity)
+    if driver is None or driver.scheme == asked:
+        return "check the address"
+    if driver.scheme:
+        return f"check the address: one of {driver.name} begins with '{driver.scheme}:'"
+    return f"check the address: one of {driver.name} has no '{asked}:' before it"
 
 
 def parse_instrument(url: str, hosted: tuple[str, ...] = ("sim",)) -> Address:

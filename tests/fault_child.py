@@ -188,18 +188,18 @@ def options(points: int) -> PlanOptions:
 
 def shorten_waits() -> None:
     """The same outcomes as with the driver's own limits, sooner."""
-    import daq.hp35670a
-    import daq.hp35670a_safe
-    import daq.hp35670a_setup
+    import daq.hp35670a.analyser
+    import daq.hp35670a.safe
+    import daq.hp35670a.setup
     import daq.sr785.analyser
     import daq.sr785.safe
     import daq.sr785.setup
     import daq.store_file
 
     short = {"reply_s": 1.0, "block_s": 1.5, "overhead_s": 3.0}
-    timing = daq.hp35670a_setup.Timing
-    daq.hp35670a.Timing = lambda: timing(**short)
-    daq.hp35670a_safe._BUDGET_S = 4.0
+    timing = daq.hp35670a.setup.Timing
+    daq.hp35670a.analyser.Timing = lambda: timing(**short)
+    daq.hp35670a.safe._BUDGET_S = 4.0
     other = daq.sr785.setup.Timing
     daq.sr785.analyser.Timing = lambda: other(**short, serial_block_s=1.5, point_s=0.1)
     daq.sr785.safe._BUDGET_S = daq.sr785.safe._RESET_S = 4.0

@@ -20,7 +20,7 @@ from bench_server import linear_analyser, served  # noqa: E402
 
 from daq.control import SessionControl
 from daq.errors import LashbenchError
-from daq.hp35670a_setup import Timing
+from daq.hp35670a.setup import Timing
 from daq.session_events import Finished
 from sim.faults import CATALOGUE
 from sim.unit import load_unit

@@ -4,6 +4,20 @@ Owns everything that is particular to them. Nothing here was watched on a real i
 docs/sr785.md lists what to check there first.
 """
 
-from daq.sr785.analyser import SR785
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from daq.sr785.analyser import SR785
 
 __all__ = ["SR785"]
+
+
+def __getattr__(name: str) -> object:
+    # The table of drivers imports this package of every instrument, numpy only of the one in use.
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from daq.sr785 import analyser
+
+    return getattr(analyser, name)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from contextlib import suppress
 
 from daq.analyser import Identity
+from daq.drivers import stranger
 from daq.errors import BenchTimeout, InstrumentError, LashbenchError, ProtocolError
 from daq.sr785.dialogue import GPIB, RS232, Dialogue
 from daq.sr785.settings import MODELS
@@ -30,8 +31,8 @@ def parse_identity(identity: str) -> Identity:
     fields = [field.strip() for field in identity.split(",")]
     if len(fields) != 4 or fields[1].upper() not in MODELS:
         raise InstrumentError(
-            f"{identity!r} answers '*IDN?', an SR785 or SR780 was due; check the address, and "
-            "whether it should begin with 'sr785:'"
+            f"{identity!r} answers '*IDN?', an SR785 or SR780 was due; "
+            f"{stranger(identity, 'sr785')}"
         )
     if not fields[0].upper().startswith(_MAKER):
         raise InstrumentError(

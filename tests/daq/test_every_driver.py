@@ -16,7 +16,13 @@ from session_runs import of
 from daq.analyser import PointSettings, SourceState
 from daq.control import SessionControl
 from daq.drivers import DRIVERS, check_sweep
-from daq.errors import InputError, LashbenchError, LimitError, MeasurementError
+from daq.errors import (
+    InputError,
+    InstrumentError,
+    LashbenchError,
+    LimitError,
+    MeasurementError,
+)
 from daq.frf import PointFlag
 from daq.limits import Limits
 from daq.plan import SweepPlan, spaced_frequencies
@@ -224,6 +230,19 @@ def test_a_sweep_that_cannot_be_set_is_refused_before_anything_is_opened(driver)
     ):
         with pytest.raises((LimitError, InputError)):
             check_sweep(f"{lead}sim:", plan, slew, ranges)
+
+
+@pytest.mark.parametrize(
+    ("driver", "other"),
+    [(driver, other) for driver in DRIVERS for other in DRIVERS if driver is not other],
+    ids=lambda driver: driver.scheme or "preset",
+)
+def test_who_gives_the_address_of_another_instrument_is_told_what_to_do(driver, other):
+    instrument = simulated(other.scheme, LinearPlant(known_gain))
+    analyser = driver.drive(Loopback(instrument))
+    word = f"begins with '{other.scheme}:'" if other.scheme else f"has no '{driver.scheme}:'"
+    with pytest.raises(InstrumentError, match=f"answers '.IDN.', .* was due; .*{word}"):
+        analyser.identify()
 
 
 # ------------------------------------------------------------ sessions

@@ -11,7 +11,7 @@ from daq.analyser import PointSettings, SourceState
 from daq.errors import BenchTimeout, InstrumentError, LashbenchError, LinkError, ProtocolError
 from daq.frf import PointFlag
 from daq.hp35670a import HP35670A
-from daq.hp35670a_setup import Timing
+from daq.hp35670a.setup import Timing
 from daq.transports.open import open_transport
 from sim.analyser35670a import Analyser35670A, Choices, LinearPlant
 from sim.faults import FaultBoard, parse_fault

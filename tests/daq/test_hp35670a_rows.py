@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from daq.hp35670a_settings import GRID_HZ
-from daq.hp35670a_trace import nearest_row
+from daq.hp35670a.settings import GRID_HZ
+from daq.hp35670a.trace import nearest_row
 
 EDGES = st.integers(1, 3_276_000)
 

@@ -9,7 +9,7 @@ from wire import Script
 from daq.analyser import PointSettings, SourceState
 from daq.errors import BenchTimeout, LinkError, MeasurementError, ProtocolError
 from daq.hp35670a import HP35670A
-from daq.hp35670a_safe import make_safe
+from daq.hp35670a.safe import make_safe
 from daq.transports.base import Deadline
 from sim.analyser35670a import Analyser35670A, Choices, LinearPlant
 from sim.analyser35670a.settings import Mode

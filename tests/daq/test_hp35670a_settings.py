@@ -13,8 +13,8 @@ import pytest
 from daq.analyser import PointSettings
 from daq.dialogue import Dialogue
 from daq.errors import InstrumentError, LimitError
-from daq.hp35670a_settings import LEVEL, SETTINGS, check_drive, standing_settings
-from daq.hp35670a_setup import enter_swept_sine, planned_settings
+from daq.hp35670a.settings import LEVEL, SETTINGS, check_drive, standing_settings
+from daq.hp35670a.setup import enter_swept_sine, planned_settings
 from daq.scpi_settings import Choice, Number, Switch
 from sim.analyser35670a import Analyser35670A, LinearPlant
 from sim.loopback import Loopback

@@ -24,7 +24,7 @@ from wire import Script
 
 from daq.errors import BenchTimeout, InstrumentError, MeasurementError, ProtocolError
 from daq.hp35670a import HP35670A
-from daq.hp35670a_setup import Timing
+from daq.hp35670a.setup import Timing
 
 # Waiting
 

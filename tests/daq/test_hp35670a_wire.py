@@ -27,7 +27,7 @@ from wire import Script
 from daq.analyser import PointSettings, SourceState
 from daq.errors import InputError, InstrumentError, LimitError, MeasurementError, ProtocolError
 from daq.frf import PointFlag
-from daq.hp35670a_identity import parse_identity
+from daq.hp35670a.identity import parse_identity
 
 
 def test_identify():

@@ -21,17 +21,17 @@ from daq.store import Store
 PROGRAM = """
 import sys
 from pathlib import Path
-import daq.hp35670a
-import daq.hp35670a_safe
-from daq.hp35670a_setup import Timing
+import daq.hp35670a.analyser
+import daq.hp35670a.safe
+from daq.hp35670a.setup import Timing
 from tui.app.application import BenchApp
 from tui.measure_options import PlanOptions
 
 # Whoever is silent is waited for less long than at a bench; whoever answers may take his time,
 # on a machine that is busy with other tests.
 if "silence" in sys.argv[2]:
-    daq.hp35670a.Timing = lambda: Timing(reply_s=0.5, block_s=1.0, overhead_s=3.0)
-    daq.hp35670a_safe._BUDGET_S = 2.0
+    daq.hp35670a.analyser.Timing = lambda: Timing(reply_s=0.5, block_s=1.0, overhead_s=3.0)
+    daq.hp35670a.safe._BUDGET_S = 2.0
 
 class Driven(BenchApp):
     def on_mount(self):
@@ -213,7 +213,7 @@ def test_a_source_that_a_signal_could_not_switch_off_is_told_after_the_screen(
 
 
 def test_who_quits_reads_first_that_the_source_could_not_be_switched_off(tmp_path, monkeypatch):
-    monkeypatch.setattr("daq.hp35670a_safe._BUDGET_S", 2.0)
+    monkeypatch.setattr("daq.hp35670a.safe._BUDGET_S", 2.0)
     db = tmp_path / "bench.db"
 
     async def way():

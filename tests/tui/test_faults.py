@@ -22,8 +22,8 @@ ROOT = Path(__file__).parents[2]
 @pytest.fixture(scope="module")
 def outcomes(tmp_path_factory):
     patch = pytest.MonkeyPatch()
-    patch.setattr("daq.hp35670a.Timing", short_timing)
-    patch.setattr("daq.hp35670a_safe._BUDGET_S", 4.0)
+    patch.setattr("daq.hp35670a.analyser.Timing", short_timing)
+    patch.setattr("daq.hp35670a.safe._BUDGET_S", 4.0)
     faults = {name: ordered(name) for name in CATALOGUE}
     # Well under what an answer may take here: a busy machine adds to it.
     faults["slow-reply"] += ",seconds=0.3"

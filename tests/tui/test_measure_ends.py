@@ -237,7 +237,7 @@ def test_resuming_a_complete_measurement_is_no_fault(run):
 
 
 def test_a_long_point_is_ended_at_once_and_retaken(run, db, tmp_path, monkeypatch):
-    monkeypatch.setattr("daq.hp35670a.calibrate", lambda dialogue: None)
+    monkeypatch.setattr("daq.hp35670a.analyser.calibrate", lambda dialogue: None)
     bench = tmp_path / "bench.toml"
     text = config_path("benches", "default").read_text()
     bench.write_text(text + "channel1_range_vpk = 20.0\nchannel2_range_vpk = 20.0\n")

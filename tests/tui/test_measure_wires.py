@@ -15,7 +15,7 @@ from daq.bench_lock import BenchLock
 from daq.drivers import DRIVERS
 from daq.errors import MeasurementError
 from daq.frf import PointFlag
-from daq.hp35670a_setup import Timing
+from daq.hp35670a.setup import Timing
 from daq.store import Store
 from sim.instrument.plant import LinearPlant
 from tui import cli
@@ -134,8 +134,8 @@ def test_after_a_kill_the_watchdog_switches_the_source_off(tmp_path, driver):
 
 def test_a_watchdog_goes_on_where_the_source_could_not_be_proven_off(tmp_path, monkeypatch, capsys):
     """The instrument is silent for longer than the session waits, and answers then."""
-    monkeypatch.setattr("daq.hp35670a.Timing", lambda: Timing(reply_s=0.5, block_s=1.0))
-    monkeypatch.setattr("daq.hp35670a_safe._BUDGET_S", 0.5)
+    monkeypatch.setattr("daq.hp35670a.analyser.Timing", lambda: Timing(reply_s=0.5, block_s=1.0))
+    monkeypatch.setattr("daq.hp35670a.safe._BUDGET_S", 0.5)
     db, silent = tmp_path / "bench.db", "silence:point=3,seconds=8"
     short = ["--level", "1", "--start", "130", "--stop", "170", "--points", "9", *QUICK]
     with served(linear_analyser(known_gain, [silent])) as url:
@@ -153,8 +153,8 @@ def test_a_watchdog_goes_on_where_the_source_could_not_be_proven_off(tmp_path, m
 
 def test_no_watchdog_is_left_with_what_is_no_analyser(tmp_path, monkeypatch, capsys):
     """Somebody gave a wrong address: the next session must not wait."""
-    monkeypatch.setattr("daq.hp35670a.Timing", lambda: Timing(reply_s=0.3, block_s=1.0))
-    monkeypatch.setattr("daq.hp35670a_safe._BUDGET_S", 0.5)
+    monkeypatch.setattr("daq.hp35670a.analyser.Timing", lambda: Timing(reply_s=0.3, block_s=1.0))
+    monkeypatch.setattr("daq.hp35670a.safe._BUDGET_S", 0.5)
     db = tmp_path / "bench.db"
     short = ["--level", "1", "--start", "130", "--stop", "170", "--points", "9", *QUICK]
     with socket.create_server(("127.0.0.1", 0)) as silent:

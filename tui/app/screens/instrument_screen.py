@@ -28,6 +28,7 @@ _REMEDIES = (
     "What to try:",
     "- the simulated bench needs nothing: choose it above",
     "- power, cable and address of the analyser; its front panel shows the address",
+    "- an SR785 needs sr785: before its address",
     "- a serial adapter needs the right to use its port: group dialout",
     "- a simulated one on a wire: lashbench serve --unit adss --ratio 0.3 --tcp 0",
 )
@@ -40,7 +41,9 @@ class InstrumentScreen(StepScreen):
     HELP = """
 Choose where the analyser is and press Enter: a simulated bench, a port or resource that was
 found on this machine, or an address that you type, such as TCPIP::192.0.2.7::5025::SOCKET,
-GPIB0::11::INSTR, prologix:/dev/ttyUSB0?addr=11 or prologix-tcp:HOST:PORT?addr=11.
+GPIB0::11::INSTR, prologix:/dev/ttyUSB0?addr=11 or prologix-tcp:HOST:PORT?addr=11. These are for a
+35670A. For an SR785 write sr785: before any of them, as in sr785:GPIB0::10::INSTR, or give its
+own serial port: sr785:serial:/dev/ttyUSB0?baud=9600.
 
 Connecting asks who is there and what the source does. It drives nothing.
 """

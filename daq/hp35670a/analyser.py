@@ -2,7 +2,7 @@
 
 Owns the state of the driver and the order of things: identify, prepare, level
 last, points, quiet again, safe. What settings, bits, traces and the safe-off
-recipe are is said in the `hp35670a_*` modules beside this one. Nothing here
+recipe are is said in the modules beside this one. Nothing here
 was watched on a real instrument; docs/instrument.md lists what to check
 there first.
 """
@@ -18,10 +18,10 @@ from typing import Literal
 from daq.analyser import Identity, PointSettings, SourceState, SweepPoint
 from daq.dialogue import Dialogue
 from daq.errors import LashbenchError, LimitError, MeasurementError
-from daq.hp35670a_identity import identify
-from daq.hp35670a_safe import SafeOff, make_safe, read_source
-from daq.hp35670a_settings import DC_OFFSET, LEVEL, MANUAL_FREQUENCY, MODE
-from daq.hp35670a_setup import (
+from daq.hp35670a.identity import identify
+from daq.hp35670a.safe import SafeOff, make_safe, read_source
+from daq.hp35670a.settings import DC_OFFSET, LEVEL, MANUAL_FREQUENCY, MODE
+from daq.hp35670a.setup import (
     SetUp,
     Timing,
     apply_all,
@@ -32,8 +32,8 @@ from daq.hp35670a_setup import (
     prove_axis,
     select_traces,
 )
-from daq.hp35670a_status import arm_events
-from daq.hp35670a_sweeps import Guard, check_grid, on_box, point_by_point
+from daq.hp35670a.status import arm_events
+from daq.hp35670a.sweeps import Guard, check_grid, on_box, point_by_point
 from daq.scpi import parse_string
 from daq.transports.base import Transport
 

@@ -6,10 +6,14 @@ in the instrument.
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 from daq.analyser import Identity
 from daq.dialogue import Dialogue
-from daq.errors import InstrumentError
+from daq.drivers import driver_for, stranger
+from daq.errors import BenchTimeout, InstrumentError, ProtocolError
 from daq.scpi import parse_string
+from daq.transports.base import ask
 
 __all__ = ["identify", "parse_identity"]
 
@@ -35,7 +39,7 @@ def parse_identity(identity: str, options: str) -> Identity:
     maker, model = (fields + ["", ""])[:2]
     if len(fields) not in (3, 4) or not model.upper().endswith(_MODEL):
         raise InstrumentError(
-            f"{identity!r} answers '*IDN?', a {_MODEL} was due; check the address"
+            f"{identity!r} answers '*IDN?', a {_MODEL} was due; {stranger(identity, '')}"
         )
     if not maker.upper().startswith(_MAKERS):
         raise InstrumentError(
@@ -55,7 +59,11 @@ def identify(dialogue: Dialogue) -> Identity:
     InstrumentError
         If it is no 35670A, or lacks swept sine; said now and not in mid-run.
     """
-    dialogue.recover()
+    try:
+        dialogue.recover()
+    except (BenchTimeout, ProtocolError):
+        _refuse_stranger(dialogue)
+        raise
     identity = parse_identity(dialogue.ask("*IDN?"), dialogue.ask("*OPT?"))
     if _SWEPT_SINE not in identity.options:
         listed = ", ".join(identity.options) or "none"
@@ -64,3 +72,11 @@ def identify(dialogue: Dialogue) -> Identity:
             "use an analyser that has it"
         )
     return identity
+
+
+def _refuse_stranger(dialogue: Dialogue) -> None:
+    """An instrument of another language answers no question but who it is."""
+    with suppress(BenchTimeout, ProtocolError):
+        identity = ask(dialogue.transport, "*IDN?", dialogue.soon())
+        if driver_for(identity) is not None:
+            parse_identity(identity, "")

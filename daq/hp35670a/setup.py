@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from daq.analyser import PointSettings
 from daq.dialogue import Dialogue
 from daq.errors import InputError, InstrumentError
-from daq.hp35670a_settings import (
+from daq.hp35670a.settings import (
     CALCULATE,
     CONTINUOUS,
     DC_OFFSET,
@@ -34,8 +34,8 @@ from daq.hp35670a_settings import (
     point_settings,
     standing_settings,
 )
-from daq.hp35670a_status import Questionable, arm_events, wait_until_done
-from daq.hp35670a_trace import prove_byte_order, read_axis
+from daq.hp35670a.status import Questionable, arm_events, wait_until_done
+from daq.hp35670a.trace import prove_byte_order, read_axis
 from daq.plan import SweepPlan
 from daq.scpi import QueueEntry
 from daq.scpi_settings import Setting

@@ -14,7 +14,7 @@ from daq.analyser import SourceState
 from daq.dialogue import Dialogue
 from daq.driving.safe_off import Attempt, SafeOff, Step
 from daq.errors import LashbenchError
-from daq.hp35670a_settings import LEVEL
+from daq.hp35670a.settings import LEVEL
 from daq.scpi import parse_integer, parse_number, parse_string
 from daq.transports.base import Transport
 

@@ -19,7 +19,7 @@ from daq.dialogue import Dialogue
 from daq.driving.variance import gain_standard_error
 from daq.errors import InputError
 from daq.frf import PointFlag
-from daq.hp35670a_settings import (
+from daq.hp35670a.settings import (
     DC_OFFSET,
     DIRECTION,
     GRID_HZ,
@@ -31,9 +31,9 @@ from daq.hp35670a_settings import (
     STEPPING,
     STOP,
 )
-from daq.hp35670a_setup import SetUp, Timing, apply_all, prove_axis
-from daq.hp35670a_status import DeviceState, Voltage, polled
-from daq.hp35670a_trace import Picture, nearest_row, read_picture
+from daq.hp35670a.setup import SetUp, Timing, apply_all, prove_axis
+from daq.hp35670a.status import DeviceState, Voltage, polled
+from daq.hp35670a.trace import Picture, nearest_row, read_picture
 from daq.scpi_settings import Setting
 from daq.transports.base import Deadline
 

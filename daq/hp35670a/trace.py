@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from daq.dialogue import Dialogue
 from daq.errors import ProtocolError
-from daq.hp35670a_settings import GRID_HZ
+from daq.hp35670a.settings import GRID_HZ
 from daq.scpi import is_filler
 
 __all__ = ["Picture", "nearest_row", "prove_byte_order", "read_axis", "read_picture"]
