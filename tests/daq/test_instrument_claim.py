@@ -30,8 +30,10 @@ sys.stdin.read(1)
          "prologix-tcp:127.0.0.1:5025?addr=11", "prologix-tcp:localhost:5025?addr=12"),
         ("GPIB0::11::INSTR", "gpib::11", "GPIB0::11", " GPIB::11::INSTR"),
         ("TCPIP::Bench.local::INSTR", "TCPIP0::bench.local::inst0::INSTR"),
-        ("prologix:/dev/null?addr=11", "prologix:/dev/../dev/null"),
-        ("sim:", "sim:?ratio=0.3", "replay:x.jsonl"),
+        ("prologix:/dev/null?addr=11", "prologix:/dev/../dev/null", "sr785:prologix:/dev/null",
+         "sr785:serial:/dev/null?baud=300"),
+        ("sr785:GPIB0::10::INSTR", "gpib::10"),
+        ("sim:", "sim:?ratio=0.3", "replay:x.jsonl", "sr785:sim:"),
     ],
 )  # fmt: skip
 def test_every_way_to_write_an_address_is_one_instrument(same):

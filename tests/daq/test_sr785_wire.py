@@ -23,6 +23,7 @@ from daq.sr785 import SR785
 from daq.sr785.levels import is_zero, scale_of
 from daq.sr785.setup import Timing
 from daq.transports.base import Deadline
+from daq.transports.transcript import Recorder, Replay
 from sim.faults import FaultBoard
 from sim.instrument.plant import LinearPlant
 from sim.loopback import Loopback
@@ -257,6 +258,24 @@ def test_errors_refer_to_the_cycles_that_were_integrated():
         assert {point.detail["integrated_cycles"] for point in points} <= {15.0, 16.0, 17.0, 18.0}
         errors.append(np.mean([point.gain_std_db for point in points]))
     assert errors[0] == pytest.approx(errors[1], rel=0.25)
+
+
+@pytest.mark.parametrize("wire", [Tap, Line])
+def test_a_recorded_dialogue_measures_again_without_an_instrument(tmp_path, wire):
+    def measured(over):
+        analyser = SR785(over)
+        analyser.identify()
+        analyser.prepare(100.0, 200.0, SETTINGS)
+        points = [*analyser.sweep(GRID[:1]), *analyser.sweep(GRID)]
+        return points, analyser.make_safe()
+
+    _, _, tap = bench(replace(QUIET, noise_v=1e-3), wire=wire)
+    recorder = Recorder(tap, tmp_path / "dialogue.jsonl")
+    first = measured(recorder)
+    recorder.close()
+    replay = Replay(tmp_path / "dialogue.jsonl")
+    assert measured(replay) == first
+    assert replay.unused == 0
 
 
 # ------------------------------------------------------------ readings of the manual

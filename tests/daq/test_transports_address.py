@@ -14,6 +14,7 @@ from daq.transports.address import (
     PrologixSerial,
     PrologixTcp,
     ReplayFile,
+    SerialPort,
     VisaAddress,
     parse_address,
 )
@@ -35,6 +36,10 @@ from daq.transports.open import open_transport
         ("prologix:socket://10.0.0.2:1234?addr=0", PrologixSerial("socket://10.0.0.2:1234", 0)),
         ("prologix-tcp:10.0.0.2:1234?addr=30", PrologixTcp("10.0.0.2", 1234, 30)),
         ("prologix-tcp:[::1]:1234", PrologixTcp("::1", 1234, 11)),
+        ("serial:/dev/ttyUSB0", SerialPort("/dev/ttyUSB0", 9600, "none")),
+        ("serial:COM3?baud=19200", SerialPort("COM3", 19200, "none")),
+        ("serial:COM3?flow=hardware&baud=300", SerialPort("COM3", 300, "hardware")),
+        ("serial:socket://10.0.0.2:4001", SerialPort("socket://10.0.0.2:4001", 9600, "none")),
         ("replay:runs/a b.jsonl", ReplayFile(Path("runs/a b.jsonl"))),
     ],
 )
@@ -71,6 +76,14 @@ def test_every_form_is_read(url, address):
         ("prologix-tcp:host:99999", "HOST:PORT"),
         ("prologix-tcp:host:12a", "HOST:PORT"),
         ("prologix-tcp:a:b:1", "HOST:PORT"),
+        ("serial:", "no serial device"),
+        ("serial:?baud=9600", "no serial device"),
+        ("serial:/dev/tty USB", "no serial device"),
+        ("serial:COM3?baud=9601", "'9601' baud"),
+        ("serial:COM3?baud=", "'' baud"),
+        ("serial:COM3?flow=rts", "flow control 'rts'"),
+        ("serial:COM3?addr=11", "these options once each, 'baud' and 'flow'"),
+        ("serial:COM3?baud=300&baud=300", "these options once each"),
         ("replay:", "no file"),
     ],
 )

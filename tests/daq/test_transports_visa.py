@@ -6,13 +6,20 @@ import threading
 import time
 
 import pytest
-from vxi11 import Vxi11Instrument
+from bench_server import simulated
+from fake_analyser import known_gain
+from vxi11 import CLEAR, READ_STB, Vxi11Instrument
 from wire import ByteServer, lines_of
 
+from daq.analyser import PointSettings, SourceState
+from daq.drivers import DRIVERS, open_analyser
 from daq.errors import BenchTimeout, LinkError, ProtocolError
+from daq.plan import spaced_frequencies
 from daq.transports.base import Deadline, ask, ask_block
 from daq.transports.open import open_transport
 from daq.transports.visa import open_visa
+from sim.instrument.pace import Fast
+from sim.instrument.plant import LinearPlant
 
 PAYLOAD = struct.pack(">6d", 1.0, -2.0, 10.0, 43.0, 9.9e37, 0.0) + b"\n\r\x1b+\0#\n"
 BLOCK = b"#2%d" % len(PAYLOAD) + PAYLOAD + b"\n"
@@ -147,6 +154,63 @@ def test_vxi11_answers_text_and_blocks(vxi11, largest_read):
     assert ask(transport, "A?", Deadline.after(2.0)) == "+1"
     assert ask_block(transport, "BLOCK?", Deadline.after(2.0)) == PAYLOAD
     assert device.messages == [b"A?", b"BLOCK?"]
+
+
+def test_bytes_without_a_header_are_counted(vxi11, raw):
+    for transport in (vxi11[0], raw):
+        transport.write("BLOCK?", Deadline.after(2.0))
+        assert transport.read_bytes(len(BLOCK), Deadline.after(2.0)) == BLOCK
+        transport.write("A?", Deadline.after(2.0))
+        with pytest.raises(ProtocolError, match="3 bytes, 8 were due|was cut short"):
+            transport.read_bytes(8, Deadline.after(0.3))
+        transport.write("N?", Deadline.after(2.0))
+        with pytest.raises(BenchTimeout):
+            transport.read_bytes(8, Deadline.after(0.1))
+
+
+class Gateway(Vxi11Instrument):
+    """A LAN gateway with a simulated instrument on its bus."""
+
+    def __init__(self, box):
+        super().__init__(self._exchange)
+        self._box, self._pace = box, Fast(box)
+
+    def _exchange(self, message):
+        self._box.listen(message, end=True)
+        self._rest()
+        found = bytearray()
+        while self._box.reply_ready:
+            found += self._box.talk().data
+        return bytes(found)
+
+    def _rest(self):
+        for _ in range(3):
+            self._pace.advance()
+
+    def _procedure(self, procedure, body):
+        self._rest()
+        if procedure == READ_STB:
+            return struct.pack(">2I", 0, self._box.serial_poll())
+        if procedure == CLEAR:
+            self._box.device_clear()
+        return super()._procedure(procedure, body)
+
+
+@pytest.mark.parametrize("driver", DRIVERS, ids=lambda driver: driver.scheme or "preset")
+def test_every_driver_measures_through_a_gateway(driver):
+    box = simulated(driver.scheme, LinearPlant(known_gain))
+    lead = f"{driver.scheme}:" if driver.scheme else ""
+    with ByteServer(Gateway(box).feed) as server:
+        analyser = open_analyser(f"{lead}TCPIP::127.0.0.1,{server.port}::inst0::INSTR")
+        assert analyser.identify().model in driver.models
+        analyser.prepare(100.0, 200.0, PointSettings(1.0, 2, 3, slew_vpk_per_s=0.0))
+        points = list(analyser.sweep(spaced_frequencies(120.0, 160.0, 11)))
+        assert analyser.make_safe() is SourceState.CONFIRMED_OFF
+        analyser.close()
+    assert box.driven_v == 0.0
+    assert len(points) == 11
+    for point in points:
+        assert point.gain == pytest.approx(known_gain(point.frequency_hz), rel=1e-4)
 
 
 def test_vxi11_polls_and_clears(vxi11):

@@ -75,6 +75,12 @@ def test_every_wire_of_every_driver_gives_the_same_points(tmp_path):
             np.testing.assert_allclose(response.gain, found[0].gain, rtol=1e-6)
 
 
+@pytest.mark.parametrize("flow", ["hardware", "software"])
+def test_flow_control_is_that_of_the_address(tmp_path, flow):
+    with served(simulated("sr785", LinearPlant(known_gain)), "serial_pty", "sr785") as url:
+        assert measure(tmp_path / "bench.db", f"{url}?baud=19200&flow={flow}") == 0
+
+
 def test_another_seed_gives_other_points(tmp_path):
     db = tmp_path / "bench.db"
     for seed in (4, 5):
