@@ -19,12 +19,11 @@ from daq.formats.foreign.unit_words import frequency_in, gain_in, level_in, phas
 
 __all__ = ["Meaning", "guessed_by_place", "meaning_of", "names_another_unit", "settled_unit"]
 
-_UNIT = re.compile(
-    r"^(?P<name>.*?)\s*(?:[(\[{](?P<unit>[^()\[\]{}]*)[)\]}]"
-    r"|/\s*(?P<per>[^\s/]+(?:/s(?:ec)?)?)"
-    r"|\bin\s+(?P<in>\S+))\s*$"
+_BRACKETS = re.compile(r"^(?P<name>.*?)\s*[(\[{](?P<unit>[^()\[\]{}]*)[)\]}]\s*$")
+_STROKE = re.compile(
+    r"^(?P<name>.*?)\s*(?:/\s*(?P<unit>[^\s/]+(?:/s(?:ec)?)?)|\bin\s+(?P<in>\S+))\s*$"
 )
-"""A name with its unit in brackets, behind a stroke, or behind "in"."""
+"""A name with its unit in brackets; behind a stroke or "in"."""
 _LAST = re.compile(r"^(?P<name>.*?)[\s_,]+(?P<unit>\S+)$")
 
 
@@ -136,19 +135,22 @@ def guessed_by_place(columns: Sequence[NDArray[Any]]) -> dict[str, int]:
 
 def _parted(header: str) -> tuple[str, str]:
     """Name and unit of a header; the unit is empty where none stands there."""
-    if found := _UNIT.match(header):
-        unit = found["unit"] or found["per"] or found["in"] or ""
-        if found["name"].strip() or unit:
-            return found["name"].strip(), unit
+    if found := _BRACKETS.match(header):
+        return found["name"].strip(), found["unit"]
     found = _LAST.match(header)
-    if found and (
-        any(known(found["unit"]) for known in (frequency_in, phase_in, level_in))
-        or found["unit"].lower() == "db"
-    ):
+    if found and _is_known(found["unit"]):
         return found["name"], found["unit"]
+    if (found := _STROKE.match(header)) and not frequency_in(header):
+        return found["name"].strip(), found["unit"] or found["in"]
     if any(known(header) for known in (frequency_in, phase_in)) or header.lower() == "db":
         return "", header
     return header, ""
+
+
+def _is_known(unit: str) -> bool:
+    """Whether a word can be nothing but a unit."""
+    said = plain_unit(unit) in ("db", "lin", "linear", "abs", "ratio", "v/v")
+    return said or any(known(unit) for known in (frequency_in, phase_in, level_in))
 
 
 def _by_unit(unit: str) -> str | None:
@@ -196,6 +198,6 @@ def _quantity(kind: str, unit: str) -> str | None:
         return gain_in(unit)
     if kind == "coherence":
         return "coherence"
-    if kind in ("real", "imag") and (not unit or gain_in(unit) == "gain"):
+    if kind in ("real", "imag") and (unit in ("", "-") or gain_in(unit) == "gain"):
         return f"gain_{kind}"
     return None

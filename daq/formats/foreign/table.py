@@ -236,13 +236,20 @@ def _header(
     if last is None:
         return ("",) * width, frozenset()
     above = _names(lines[filled[-2]], form, width, pairs) if len(filled) > 1 else None
-    if above and all(map(_is_unit, last)) and not all(map(_is_unit, above)):
+    if above and _are_units(last) and not any(_is_unit(cell) for cell in above if cell):
         units = [cell.strip("()[] ") for cell in last]
         named = tuple(
             f"{name} ({unit})" if unit else name for name, unit in zip(above, units, strict=True)
         )
         return named, frozenset(filled[-2:])
     return tuple(last), frozenset(filled[-1:])
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    """Whether a line holds units: half of its cells that say something, and nothing long."""
+    said = [cell for cell in cells if cell.strip("()[] ")]
+    known = sum(_is_unit(cell) for cell in said)
+    return bool(said) and 2 * known >= len(said) and all(len(cell) <= 9 for cell in said)
 
 
 def _is_unit(cell: str) -> bool:
