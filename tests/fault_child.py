@@ -201,7 +201,7 @@ def shorten_waits() -> None:
     daq.hp35670a.analyser.Timing = lambda: timing(**short)
     daq.hp35670a.safe._BUDGET_S = 4.0
     other = daq.sr785.setup.Timing
-    daq.sr785.analyser.Timing = lambda: other(**short, serial_block_s=1.5, point_s=0.1)
+    daq.sr785.analyser.Timing = lambda: other(**short, point_s=0.1)
     daq.sr785.safe._BUDGET_S = daq.sr785.safe._RESET_S = 4.0
     daq.store_file._BUSY_S = BUSY_S
 

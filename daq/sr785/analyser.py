@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from daq.analyser import Identity, PointSettings, SourceState, SweepPoint
 from daq.driving.safe_off import SafeOff
 from daq.errors import LashbenchError, LimitError, MeasurementError
-from daq.sr785.dialogue import RS232, Dialogue
+from daq.sr785.dialogue import Dialogue
 from daq.sr785.identity import identify
 from daq.sr785.plan import Grid, grids_of, repeats_at
 from daq.sr785.safe import make_safe, read_source
@@ -40,9 +40,9 @@ class SR785:
 
     Notes
     -----
-    Evenly spaced frequencies are swept in one go. Any others, and all where the instrument loses
-    its data when a display is changed, are measured one by one in sweeps too narrow to matter,
-    between which the source stops.
+    Evenly spaced frequencies are swept in one go. Any others, and all where the instrument gives
+    no variance (an SR780) or loses its data when a display is changed, are measured one by one in
+    sweeps too narrow to matter, between which the source stops.
     """
 
     def __init__(self, transport: Transport, *, timing: Timing | None = None) -> None:
@@ -51,8 +51,6 @@ class SR785:
         self._timing = timing or Timing()
         self._transport = transport
         self._dialogue = Dialogue(transport, self._timing.reply_s, self._timing.block_s)
-        if self._dialogue.interface == RS232:
-            self._dialogue.block_s = self._timing.serial_block_s
         self._model: str | None = None
         self._knowledge = Knowledge()
         self._setup: SetUp | None = None
@@ -84,6 +82,9 @@ class SR785:
         with self._dialogue.lock:
             found = identify(self._dialogue)
         self._model = found.model
+        if MODELS[found.model].variances is None:
+            # Nothing tells the error of a point but repeating it.
+            self._knowledge.data_survive = False
         return found
 
     def prepare(

@@ -23,6 +23,8 @@ GPIB, RS232 = 0, 1
 _FIRST_PAUSE_S = 0.0005
 _LONGEST_PAUSE_S = 0.05
 _STALE_REPLIES = 400
+_BITS = 10
+"""Of a character on a serial line: start, eight of data, stop."""
 _NAMES = {
     Event.OUTPUT_OVERFLOW: "its output buffer overflowed",
     Event.INPUT_OVERFLOW: "its input buffer overflowed",
@@ -33,11 +35,16 @@ _NAMES = {
 
 def interface_of(transport: Transport) -> int:
     """The interface that a wire leads to; a replayed one counts as where it was recorded."""
+    return GPIB if _serial_port(transport) is None else RS232
+
+
+def _serial_port(transport: Transport) -> SerialPort | None:
     address = str(getattr(transport, "recorded_address", transport.address))
     try:
-        return RS232 if isinstance(parse_address(address), SerialPort) else GPIB
+        found = parse_address(address)
     except ConfigurationError:
-        return GPIB
+        return None
+    return found if isinstance(found, SerialPort) else None
 
 
 class Dialogue(Conversation):
@@ -58,6 +65,9 @@ class Dialogue(Conversation):
     ) -> None:
         super().__init__(transport, reply_s, block_s)
         self.interface = interface_of(transport) if interface is None else interface
+        port = _serial_port(transport)
+        self.character_s = 0.0 if port is None else _BITS / port.baud
+        """What one character takes on a serial line, s."""
         self.key_pressed = False
         """Whether somebody has touched the front panel since this was last set to False."""
         self._polls = True

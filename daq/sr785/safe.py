@@ -70,17 +70,16 @@ def read_source(dialogue: Dialogue) -> SourceState:
     """What a read-back says of the source, nothing being changed."""
     try:
         dialogue.send(f"OUTX {dialogue.interface}")
-        switched_on = dialogue.ask_integer("SRCO?") != 0
-        in_fft = dialogue.ask_integer("MGRP? 0") == 0
-        names = ("S1AM?", "S2AM?") if in_fft else ("SSAM?",)
-        quiet = all(is_zero(dialogue.ask(name)) for name in names)
-        quiet = quiet and dialogue.ask_number("SOFF?") == 0
+        if dialogue.ask_integer("SRCO?") != 0:
+            return SourceState.ON
+        if dialogue.ask_integer("MGRP? 0") == 0:
+            # The manual: the output is held at 0 V, whatever the levels of the sines are.
+            return SourceState.CONFIRMED_OFF
+        quiet = is_zero(dialogue.ask("SSAM?")) and dialogue.ask_number("SOFF?") == 0
     except LashbenchError:
         return SourceState.UNKNOWN
-    if quiet and not switched_on:
-        return SourceState.CONFIRMED_OFF
     # Whether the switch alone keeps a swept sine from driving is not known.
-    return SourceState.ON if switched_on or not in_fft else SourceState.UNCONFIRMED
+    return SourceState.CONFIRMED_OFF if quiet else SourceState.ON
 
 
 def _go_quiet(attempt: Attempt[Dialogue]) -> None:

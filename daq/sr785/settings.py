@@ -39,11 +39,12 @@ class Numbers:
 
     swept_sine: int
     response: int
-    variances: tuple[int, int]
+    variances: tuple[int, int] | None
+    """Normalised variances of both channels; None where there are none."""
 
 
-MODELS = {"SR785": Numbers(3, 47, (44, 45)), "SR780": Numbers(2, 36, (33, 34))}
-"""Those of the SR780 are UNVERIFIED."""
+MODELS = {"SR785": Numbers(3, 47, (44, 45)), "SR780": Numbers(2, 32, None)}
+"""Those of the SR780 are the ones of a public program for it (pyHegel), UNVERIFIED."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,7 +181,7 @@ def display_settings(numbers: Numbers) -> list[tuple[Setting, float]]:
 def variance_settings(numbers: Numbers) -> list[tuple[Setting, float]]:
     """Display A holds the normalised variance of channel 1, display B that of channel 2."""
     table: list[tuple[Setting, float]] = []
-    for display, measurement in enumerate(numbers.variances):
+    for display, measurement in enumerate(numbers.variances or ()):
         table += [(_MEASUREMENT[display], measurement), (_VIEW[display], REAL)]
     return table
 

@@ -41,12 +41,11 @@ class Timing:
     """Bounds of waits.
 
     A sweep may take `margin` times its cycles and `overhead_s` on top, and `point_s` a point for
-    ranging; `serial_block_s` is for a whole trace at 9600 baud.
+    ranging. A whole trace has the time that its line needs on top of `block_s`.
     """
 
     reply_s: float = 5.0
     block_s: float = 10.0
-    serial_block_s: float = 60.0
     overhead_s: float = 15.0
     margin: float = 1.5
     point_s: float = 2.0

@@ -18,6 +18,9 @@ __all__ = ["read_axis", "read_bin", "read_length", "read_trace", "response_of"]
 _NOTHING = -3.4e38
 """What lies below this is the smallest number there is, which fills bins without a datum."""
 _AGREES = 1e-5
+_CHARACTERS = 16
+"""Of one number in ASCII, comma included."""
+_MARGIN = 1.5
 _WITNESSES = 3
 """Bins whose binary value is compared with the one in ASCII."""
 
@@ -94,7 +97,8 @@ def _in_ascii(dialogue: Dialogue, display: int, count: int) -> NDArray[np.float6
             raise ProtocolError(f"{len(values)} numbers came, {count} were due")
         return values
 
-    return dialogue.parsed(line, numbers, dialogue.block_s)
+    bound_s = dialogue.block_s + _MARGIN * count * _CHARACTERS * dialogue.character_s
+    return dialogue.parsed(line, numbers, bound_s)
 
 
 def _prove_bytes(dialogue: Dialogue, display: int, values: NDArray[np.float64]) -> None:

@@ -28,14 +28,14 @@ MEASUREMENTS: dict[str, dict[str, dict[int, str]]] = {
                 **{48 + i: f"user {i + 1}" for i in range(5)}},
     },
     "SR780": {
-        FFT: {0: "FFT 1", 1: "FFT 2", 2: "power 1", 3: "power 2", 4: "time 1", 5: "time 2",
-              9: "coherence", 10: "cross spectrum", 11: "frequency response"},
-        SWEPT: {31: "spectrum 1", 32: "spectrum 2", 33: "variance 1", 34: "variance 2",
-                35: "cross spectrum", 36: "frequency response",
-                **{37 + i: f"user {i + 1}" for i in range(5)}},
+        FFT: {0: "FFT 1", 1: "FFT 2", 2: "time 1", 3: "time 2", 7: "coherence",
+              8: "cross spectrum", 9: "frequency response"},
+        SWEPT: {29: "spectrum 1", 30: "spectrum 2", 31: "cross spectrum",
+                32: "frequency response", **{33 + i: f"user {i + 1}" for i in range(5)}},
     },
 }  # fmt: skip
-"""By model, group and number. [S] The numbers of the SR780 are not known from any stored page."""
+"""By model, group and number. [S] Those of the SR780 are from a
+public program for it (pyHegel), which lists no normalised variance."""
 
 FREQUENCY = (("Hz", 1.0), ("kHz", 1e3), ("mHz", 1e-3))
 TIME = (("s", 1.0), ("ms", 1e-3), ("us", 1e-6))

@@ -309,9 +309,9 @@ def test_whatever_the_manual_means_points_are_right_and_the_source_is_off(change
     assert instrument.driven_v == 0.0
 
 
-def test_without_variances_errors_come_from_repeats():
-    choices = replace(QUIET, data_survive_change=False, noise_v=2e-3)
-    _, analyser, tap = prepared(choices)
+@pytest.mark.parametrize("changes", [{"data_survive_change": False}, {"model": "SR780"}], ids=str)
+def test_without_variances_errors_come_from_repeats(changes):
+    _, analyser, tap = prepared(replace(QUIET, noise_v=2e-3, **changes))
     list(analyser.sweep(GRID[:1]))
     begun = len(tap.lines)
     points = list(analyser.sweep(GRID))
@@ -372,6 +372,28 @@ def test_whatever_a_program_left_on_is_off_and_can_be_measured_with(left, obeys)
     assert instrument.driven_v == 0.0
     analyser.prepare(100.0, 200.0, SETTINGS)
     assert_right(list(analyser.sweep(GRID)), GRID)
+
+
+@pytest.mark.parametrize(
+    ("left", "state"),
+    [
+        ([], SourceState.CONFIRMED_OFF),
+        (["S1AM 3000 mV"], SourceState.CONFIRMED_OFF),
+        (["SRCO 1"], SourceState.ON),
+        (["MGRP 2,3"], SourceState.ON),
+        (["MGRP 2,3", "SSAM 0 mV"], SourceState.CONFIRMED_OFF),
+        (["MGRP 2,3", "SSAM 0 mV", "SOFF 1 V"], SourceState.ON),
+    ],
+    ids=str,
+)
+def test_what_the_source_is_said_to_do_changes_nothing(left, state):
+    _, analyser, tap = bench()
+    for line in left:
+        tap.write(line, Deadline.after(1.0))
+        tap.serial_poll(Deadline.after(1.0))
+    begun = len(tap.lines)
+    assert analyser.source_state() is state
+    assert not [line for line in tap.lines[begun:] if "?" not in line and line != "OUTX 0"]
 
 
 @pytest.mark.parametrize("fault", ["psd-stuck", "psd-stuck:point=14", "display-off-line:point=14",

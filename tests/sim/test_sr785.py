@@ -508,7 +508,7 @@ def test_an_sr780_has_other_numbers():
     bench.send("MGRP 2,3")
     assert bench.events() & 16
     bench.send("MGRP 2,2")
-    bench.send("MEAS 2,36")
+    bench.send("MEAS 2,32")
     assert bench.events() == 0
 
 
