@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.driving.entry import Driver
+from daq.errors import ConfigurationError
 from daq.transports.address import Address, parse_address
 
 if TYPE_CHECKING:
@@ -82,7 +83,12 @@ def parse_instrument(url: str, hosted: tuple[str, ...] = ("sim",)) -> Address:
         If it is no address.
     """
     driver, address = driver_at(url)
-    return parse_address(address, hosted, driver.gpib_address)
+    try:
+        return parse_address(address, hosted, driver.gpib_address)
+    except ConfigurationError as error:
+        told = str(error).replace(f"instrument {address!r}", f"instrument {url!r}", 1)
+        others = ", ".join(f"'{one.scheme}:' for {one.name}" for one in DRIVERS if one.scheme)
+        raise ConfigurationError(f"{told}; before any of them may stand {others}") from error
 
 
 def driver_at(url: str) -> tuple[Driver, str]:
@@ -113,6 +119,7 @@ def open_analyser(
     from daq.transports.open import open_transport
 
     driver, address = driver_at(url)
+    parse_instrument(url, tuple(factories or {}))
     transport = open_transport(
         address, factories, record=record, fault=fault, gpib_address=driver.gpib_address
     )

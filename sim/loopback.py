@@ -176,6 +176,8 @@ def read_loopback_settings(rest: str, model: Model | None = None) -> LoopbackSet
     once = [key for key, found in values.items() if len(found) > 1]
     if once and not set(once) <= {"effect", "fault"}:
         raise _refusal(rest, f"has {once[0]!r} twice")
+    if "options" in values and not known.has_options:
+        raise _refusal(rest, f"has options, which a {known.name} does not list")
     speed = values.get("speed", ["fast"])[0]
     if speed not in ("fast", "realtime"):
         raise _refusal(rest, f"has speed {speed!r}; it is fast or realtime")

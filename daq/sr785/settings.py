@@ -89,7 +89,7 @@ class Setting:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise LimitError(f"{self.name} {value!r} is not a number; nothing was sent")
         if not self.low <= value <= self.high or (self.is_whole and value != int(value)):
-            kind = "a whole number from " if self.is_whole else ""
+            kind = "whole numbers from " if self.is_whole else ""
             raise LimitError(
                 f"{self.name} {value:g} is outside the instrument's {kind}{self.low:g} to "
                 f"{self.high:g}; nothing was sent"

@@ -44,11 +44,46 @@ def test_the_verb_prints_one_ready_line_and_ends_on_a_signal(number):
         process.wait()
 
 
+def test_an_instrument_without_rs232_is_not_served_on_it(capsys):
+    from tui.cli import main
+
+    assert main(["serve", "--unit", "adss", "--ratio", "0.25", "--serial-pty"]) == 2
+    assert "model 35670A cannot be measured with over RS-232" in capsys.readouterr().err
+
+
+def test_an_sr785_is_served_beside_its_own_serial_port():
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tui.cli", "serve", "--model", "SR785", "--unit", "adss",
+         "--ratio", "0.25", "--tcp", "0", "--serial-pty", "--speed", "fast"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        assert process.stdout is not None
+        addresses = json.loads(process.stdout.readline())
+        assert set(addresses) == {"tcp", "serial_pty"}
+        with open(addresses["serial_pty"], "r+b", buffering=0) as line:
+            line.write(b"OUTX 1\r*IDN?\r")
+            heard = b""
+            while not heard.endswith(b"\r"):
+                heard += line.read(1) or b""
+        assert heard.startswith(b"Stanford_Research_Systems,SR785,")
+        process.terminate()
+        _, notes = process.communicate(timeout=60)
+        assert process.returncode == 0
+        assert "serving a simulated SR785" in notes
+    finally:
+        process.kill()
+        process.wait()
+
+
 @pytest.mark.parametrize(
     ("words", "code", "says"),
     [
         ([], 2, "--tcp"),
         (["--tcp", "70000"], 2, "70000"),
+        (["--tcp", "0", "--model", "SR786"], 2, "35670A, SR785"),
+        (["--tcp", "0", "--model", "SR785", "--options", "1D2"], 2, "lists no options"),
+        (["--tcp", "0", "--model", "sr785", "--fault", "hardware-error"], 2, "outx-elsewhere"),
         (["--tcp", "0", "--fault", "nonsense"], 2, "nonsense"),
         (["--tcp", "0", "--effect", "nonsense"], 2, "nonsense"),
         (["--tcp", "0", "--noise", "-1"], 2, "noise"),

@@ -95,9 +95,9 @@ def serve(
 
     kind = model_named(model)
     if serial_pty and not kind.has_serial:
-        raise InputError(f"--serial-pty: a {kind.name} has no RS-232 interface to measure over")
+        raise InputError(f"--serial-pty: model {kind.name} cannot be measured with over RS-232")
     if options is not None and not kind.has_options:
-        raise InputError(f"--options {options}: a {kind.name} has no options to be listed")
+        raise InputError(f"--options {options}: model {kind.name} lists no options")
     faults = [kind.parse_fault(text) for text in fault or []]
     effects = tuple(parse_effect(text) for text in effect or [])
     servo = SteppedServo(load_unit(unit), ratio, effects, seed=seed)
