@@ -114,9 +114,10 @@ def _reader(path: Path, reading: Reading) -> str:
     """The module that reads a file: by its suffix, and by what it holds where that leaves two."""
     module = _module(path, READABLE, "read")
     if module == "daq.formats.csv":
-        from daq.formats.csv_text import is_ours
+        from daq.formats.csv_text import has_our_header, is_ours
 
-        foreign = reading.profile or reading.columns or reading.as_guessed or not is_ours(path)
+        told = reading.profile or reading.columns or reading.as_guessed
+        foreign = not is_ours(path) or (told and not has_our_header(path))
         return _TEXT if foreign else module
     if path.suffix.lower() == ".dat" and _is_text(path):
         return _TEXT

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from daq.bounded_text import parse_toml, read_bytes
 from daq.errors import FileFormatError
 
-__all__ = ["COLUMNS", "Table", "is_ours", "parsed", "text_of"]
+__all__ = ["COLUMNS", "Table", "has_our_header", "is_ours", "parsed", "text_of"]
 
 COLUMNS = ("frequency_hz", "source_vpk", "gain_db", "phase_deg", "gain_std_db")
 """The header, in this order."""
@@ -59,17 +59,31 @@ def is_ours(path: Path) -> bool:
 
     What is no text in UTF-8 is not: another program wrote it.
     """
-    try:
-        with path.open("rb") as file:
-            head = file.read(_HEAD_BYTES)
-    except (OSError, ValueError):
-        return True
-    text = head.decode("utf-8-sig", "replace")
+    text = _head_of(path)
     if not text.strip() or _KEY.search(text):
         return True
+    names = _names_in(text)
+    return names == [""] or len(set(names) & set(COLUMNS)) > 2
+
+
+def has_our_header(path: Path) -> bool:
+    """Whether the header of a file is that of this format."""
+    return tuple(_names_in(_head_of(path))) == COLUMNS
+
+
+def _head_of(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            return file.read(_HEAD_BYTES).decode("utf-8-sig", "replace")
+    except (OSError, ValueError):
+        return ""
+
+
+def _names_in(text: str) -> list[str]:
+    """The cells of the first line that is no comment; one empty cell where there is none."""
     lines = (line.strip() for line in text.split("\n"))
     header = next((line for line in lines if line and not line.startswith("#")), "")
-    return not header or len({name.strip() for name in header.split(",")} & set(COLUMNS)) > 2
+    return [name.strip() for name in header.split(",")]
 
 
 def parsed(text: str, path: Path) -> Table:
@@ -167,7 +181,10 @@ def _check_header(path: Path, header: str) -> None:
     wanted = f"the header must be {','.join(COLUMNS)}"
     if not set(names) & set(COLUMNS):
         found = f"found {_shown(header)}" if header else "found none"
-        raise FileFormatError(f"{path}: no header; {found}; {wanted}")
+        raise FileFormatError(
+            f"{path}: no header; {found}; {wanted}; a table that another program saved is read "
+            "with --as-guessed or --column"
+        )
     unknown = [_shown(name) for name in names if name not in COLUMNS]
     missing = [name for name in COLUMNS if name not in names]
     faults = []

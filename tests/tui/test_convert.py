@@ -77,6 +77,27 @@ def test_what_contradicts_a_file_or_means_nothing_is_refused(tmp_path, capsys, w
     assert not out.exists()
 
 
+def test_columns_are_not_told_of_a_file_of_our_own_form(tmp_path, capsys):
+    given, out = str(sample_path("adss-sweep")), tmp_path / "y.h5"
+    for words in (["--column", "gain_db=3"], ["--as-guessed"], ["--profile", "bode100"]):
+        assert main(["convert", given, str(out), *words]) == 2
+        assert "is a CSV of lashbench's own form" in capsys.readouterr().err
+
+
+def test_our_own_table_saved_by_a_spreadsheet_is_read_as_a_table(tmp_path, capsys):
+    given, out = tmp_path / "x.csv", tmp_path / "y.csv"
+    text = Path(sample_path("adss-sweep")).read_text()
+    given.write_text(text.replace(".", "·").replace(",", ";").replace("·", ","))
+    assert main(["convert", str(given), str(out)]) == 2
+    assert "--as-guessed" in capsys.readouterr().err
+    words = ["--as-guessed", "--unit-name", "ADSS", "--sweep", "up"]
+    assert main(["convert", str(given), str(out), *words]) == 0
+    back, true = read_response(out), read_response(sample_path("adss-sweep"))
+    np.testing.assert_allclose(back.gain, true.gain, rtol=1e-12)
+    np.testing.assert_array_equal(back.source_vpk, true.source_vpk)
+    np.testing.assert_array_equal(back.gain_std_db, true.gain_std_db)
+
+
 def test_a_file_is_not_written_over_itself(tmp_path, capsys):
     path = tmp_path / "x.csv"
     write_response(measured(flags=None), path)

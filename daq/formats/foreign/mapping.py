@@ -18,7 +18,7 @@ from daq.formats.foreign.headers import (
     settled_unit,
 )
 from daq.formats.foreign.profiles import Profile, matches
-from daq.formats.foreign.quantities import checked_quantity
+from daq.formats.foreign.quantities import QUANTITIES, checked_quantity
 from daq.formats.foreign.table import Table
 
 __all__ = ["Assigned", "assigned_columns"]
@@ -88,6 +88,13 @@ def _by_headers(found: dict[str, Assigned], table: Table, path: Path) -> None:
         for name, column in guessed_by_place(table.columns).items():
             found[name] = Assigned(name, column, "guessed")
         return
+    said = {_kind(name) for name in found}
+    for k, header in enumerate(table.names):
+        # The names of the quantities themselves.
+        name = header.lower()
+        if name in QUANTITIES and "_" in name and k not in taken and _kind(name) not in said:
+            found[name] = Assigned(name, k, "stated")
+            taken.add(k)
     kinds: dict[str, list[int]] = {}
     for k, header in enumerate(table.names):
         if k not in taken:
