@@ -75,6 +75,18 @@ class Dialogue(Conversation):
 
     # Exchanges
 
+    def ask(self, line: str, within_s: float | None = None) -> str:
+        """Send a query and read its reply, after a look at whether anybody wants an end.
+
+        A look at a running sweep is some forty exchanges: none of them waits for all.
+        """
+        self._look()
+        return super().ask(line, within_s)
+
+    def _look(self) -> None:
+        if self.on_wait is not None:
+            self.on_wait()
+
     def command(self, line: str, within_s: float | None = None) -> None:
         """Send a command, wait until it is done, and insist that it was.
 
@@ -83,6 +95,7 @@ class Dialogue(Conversation):
         InstrumentError
             If it was refused; names it.
         """
+        self._look()
         self.send(line)
         self.finish(line, self.reply_s if within_s is None else within_s)
 
@@ -149,6 +162,7 @@ class Dialogue(Conversation):
             self.transport.write(line, deadline)
             return self.transport.read_bytes(4 * count, deadline)
 
+        self._look()
         data = self.guarded(exchange, self.block_s)
         return np.frombuffer(data, dtype="<f4").astype(np.float64)
 

@@ -57,12 +57,7 @@ def read_length(dialogue: Dialogue, points: int) -> None:
 
 def read_axis(dialogue: Dialogue, rows: NDArray[np.int_]) -> NDArray[np.float64]:
     """Frequency of bins, Hz, shape of `rows`; one question each, there is no other way."""
-    found = []
-    for row in rows:
-        found.append(dialogue.ask_number(f"DBIN? 0,{row}"))
-        if dialogue.on_wait is not None:
-            dialogue.on_wait()
-    return np.array(found)
+    return np.array([dialogue.ask_number(f"DBIN? 0,{row}") for row in rows])
 
 
 def read_bin(dialogue: Dialogue, display: int, row: int) -> float:

@@ -3,6 +3,7 @@
 import math
 from contextlib import suppress
 from dataclasses import replace
+from itertools import pairwise
 
 import bench_server
 import numpy as np
@@ -244,6 +245,22 @@ def test_points_come_while_the_sweep_runs_once_the_instrument_is_known():
     assert not any(line.startswith("DSPB") for line in tap.lines[begun:])
     points.close()
     assert instrument.driven_v == 0.0
+
+
+def test_whoever_wants_an_end_is_heard_between_any_two_exchanges():
+    """A look at a sweep is some forty of them, a second on a slow adapter."""
+    _, analyser, tap = prepared()
+    looked_at = [len(tap.lines)]
+    analyser.on_wait = lambda: looked_at.append(len(tap.lines))
+    analyser.prepare(100.0, 200.0, SETTINGS)
+    list(analyser.sweep(GRID[:1]))
+    analyser.prepare(100.0, 200.0, SETTINGS)
+    points = analyser.sweep(GRID)
+    for _ in points:
+        pass
+    gaps = [after - before for before, after in pairwise(looked_at)]
+    # `quiet` at the end of each sweep is the longest.
+    assert max(gaps) <= 5
 
 
 def test_errors_refer_to_the_cycles_that_were_integrated():
