@@ -321,7 +321,9 @@ class Run:
     def _resume(self, first: Child) -> None:
         """Whatever was broken is mended; the measurement goes on to its end."""
         self._board.disarm()
-        if self.instrument.damage.dead or self._case.fault_name == "missing-option":
+        # RS-232 has no device clear: whose parser hangs there is switched off and on by hand.
+        hangs = self._case.wire == "serial_pty" and self.instrument.damage.parser_stuck
+        if self.instrument.damage.dead or hangs or self._case.fault_name == "missing-option":
             self.instrument, self._board = fault_child.instrument_of(None, self._case.driver)
         if self._served is not None:
             self._served.unplug()
