@@ -18,10 +18,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.executor import LocalExecutor
 from analysis.inference.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
-from analysis.inference.examples import Examples, Scales, read_batch
+from analysis.inference.examples import Scales, read_batch
 from analysis.inference.network import densities, first_weights, set_logits, summarise
 from analysis.inference.plans import landmarks
 from analysis.inference.prior import Prior
@@ -116,22 +117,24 @@ def measure(scales: Scales, state: Checkpoint, batches: list[Batch]) -> dict[str
         belief = np.exp(found - found.max(axis=1, keepdims=True))
         centres = (np.arange(state.shape.bins) + 0.5) / state.shape.bins
         ratios.append(belief @ centres / belief.sum(axis=1))
-    return _figures(scales, Examples.joined(parts), np.concatenate(probability), ratios)
+    true = np.concatenate([some.set for some in parts])
+    missed = np.concatenate(ratios) - np.concatenate([some.ratio for some in parts])
+    return _figures(scales, true, np.concatenate(probability), missed)
 
 
 def _figures(
-    scales: Scales, true: Examples, probability: np.ndarray, ratios: list[np.ndarray]
+    scales: Scales, true: NDArray[np.int32], probability: np.ndarray, missed: np.ndarray
 ) -> dict[str, float]:
-    of_truth = probability[np.arange(len(true)), true.set]
+    of_truth = probability[np.arange(len(true)), true]
     rank = (probability > of_truth[:, None]).sum(axis=1)
     sure = probability.max(axis=1) >= 0.95
     figures = {
         "nll": float(-np.log(np.maximum(of_truth, 1e-12)).mean()),
         "sure": float(sure.mean()),
         "sure_right": float((rank[sure] == 0).mean()) if sure.any() else 1.0,
-        "ratio_error": float(np.median(np.abs(np.concatenate(ratios) - true.ratio))),
+        "ratio_error": float(np.median(np.abs(missed))),
     }
-    causes = scales.sets.sizes[true.set]
+    causes = scales.sets.sizes[true]
     for count in np.unique(causes):
         some = rank[causes == count]
         figures[f"first_{count}"] = float((some == 0).mean())

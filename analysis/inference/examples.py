@@ -15,16 +15,17 @@ from numpy.typing import NDArray
 
 from analysis.inference.inputs import SweptLevels, network_inputs
 from analysis.inference.network import Architecture
+from analysis.inference.nominal import expected, relative
 from analysis.inference.plans import Landmarks, reference_response
 from analysis.inference.prior import COUNTS, Prior
 from analysis.inference.runs import Batch
 from analysis.inference.sets import CauseSets
 from analysis.observation import USUAL_NOISE_V
 
-__all__ = ["Examples", "MOST_ROWS", "Scales", "conditions", "estimated_noise", "read_batch"]
+__all__ = ["ROWS", "Examples", "Scales", "conditions", "estimated_noise", "read_batch"]
 
-MOST_ROWS = 5
-"""Levels of an example in training; answers may have more."""
+ROWS = (3, 5)
+"""Levels that examples are padded to in training; answers may have more."""
 
 _NOISE_V = (1e-4, 3e-3)
 _QUIET_SHARE = 0.02
@@ -88,11 +89,13 @@ class Scales:
         counts = len(prior.effects), len(prior.parameters), len(prior.symbols)
         return Architecture(*counts, **shape)
 
-    def inputs(self, swept: SweptLevels) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def inputs(
+        self, swept: SweptLevels, departures: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Arrays of points and rows of a sweep of the unit."""
         unit, marks = self.prior.unit, (self.marks.arf_hz, self.marks.rf_hz)
         reference = reference_response(unit, swept.frequency_hz)
-        return network_inputs(swept, reference, marks, unit.limits.source_vpk)
+        return network_inputs(swept, reference, marks, unit.limits.source_vpk, departures)
 
 
 def conditions(
@@ -167,7 +170,9 @@ def read_batch(
         plan.integrate_cycles,
         plan.dc_offset_v,
     )
-    points, facts = scales.inputs(swept)
+    plain = batch.plain_mean[:, levels][:, :, columns], batch.plain_variance[:, levels][..., columns]
+    (departures,), believed = relative([(swept, expected(*plain))])
+    points, facts = scales.inputs(swept, departures)
     padded, rows = _padded(points, facts)
     index, (low, high) = scales.sets.index, scales.size_ends.T
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -175,7 +180,7 @@ def read_batch(
     return Examples(
         points=padded,
         rows=rows,
-        conditions=conditions(batch.tolerance, batch.total_known, scatter_known, phase_known),
+        conditions=np.concatenate([conditions(batch.tolerance, batch.total_known, scatter_known, phase_known), believed], axis=1),
         set=np.array([index[tuple(np.flatnonzero(e))] for e in batch.effects], dtype=np.int32),
         chosen=batch.effects.astype(np.float32),
         ratio=batch.ratio,
@@ -202,9 +207,10 @@ def _kept(batch: Batch, rng: np.random.Generator) -> tuple[NDArray[np.int64], ND
 def _padded(
     points: NDArray[np.float32], facts: NDArray[np.float32]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Bring every example to the same number of rows, and say which are there."""
+    """Bring examples to one of the numbers of rows, and say which are there."""
     count, levels = facts.shape[:2]
-    padded = np.zeros((count, MOST_ROWS, *points.shape[2:]), dtype=np.float32)
-    rows = np.zeros((count, MOST_ROWS, facts.shape[2] + 1), dtype=np.float32)
+    most = next(rows for rows in ROWS if rows >= levels)
+    padded = np.zeros((count, most, *points.shape[2:]), dtype=np.float32)
+    rows = np.zeros((count, most, facts.shape[2] + 1), dtype=np.float32)
     padded[:, :levels], rows[:, :levels, :-1], rows[:, :levels, -1] = points, facts, 1.0
     return padded, rows

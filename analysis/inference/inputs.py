@@ -32,10 +32,15 @@ CHANNELS = (
     "wave_cos_1",
     "wave_sin_2",
     "wave_cos_2",
+    "off_gain",
+    "off_phase",
+    "off_scatter",
+    "off_known",
 )
 """Channels of a point. `gain`: log gain over the reference. `phase_*`: of the phase beyond the
 reference. `scatter`: log of the relative cycle-to-cycle scatter of one cycle. `noise`: log of the
-relative reading noise. `position`: log frequency between ARF and RF. `wave_*`: of `position`."""
+relative reading noise. `position`: log frequency between ARF and RF. `wave_*`: of `position`.
+`off_*`: departures from the datasheet's machine, see `analysis.inference.nominal`."""
 
 ROW_FACTS = ("level", "down", "settle", "integrate", "offset")
 """Facts of a row: log of level over the unit's limit, direction, log of cycles, offset by level."""
@@ -71,6 +76,7 @@ def network_inputs(
     reference: NDArray[np.complex128],
     landmarks_hz: Sequence[float],
     most_v: float,
+    departures: NDArray[np.float32],
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Arrays (n, L, C, G) of points and (n, L, R) of rows.
 
@@ -82,6 +88,9 @@ def network_inputs(
         ARF and RF that scale the frequencies.
     most_v
         Highest source level of the unit, V peak.
+    departures
+        (n, 4, L, F): log gain, phase and log scatter in standard deviations of single runs of the
+        datasheet's machine, and the logarithm of that of the gain.
     """
     count, levels, points = swept.gain.shape
     quotient = swept.gain / reference
@@ -116,6 +125,8 @@ def network_inputs(
             np.broadcast_to(np.sin(turn), everywhere),
             np.broadcast_to(np.cos(turn), everywhere),
         ]
+    parts += [np.arcsinh(np.nan_to_num(one)) / 2.0 for one in departures[:, :3].swapaxes(0, 1)]
+    parts.append(np.nan_to_num(departures[:, 3]) / 2.0 + 1.0)
     stacked = np.stack([np.asarray(p, dtype=np.float32) for p in parts], axis=2)
     # Channels of a missing point are zero, and so is padding.
     stacked *= np.where(present, 1.0, 0.0).astype(np.float32)[:, :, None]

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.inference.inputs import CHANNELS, ROW_FACTS
+from analysis.inference.nominal import FACTS
 from analysis.inference.sets import MOST_CAUSES, CauseSets
 
 __all__ = ["Architecture", "Densities", "Weights", "densities", "first_weights", "set_logits"]
@@ -60,7 +61,7 @@ class Architecture:
     @property
     def conditions(self) -> int:
         """What is known beforehand: tolerances, and whether total backlash, scatter, phase are."""
-        return self.symbols + 3
+        return self.symbols + 3 + FACTS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -185,12 +186,13 @@ def set_logits(weights: Weights, sets: CauseSets, summary: Any, xp: Any = np) ->
     """Unnormalised log posterior probability (n, sets) of every set of causes."""
     factors = _linear(summary, weights, "pair").reshape(len(summary), -1, 2 * _RANK)
     like, unlike = factors[..., :_RANK], factors[..., _RANK:]
+    first, second = sets.pairs
     pair = xp.einsum("nir,njr->nij", like, like) - xp.einsum("nir,njr->nij", unlike, unlike)
     singles, pairs = sets.incidence
     return (
         _linear(summary, weights, "count") @ sets.of_size
         + _linear(summary, weights, "single") @ singles
-        + pair.reshape(len(summary), -1) @ (pairs / 4.0)
+        + pair[:, first, second] @ (pairs / 4.0)
         + sets.log_prior.astype(np.float32)
     )
 

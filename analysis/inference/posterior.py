@@ -7,7 +7,7 @@ library, and refines nothing.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +17,9 @@ from analysis.inference.checkpoint import Checkpoint
 from analysis.inference.examples import Scales, conditions
 from analysis.inference.inputs import SweptLevels
 from analysis.inference.network import Densities, densities, set_logits, summarise
+from analysis.inference.nominal import Nominal, relative
 from analysis.observation import Observation
+from daq.plan import SweepPlan
 
 __all__ = ["Posterior", "SetPosterior", "swept_levels"]
 
@@ -50,10 +52,14 @@ class SetPosterior:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """The trained posterior of one unit."""
+    """The trained posterior of one unit.
+
+    `nominal`: the datasheet's machine in the sweep of a plan.
+    """
 
     scales: Scales
     checkpoint: Checkpoint
+    nominal: Callable[[SweepPlan], Nominal]
 
     def summary(
         self,
@@ -71,7 +77,10 @@ class Posterior:
         total_known
             Whether the total backlash of the datasheet may be relied on.
         """
-        parts = [self.scales.inputs(swept) for swept in swept_levels(observation)]
+        sweeps = swept_levels(observation)
+        nominal = [self.nominal(plan) for plan, _ in observation.plans]
+        departures, believed = relative(list(zip(sweeps, nominal, strict=True)))
+        parts = [self.scales.inputs(*one) for one in zip(sweeps, departures, strict=True)]
         points = np.concatenate([p for p, _ in parts], axis=1)
         facts = np.concatenate([f for _, f in parts], axis=1)
         rows = np.concatenate([facts, np.ones((*facts.shape[:2], 1), dtype=np.float32)], axis=2)
@@ -82,6 +91,7 @@ class Posterior:
             np.array([total_known]),
             *(np.array([one]) for one in known),
         )
+        condition = np.concatenate([condition, believed], axis=1)
         return np.asarray(
             summarise(self.checkpoint.weights, self.checkpoint.shape, points, rows, condition)
         )

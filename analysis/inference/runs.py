@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from analysis.executor import Executor
 from analysis.family import Family, read_families
+from analysis.inference.nominal import nominal_runs
 from analysis.inference.plans import Landmarks, draw_plan
 from analysis.inference.prior import DrawnMachine, Prior
 from daq.formats.atomic import replacing
@@ -28,7 +29,7 @@ __all__ = ["Batch", "load_batch", "save_batch", "simulate_batch"]
 _LANES = 16
 """Lanes of the engine that one group of machines fills, at all its levels."""
 
-_MACHINES = 48
+_MACHINES = 96
 """Machines in a batch, about."""
 
 
@@ -39,7 +40,8 @@ class Batch:
     `mean` (n, L, F) complex: V_o/V_i. `variance` (n, L, F): relative variance of the mean over
     both components, free of reading noise. `effects` (n, E) 0 or 1; `sizes` (n, P) physical
     values, NaN where the effect is absent; `tolerance`, `errors` (n, T) as shares; `ratio`,
-    `total_backlash` (as a multiple of the datasheet's), `total_known` (n,).
+    `total_backlash` (as a multiple of the datasheet's), `total_known` (n,). `plain_mean`,
+    `plain_variance` (RUNS, L, F): of the datasheet's machine, see `analysis.inference.nominal`.
     """
 
     plan: SweepPlan
@@ -52,6 +54,8 @@ class Batch:
     ratio: NDArray[np.float32]
     total_backlash: NDArray[np.float32]
     total_known: NDArray[np.bool_]
+    plain_mean: NDArray[np.complex64]
+    plain_variance: NDArray[np.float32]
 
     def __len__(self) -> int:
         return len(self.ratio)
@@ -76,12 +80,15 @@ def simulate_batch(
         Family(prior.unit, tuple(one.machine for one in group), ((plan, rows),)) for group in groups
     ]
     readings = read_families(families, executor)
+    plain_mean, plain_variance = nominal_runs(prior.unit, plan, executor)
     shape = (-1, len(plan.levels_vpk), len(plan.frequencies_hz))
     machines = [one for group in groups for one in group]
     return Batch(
         plan=plan,
         mean=np.concatenate([m for m, _ in readings]).astype(np.complex64).reshape(shape),
         variance=np.concatenate([v for _, v in readings]).astype(np.float32).reshape(shape),
+        plain_mean=plain_mean,
+        plain_variance=plain_variance,
         **_truths(prior, machines),
     )
 

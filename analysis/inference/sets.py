@@ -65,15 +65,19 @@ class CauseSets:
 
     @cached_property
     def incidence(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """(effects, sets) and (effects x effects, sets): 1 for each member, and each pair."""
-        count = len(self.effects)
-        singles = np.zeros((count, len(self.places)), dtype=np.float32)
-        pairs = np.zeros((count, count, len(self.places)), dtype=np.float32)
-        for number, one in enumerate(self.places):
-            singles[list(one), number] = 1.0
-            for first, second in combinations(one, 2):
-                pairs[first, second, number] = 1.0
-        return singles, pairs.reshape(count * count, -1)
+        """(effects, sets) and (pairs, sets): 1 for each member, and for each pair of members."""
+        count, (first, second) = len(self.effects), self.pairs
+        singles = np.zeros((count + 1, len(self.places)), dtype=np.float32)
+        for column in self.members.T:
+            singles[column, np.arange(len(self.places))] = 1.0
+        singles = singles[:count]
+        return singles, singles[first] * singles[second]
+
+    @cached_property
+    def pairs(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """First and second member of every pair of effects."""
+        first, second = np.triu_indices(len(self.effects), 1)
+        return first, second
 
     @cached_property
     def log_prior(self) -> NDArray[np.float64]:

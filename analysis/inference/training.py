@@ -17,7 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 
-from analysis.inference.examples import Examples, Scales, read_batch
+from analysis.inference.examples import ROWS, Examples, Scales, read_batch
 from analysis.inference.network import Architecture, densities, set_logits, summarise
 from analysis.inference.runs import Batch
 
@@ -125,18 +125,26 @@ def mixed_examples(
     count: int,
     rng: np.random.Generator,
 ) -> Iterator[Examples]:
-    """Examples in lots of `count`, from many batches at a time, for ever."""
-    pool: list[Examples] = []
+    """Examples in lots of `count`, from many batches at a time, for ever.
+
+    A lot holds examples of the same number of rows.
+    """
+    pools: dict[int, list[Examples]] = {rows: [] for rows in ROWS}
     while True:
         order = rng.permutation(len(batches))
         for first in range(0, len(order), _POOL):
-            pool += [read_batch(scales, batches[i], rng) for i in order[first : first + _POOL]]
-            mixed = Examples.joined(pool)
-            mixed = mixed.taken(rng.permutation(len(mixed)))
-            whole = len(mixed) // count * count
-            for start in range(0, whole, count):
-                yield mixed.taken(slice(start, start + count))
-            pool = [mixed.taken(slice(whole, None))]
+            for number in order[first : first + _POOL]:
+                some = read_batch(scales, batches[number], rng)
+                pools[some.rows.shape[1]].append(some)
+            for rows, pool in pools.items():
+                if sum(map(len, pool)) < _POOL * count // 8:
+                    continue
+                mixed = Examples.joined(pool)
+                mixed = mixed.taken(rng.permutation(len(mixed)))
+                whole = len(mixed) // count * count
+                for start in range(0, whole, count):
+                    yield mixed.taken(slice(start, start + count))
+                pools[rows] = [mixed.taken(slice(whole, None))]
 
 
 def losses(
