@@ -18,6 +18,7 @@ __all__ = [
     "config_names",
     "config_path",
     "kept_runs",
+    "posterior_folder",
     "sample_names",
     "sample_path",
 ]
@@ -82,6 +83,11 @@ def sample_path(name: str) -> Path:
 def atlas_folder() -> Path:
     """The folder of the atlases that come with lashbench, see `analysis.atlas`."""
     return _root() / "atlases"
+
+
+def posterior_folder() -> Path:
+    """The folder of the trained posteriors that come with lashbench."""
+    return _root() / "posteriors"
 
 
 def kept_runs() -> Path:

@@ -1,102 +1,150 @@
-"""Simulation and training of one unit's posterior, in rounds, from a checkpoint onward.
+"""Simulation and training of one unit's posterior, interruptible and resumable.
 
-Owns the order of the work: draw batches, keep the latest of them, train on these, measure on
-batches that training never sees, and save. It may be interrupted at any moment and loses one round
-at most. Answers are made by `analysis.inference.posterior`.
+Owns the order of the work: simulate the batches that are missing, train on all of them by one
+schedule, measure on batches that training never sees, and save. Batches are files, so that what is
+interrupted loses one of them at most. Answers are made by `analysis.inference.posterior`.
 
-    python -m analysis.inference.campaign --unit adss --machines 20000 --folder FOLDER
+    python -m analysis.inference.campaign --unit adss --machines 100000 --folder build/adss
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.executor import LocalExecutor
-from analysis.inference.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+from analysis.executor import Executor, LocalExecutor
+from analysis.inference.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from analysis.inference.examples import Scales, read_batch
 from analysis.inference.network import densities, first_weights, set_logits, summarise
-from analysis.inference.plans import landmarks
-from analysis.inference.prior import Prior
-from analysis.inference.runs import Batch, simulate_batch
-from analysis.inference.training import Schedule, Trainer
+from analysis.inference.runs import Batch, load_batch, save_batch, simulate_batch
 from daq.errors import AnalysisError
 from sim.unit import Unit, load_unit
 
-__all__ = ["Rounds", "measure", "train_unit"]
+__all__ = ["Recipe", "measure", "simulate_runs", "train_unit"]
 
-_HELD_OUT_SEED = 1_000_003
-"""Added to the seed of training for batches that training never sees."""
+HELD_OUT = 20
+"""One batch in so many is kept for measuring."""
+
+_ATTEMPTS, _APART = 5, 10**7
+"""A batch whose motion grew without bound is drawn anew under a number so far off."""
 
 
 @dataclass(frozen=True)
-class Rounds:
-    """How the work is divided.
+class Recipe:
+    """How a posterior is made.
 
-    `batches` are simulated in a round; the latest `kept` of all rounds are trained on, for `steps`
-    steps a round.
+    `seed`: of the batches, whose numbers begin at `first`. `epochs`: how often training sees each
+    machine; `rate`: the highest learning rate, which falls to nothing along a cosine; `examples` in
+    a step; `dropout` of the summary's units. `shape`: see `analysis.inference.network`.
     """
 
-    batches: int = 60
-    kept: int = 4000
-    steps: int = 300
+    seed: int = 1
+    first: int = 0
+    epochs: float = 8.0
     examples: int = 192
-    rate: float = 8e-4
+    rate: float = 1e-3
+    dropout: float = 0.1
+    shape: Mapping[str, Any] | None = None
+
+
+def simulate_runs(
+    scales: Scales,
+    folder: Path,
+    machines: int,
+    recipe: Recipe,
+    executor: Executor | None = None,
+    told: Callable[[int], None] = lambda machines: None,
+) -> list[Path]:
+    """Files of batches that hold so many machines; those that are missing are simulated.
+
+    `told` of the machines that there are, from time to time.
+    """
+    executor = executor or LocalExecutor()
+    files: list[Path] = []
+    held, number = 0, recipe.first
+    while held < machines:
+        numbers = range(number, number + 2 * getattr(executor, "cores", 8))
+        missing = [n for n in numbers if not _file(folder, n).exists()]
+        made = executor.each(partial(_simulate, scales, recipe.seed), missing)
+        for n, batch in zip(missing, made, strict=True):
+            save_batch(_file(folder, n), batch)
+        for n in numbers:
+            files.append(_file(folder, n))
+            held += len(load_batch(files[-1]))
+        number = numbers.stop
+        told(held)
+    return files
 
 
 def train_unit(
     unit: Unit,
-    folder: Path,
+    file: Path,
+    runs: Path,
     machines: int,
-    rounds: Rounds | None = None,
-    shape: dict[str, Any] | None = None,
-    seed: int = 1,
-    told: Callable[[Checkpoint], None] = lambda checkpoint: None,
+    recipe: Recipe | None = None,
+    start: Checkpoint | None = None,
+    executor: Executor | None = None,
+    told: Callable[[str], None] = lambda text: None,
 ) -> Checkpoint:
-    """Go on until so many machines were simulated, from the checkpoint in a folder.
+    """Make the posterior of a unit, or go on with one that was interrupted.
 
     Parameters
     ----------
-    shape
-        Of a new network; see `analysis.inference.network.Architecture`.
+    file
+        Where the checkpoint is; it is written about every minute.
+    runs
+        Folder of the batches.
+    start
+        A posterior, of another unit perhaps, whose weights training begins with.
     told
-        Told of the checkpoint after each round.
+        Told what is being done, with figures.
     """
-    rounds = rounds or Rounds()
-    scales = Scales(Prior(unit), landmarks(unit))
-    state = load_checkpoint(folder)
-    if state is None:
-        network = scales.architecture(**shape or {})
-        weights = first_weights(network, np.random.default_rng(seed))
-        state = Checkpoint(unit.name, network, weights, seed)
-    schedule = Schedule(rounds.steps, rounds.examples, rounds.rate)
+    # Loads JAX, which nobody who answers needs.
+    from analysis.inference.training import Schedule, Trainer
+
+    recipe = recipe or Recipe()
+    state = read_checkpoint(file)
+    known = state or start
+    scales = Scales.of(unit) if known is None or known is start else Scales.from_facts(unit, state)
+    files = simulate_runs(
+        scales, runs, machines, recipe, executor, lambda held: told(f"{held} machines simulated")
+    )
+    batches = [load_batch(one) for one in files]
+    held_out = batches[HELD_OUT - 1 :: HELD_OUT] or batches[-1:]
+    seen = [one for number, one in enumerate(batches) if number % HELD_OUT != HELD_OUT - 1]
+    count = sum(map(len, seen))
+    steps = max(int(recipe.epochs * count / recipe.examples), 1)
+    schedule = Schedule(steps, recipe.examples, recipe.rate, recipe.dropout)
+    if state is None or state.machines != count:
+        shape = start.shape if start else scales.architecture(**recipe.shape or {})
+        weights = start.weights if start else first_weights(shape, np.random.default_rng(0))
+        weights = known.weights if known else weights
+        state = Checkpoint(
+            unit.name, scales.marks.arf_hz, scales.marks.rf_hz, scales.most_v, shape, weights,
+            recipe.seed, len(files), count,
+        )  # fmt: skip
     trainer = Trainer(scales, state.shape, schedule)
-    recent: list[Batch] = []
-    held_out = _simulated(scales, state.seed + _HELD_OUT_SEED, range(rounds.batches // 3 + 1))
-    while state.machines < machines:
-        numbers = range(state.batches, state.batches + rounds.batches)
-        fresh = _simulated(scales, state.seed, numbers)
-        recent = [*recent, *fresh][-rounds.kept :]
-        weights, _ = trainer.train(state.weights, recent, state.seed + state.steps)
-        state = replace(
-            state,
-            weights=weights,
-            batches=numbers.stop,
-            machines=state.machines + sum(map(len, fresh)),
-            steps=state.steps + rounds.steps,
-        )
+    while state.steps < steps:
+        more = min(_AT_ONCE, steps - state.steps)
+        weights, progress = trainer.train(state.weights, seen, state.steps, more)
+        state = replace(state, weights=weights, steps=state.steps + more)
         state = replace(state, figures=measure(scales, state, held_out))
-        save_checkpoint(folder, state)
-        told(state)
+        write_checkpoint(file, state)
+        figures = ", ".join(f"{name} {value:.3f}" for name, value in state.figures.items())
+        told(f"step {state.steps} of {steps}: loss {progress.loss}, {figures}")
     return state
+
+
+_AT_ONCE = 200
+"""Steps of training between two checkpoints."""
 
 
 def measure(scales: Scales, state: Checkpoint, batches: list[Batch]) -> dict[str, float]:
@@ -142,33 +190,45 @@ def _figures(
     return figures
 
 
-def _simulated(scales: Scales, seed: int, numbers: range) -> list[Batch]:
-    """Batches of these numbers, each on a core; one whose motion grew without bound is left out."""
-    one_core = LocalExecutor(1)
+def _file(folder: Path, number: int) -> Path:
+    return folder / f"{number:06d}.npz"
 
-    def simulated(number: int) -> Batch | None:
+
+def _simulate(scales: Scales, seed: int, number: int) -> Batch:
+    """The batch of a number; the next one of its own where a motion grew without bound."""
+    for attempt in range(_ATTEMPTS):
         try:
-            return simulate_batch(scales.prior, scales.marks, seed, number, one_core)
+            key = number + attempt * _APART
+            return simulate_batch(scales.prior, scales.marks, seed, key, LocalExecutor(1))
         except AnalysisError:
-            return None
-
-    with ThreadPoolExecutor(LocalExecutor().cores) as pool:
-        return [batch for batch in pool.map(simulated, numbers) if batch is not None]
+            continue
+    raise AnalysisError(f"batch {number}: every motion grew without bound")
 
 
-def main(arguments: list[str]) -> int:
-    """Train, and print the figures of every round."""
+def main(arguments: Sequence[str]) -> int:
+    """Train, and print what is being done."""
     parser = argparse.ArgumentParser(prog="python -m analysis.inference.campaign")
     parser.add_argument("--unit", required=True)
     parser.add_argument("--machines", type=int, required=True)
     parser.add_argument("--folder", type=Path, required=True)
+    parser.add_argument("--file", type=Path)
+    parser.add_argument("--start", type=Path)
+    for name in ("seed", "first"):
+        parser.add_argument(f"--{name}", type=int, default=getattr(Recipe(), name))
+    for name in ("epochs", "rate", "dropout"):
+        parser.add_argument(f"--{name}", type=float, default=getattr(Recipe(), name))
     given = parser.parse_args(arguments)
-
-    def told(state: Checkpoint) -> None:
-        figures = ", ".join(f"{name} {value:.3f}" for name, value in state.figures.items())
-        sys.stderr.write(f"{state.machines} machines, {state.steps} steps: {figures}\n")
-
-    train_unit(load_unit(given.unit), given.folder, given.machines, told=told)
+    recipe = Recipe(given.seed, given.first, given.epochs, 192, given.rate, given.dropout)
+    start = None if given.start is None else read_checkpoint(given.start)
+    train_unit(
+        load_unit(given.unit),
+        given.file or given.folder / "posterior.npz",
+        given.folder,
+        given.machines,
+        recipe,
+        start,
+        told=lambda text: print(text, file=sys.stderr, flush=True),
+    )
     return 0
 
 

@@ -1,37 +1,47 @@
-"""Checkpoints of a posterior: weights, optimiser, and where simulation and training stand.
+"""Trained posteriors as files: weights, what they were trained on, and how well they answer.
 
-Owns one folder per unit. A checkpoint appears whole or not at all, and holds what is needed to go
-on: how many batches were drawn, by which seed, and how many steps were made. It trains nothing.
+Owns the format, the name of a unit's file, and where it is looked for: in the user's cache, then
+among those that come with lashbench. A file appears whole or not at all. It trains nothing.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from analysis.inference.network import Architecture
-from daq.errors import ConfigurationError
+from daq.configs import posterior_folder
 from daq.formats.atomic import replacing
+from daq.trust import own_folder, read_own
+from sim.catalogue import CATALOGUE
+from sim.unit import Unit
 
-__all__ = ["Checkpoint", "load_checkpoint", "save_checkpoint"]
+__all__ = ["Checkpoint", "find_checkpoint", "posterior_name", "read_checkpoint", "write_checkpoint"]
 
-EDITION = 1
+EDITION = 2
 """Counted up whenever inputs, prior, network or engine change what weights mean."""
 
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """Where the training of a posterior stands.
+    """A trained posterior and where its training stands.
 
-    `unit`: key of its physics. `seed`, `batches`: runs drawn so far. `machines`: in them.
-    `steps`: of training. `figures`: measured on runs that training has not seen.
+    `unit`: its name, for people. `arf_hz`, `rf_hz`, `most_v`: scales of its inputs. `seed`,
+    `batches`: runs drawn so far. `machines`: in them. `steps`: of training. `figures`: measured on
+    runs that training has not seen.
     """
 
     unit: str
+    arf_hz: float
+    rf_hz: float
+    most_v: float
     shape: Architecture
     weights: dict[str, Any]
     seed: int
@@ -41,35 +51,54 @@ class Checkpoint:
     figures: dict[str, float] = field(default_factory=dict)
 
 
-def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
+def posterior_name(unit: Unit) -> str:
+    """File name of a unit's posterior, another for everything that it depends on."""
+    effects = {e.id: [p.name for p in e.parameters] for e in CATALOGUE.values()}
+    text = json.dumps([EDITION, effects, unit.physics], sort_keys=True)
+    return f"posterior-{hashlib.sha256(text.encode()).hexdigest()[:24]}.npz"
+
+
+def find_checkpoint(unit: Unit, cache: Path | None = None) -> Checkpoint | None:
+    """The posterior of a unit, from the cache or as it comes with lashbench; None without one."""
+    name = posterior_name(unit)
+    cache = None if cache is None else own_folder(cache)
+    contents = (
+        None if cache is None else read_own(cache / name),
+        _shipped(name),
+    )
+    for content in filter(None, contents):
+        # Damage is told by zip, zlib and numpy, each in many ways: the next one is tried.
+        with suppress(Exception):
+            return _parsed(content)
+    return None
+
+
+def read_checkpoint(file: Path) -> Checkpoint | None:
+    """A checkpoint that training goes on from; None where there is none."""
+    return _parsed(file.read_bytes()) if file.exists() else None
+
+
+def write_checkpoint(file: Path, checkpoint: Checkpoint) -> None:
     """Write a checkpoint; weights in half precision lose nothing that matters."""
-    folder.mkdir(parents=True, exist_ok=True)
+    file.parent.mkdir(parents=True, exist_ok=True)
     facts = asdict(checkpoint)
     facts.pop("weights")
-    facts["edition"] = EDITION
     arrays: dict[str, Any] = {
         name: np.asarray(w, dtype=np.float16) for name, w in checkpoint.weights.items()
     }
-    with replacing(folder / "posterior.npz") as stream:
+    with replacing(file) as stream:
         np.savez_compressed(stream, facts=json.dumps(facts), **arrays)
 
 
-def load_checkpoint(folder: Path) -> Checkpoint | None:
-    """Read a checkpoint; None where there is none.
+def _shipped(name: str) -> bytes | None:
+    file = posterior_folder() / name
+    return file.read_bytes() if file.exists() else None
 
-    Raises
-    ------
-    ConfigurationError
-        If it is of another edition.
-    """
-    file = folder / "posterior.npz"
-    if not file.exists():
-        return None
-    with np.load(file, allow_pickle=False) as kept:
-        arrays = {name: kept[name].astype(np.float32) for name in kept.files if name != "facts"}
+
+def _parsed(content: bytes) -> Checkpoint:
+    with np.load(BytesIO(content), allow_pickle=False) as kept:
+        weights = {name: kept[name].astype(np.float32) for name in kept.files if name != "facts"}
         facts = json.loads(str(kept["facts"]))
-    if facts.pop("edition") != EDITION:
-        raise ConfigurationError(f"{file}: weights of another edition; train the posterior anew")
     shape = facts.pop("shape")
     shape["widths"] = tuple(shape["widths"])
-    return Checkpoint(shape=Architecture(**shape), weights=arrays, **facts)
+    return Checkpoint(shape=Architecture(**shape), weights=weights, **facts)

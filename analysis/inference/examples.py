@@ -13,14 +13,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.inference.checkpoint import Checkpoint
 from analysis.inference.inputs import SweptLevels, network_inputs
 from analysis.inference.network import Architecture
 from analysis.inference.nominal import expected, relative
-from analysis.inference.plans import Landmarks, reference_response
+from analysis.inference.plans import Landmarks, landmarks, reference_response
 from analysis.inference.prior import COUNTS, Prior
 from analysis.inference.runs import Batch
 from analysis.inference.sets import CauseSets
 from analysis.observation import USUAL_NOISE_V
+from sim.unit import Unit
 
 __all__ = ["ROWS", "Examples", "Scales", "conditions", "estimated_noise", "read_batch"]
 
@@ -71,6 +73,17 @@ class Scales:
 
     prior: Prior
     marks: Landmarks
+    most_v: float
+
+    @classmethod
+    def of(cls, unit: Unit) -> Scales:
+        """Scales of a unit of which none are known yet: a few machines are simulated."""
+        return cls(Prior(unit), landmarks(unit), unit.limits.source_vpk)
+
+    @classmethod
+    def from_facts(cls, unit: Unit, known: Checkpoint) -> Scales:
+        """Scales that a posterior was trained with."""
+        return cls(Prior(unit), Landmarks(known.arf_hz, known.rf_hz), known.most_v)
 
     @cached_property
     def sets(self) -> CauseSets:
@@ -93,9 +106,9 @@ class Scales:
         self, swept: SweptLevels, departures: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Arrays of points and rows of a sweep of the unit."""
-        unit, marks = self.prior.unit, (self.marks.arf_hz, self.marks.rf_hz)
-        reference = reference_response(unit, swept.frequency_hz)
-        return network_inputs(swept, reference, marks, unit.limits.source_vpk, departures)
+        marks = self.marks.arf_hz, self.marks.rf_hz
+        reference = reference_response(self.prior.unit, swept.frequency_hz)
+        return network_inputs(swept, reference, marks, self.most_v, departures)
 
 
 def conditions(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +18,12 @@ from analysis.ensemble import Machine
 from analysis.executor import Executor
 from analysis.family import Family, read_families
 from analysis.inference.inputs import SweptLevels
+from analysis.library import run_families
+from analysis.observation import Observation
 from daq.plan import SweepPlan
 from sim.unit import Unit
 
-__all__ = ["FACTS", "Nominal", "compare", "expected", "nominal_runs", "relative"]
+__all__ = ["FACTS", "Nominal", "compare", "expected", "nominal_of", "nominal_runs", "relative"]
 
 RUNS = 32
 """Machines of the datasheet, their ratios evenly over 0 to 1."""
@@ -31,11 +34,14 @@ PROFILE = 33
 FACTS = PROFILE + 2
 """What the comparison tells of an observation as a whole."""
 
+_ENDS = (0.015, 0.985)
+
 _REACH = 0.09
 """Half-width of the regression, in ratio: three runs on either side."""
 
 _LEAST_STD = np.array([0.01, 0.01, 0.2])
 _SEED = 7000
+_TURN = np.float32(2.0 * np.pi)
 _HEAT = 15.0
 """Neighbouring points err together: so many count for one."""
 
@@ -57,13 +63,35 @@ def nominal_runs(
     unit: Unit, plan: SweepPlan, executor: Executor | None = None
 ) -> tuple[NDArray[np.complex64], NDArray[np.float32]]:
     """Mean and relative variance (RUNS, L, F) of machines as the datasheet has them."""
-    ratios = np.linspace(0.015, 0.985, RUNS) if unit.stages == 2 else np.ones(RUNS)
-    machines = tuple(Machine(float(r), _SEED + k) for k, r in enumerate(ratios))
-    ((mean, variance),) = read_families(
-        [Family(unit, machines, ((plan, np.arange(plan.points)),))], executor
-    )
+    family = Family(unit, _machines(unit), ((plan, np.arange(plan.points)),))
+    ((mean, variance),) = read_families([family], executor)
     shape = (RUNS, len(plan.levels_vpk), len(plan.frequencies_hz))
     return mean.astype(np.complex64).reshape(shape), variance.astype(np.float32).reshape(shape)
+
+
+def nominal_of(
+    unit: Unit,
+    observation: Observation,
+    cache: Path | None = None,
+    executor: Executor | None = None,
+) -> Nominal:
+    """The datasheet's machine in the sweep of an observation of one plan; its runs are kept."""
+    machines = _machines(unit)
+    halves = [machines[::2], machines[1::2]]
+    draws = run_families(unit, halves, observation, cache=cache, executor=executor)
+    order = np.argsort(np.concatenate([np.arange(0, RUNS, 2), np.arange(1, RUNS, 2)]))
+    ((plan, rows),) = observation.plans
+    shape = (RUNS, len(plan.levels_vpk), len(plan.frequencies_hz))
+    place = np.argsort(rows)
+    return expected(
+        draws.mean[order][:, place].astype(np.complex64).reshape(shape),
+        draws.variance[order][:, place].astype(np.float32).reshape(shape),
+    )
+
+
+def _machines(unit: Unit) -> tuple[Machine, ...]:
+    ratios = np.linspace(*_ENDS, RUNS) if unit.stages == 2 else np.ones(RUNS)
+    return tuple(Machine(float(ratio), _SEED + k) for k, ratio in enumerate(ratios))
 
 
 def expected(mean: NDArray[np.complex64], variance: NDArray[np.float32]) -> Nominal:
@@ -101,26 +129,24 @@ def compare(
     Departures are in standard deviations, NaN where nothing was read.
     """
     size = np.maximum(np.abs(swept.gain), 1e-9)
-    share = swept.noise_v[:, None, None] / (size * swept.levels_vpk[:, None])
+    volts = size * swept.levels_vpk[:, None].astype(np.float32)
+    noise2 = (swept.noise_v[:, None, None] / volts) ** 2
     scatter = swept.scatter / np.sqrt(np.float32(swept.integrate_cycles))
-    read = np.stack(
-        [
-            np.log(size),
-            np.where(swept.phase_known, np.angle(swept.gain), np.nan),
-            np.log(scatter),
-        ],
-        axis=1,
-    ).astype(np.float32)
-    off = read[:, None] - nominal.mean
-    off[:, :, 1] = (off[:, :, 1] + np.pi) % (2.0 * np.pi) - np.pi
-    noise2 = np.stack([share**2, share**2, 0.0 * share], axis=1)[:, None]
     # A scatter is never below that of the reading noise.
-    std = np.sqrt(nominal.std**2 + noise2)
-    quiet = np.log(np.sqrt(np.exp(2.0 * nominal.mean[:, 2]) + 2.0 * share[:, None] ** 2))
-    off[:, :, 2] = read[:, None, 2] - quiet
-    z = off / std
-    density = np.where(np.isfinite(z), -2.5 * np.log1p(z * z / 4.0) - np.log(std), 0.0)
-    return (density.sum(axis=(2, 3, 4)) / _HEAT).astype(np.float32), z.astype(np.float32)
+    quiet = 0.5 * np.log(np.exp(2.0 * nominal.mean[:, 2]) + 2.0 * noise2[:, None])
+    off = np.empty((len(size), *nominal.mean.shape), dtype=np.float32)
+    off[:, :, 0] = np.log(size)[:, None] - nominal.mean[:, 0]
+    angle = np.where(swept.phase_known, np.angle(swept.gain), np.nan)
+    off[:, :, 1] = angle[:, None] - nominal.mean[:, 1]
+    off[:, :, 1] -= _TURN * np.round(off[:, :, 1] / _TURN)
+    off[:, :, 2] = np.log(scatter)[:, None] - quiet
+    variance = np.repeat(nominal.std[None] ** 2, len(size), axis=0)
+    variance[:, :, :2] += noise2[:, None, None]
+    z2 = off * off / variance
+    # Bounded, so that a motion in another state over a stretch of the sweep costs no more.
+    cost = np.where(np.isfinite(z2), 8.0 * z2 / (8.0 + z2) + np.log(variance), 0.0)
+    log_likelihood = -0.5 * cost.sum(axis=(2, 3, 4)) / _HEAT
+    return log_likelihood, off / np.sqrt(variance)
 
 
 def relative(
@@ -150,9 +176,9 @@ def relative(
 
 def _smoothing() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Matrices (RUNS, RUNS) and (PROFILE, RUNS) of local linear regression over the ratio."""
-    ratios = np.linspace(0.015, 0.985, RUNS)
+    ratios = np.linspace(*_ENDS, RUNS)
     found = []
-    for places in (ratios, np.linspace(0.015, 0.985, PROFILE)):
+    for places in (ratios, np.linspace(*_ENDS, PROFILE)):
         offset = ratios - places[:, None]
         weight = np.maximum(1.0 - (offset / (_REACH * 1.5)) ** 2, 0.0) ** 2
         s0, s1, s2 = (np.sum(weight * offset**p, axis=1, keepdims=True) for p in range(3))

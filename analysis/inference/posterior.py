@@ -9,17 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.inference.checkpoint import Checkpoint
+from analysis.executor import Executor
+from analysis.inference.checkpoint import Checkpoint, find_checkpoint
 from analysis.inference.examples import Scales, conditions
 from analysis.inference.inputs import SweptLevels
 from analysis.inference.network import Densities, densities, set_logits, summarise
-from analysis.inference.nominal import Nominal, relative
+from analysis.inference.nominal import Nominal, nominal_of, relative
 from analysis.observation import Observation
-from daq.plan import SweepPlan
+from sim.unit import Unit
 
 __all__ = ["Posterior", "SetPosterior", "swept_levels"]
 
@@ -54,12 +57,23 @@ class SetPosterior:
 class Posterior:
     """The trained posterior of one unit.
 
-    `nominal`: the datasheet's machine in the sweep of a plan.
+    `nominal`: the datasheet's machine in the sweep of an observation.
     """
 
     scales: Scales
     checkpoint: Checkpoint
-    nominal: Callable[[SweepPlan], Nominal]
+    nominal: Callable[[Observation], Nominal]
+
+    @classmethod
+    def find(
+        cls, unit: Unit, cache: Path | None = None, executor: Executor | None = None
+    ) -> Posterior | None:
+        """The posterior of a unit, from the cache or as it comes with lashbench."""
+        found = find_checkpoint(unit, cache)
+        if found is None:
+            return None
+        scales = Scales.from_facts(unit, found)
+        return cls(scales, found, partial(nominal_of, unit, cache=cache, executor=executor))
 
     def summary(
         self,
@@ -78,7 +92,7 @@ class Posterior:
             Whether the total backlash of the datasheet may be relied on.
         """
         sweeps = swept_levels(observation)
-        nominal = [self.nominal(plan) for plan, _ in observation.plans]
+        nominal = [self.nominal(part) for part, _ in observation.by_plan()]
         departures, believed = relative(list(zip(sweeps, nominal, strict=True)))
         parts = [self.scales.inputs(*one) for one in zip(sweeps, departures, strict=True)]
         points = np.concatenate([p for p, _ in parts], axis=1)

@@ -32,7 +32,7 @@ _POOL = 24
 
 @dataclass(frozen=True)
 class Schedule:
-    """How long to train, and how fast.
+    """How long to train in all, and how fast.
 
     `steps` of `examples` each; `rate` the highest learning rate, after a warm-up of 2 % and
     before a cosine decay; `dropout` of the summary's units; `decay` of weights.
@@ -69,7 +69,7 @@ class Trainer:
     scales, shape
         The unit, and the network for it.
     schedule
-        Of each call of `train`.
+        Of all calls of `train` together.
     """
 
     def __init__(self, scales: Scales, shape: Architecture, schedule: Schedule) -> None:
@@ -93,19 +93,19 @@ class Trainer:
         self._step = jax.jit(step)
 
     def train(
-        self, weights: dict[str, Any], batches: Sequence[Batch], seed: int
+        self, weights: dict[str, Any], batches: Sequence[Batch], first: int, steps: int
     ) -> tuple[dict[str, Any], Progress]:
-        """Make the steps of the schedule on some batches; weights, and what it came to.
+        """Make some steps of the schedule, from the first of a number; weights, what it came to.
 
-        `seed` draws the order, the bench's part of the examples, and dropout.
+        That number draws the order, the bench's part of the examples, and dropout.
         """
         if self._state is None:
             self._state = self._optimiser.init(weights)
-        key, began_s, recent = jax.random.PRNGKey(seed), time.process_time(), []
+        key, began_s, recent = jax.random.PRNGKey(first), time.process_time(), []
         stream = mixed_examples(
-            self._scales, batches, self._schedule.examples, np.random.default_rng([seed, 1])
+            self._scales, batches, self._schedule.examples, np.random.default_rng([first, 1])
         )
-        for number in range(self._schedule.steps):
+        for number in range(first, first + steps):
             key, one = jax.random.split(key)
             some = next(stream)
             content = {name: getattr(some, name) for name in Examples.__slots__}
@@ -115,7 +115,7 @@ class Trainer:
         mean = {name: float(np.mean([one[name] for one in recent])) for name in _SHARES}
         return (
             {name: np.asarray(weight) for name, weight in weights.items()},
-            Progress(self._schedule.steps, mean, time.process_time() - began_s),
+            Progress(steps, mean, time.process_time() - began_s),
         )
 
 
