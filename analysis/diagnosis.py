@@ -18,19 +18,19 @@ import numpy as np
 
 from analysis.arithmetic import on_one_core
 from analysis.believed import HINT, believed_document, is_usually_off, trusts_much
-from analysis.bounds import bound_beside, bound_causes
 from analysis.calibration import Calibrated
 from analysis.candidate import Candidate
 from analysis.certainty import hold_against_doubt
 from analysis.diagnosis_document import Cause, Diagnosis, Size
 from analysis.executor import Executor
 from analysis.harmonics import compare_harmonics
+from analysis.inference.posterior import Posterior, limits
+from analysis.inference.refine import refine
 from analysis.misfit import describe_departures, find_departures
 from analysis.models import models_left
 from analysis.next_measurement import NextMeasurement, propose_measurement
 from analysis.observation import Observation, observe
 from analysis.progress import Progress, part_of
-from analysis.search import search_causes
 from analysis.second_thoughts import UNDOING, think_again
 from analysis.settled import settled
 from analysis.sharpening import sharpen_candidate
@@ -39,7 +39,6 @@ from analysis.stated_error import error_doubts
 from analysis.surely_off import hold_against_datasheet
 from analysis.swept import check_together, unit_doubts
 from analysis.thinning import thin_all
-from analysis.unseen import Unseen
 from analysis.verdict import Judged, Verdict, judge_candidates
 from daq.errors import AnalysisError
 from daq.frf import FrequencyResponse
@@ -151,10 +150,11 @@ def _diagnose(
         if progress is not None:
             progress(0.8 * share, text)
 
-    searched = search_causes(
-        unit, observed, without=without, cache=cache, seed=seed, executor=executor, progress=early
+    posterior = Posterior.find(unit, cache, executor)
+    refined = refine(
+        posterior, observed, without=without, seed=seed, executor=executor, progress=early
     )
-    candidates = searched.candidates
+    candidates = refined.candidates
     observation = candidates[0].surface.observation
     rng = np.random.default_rng(seed)
     verdict = judge_candidates(candidates, observation, rng)
@@ -182,12 +182,9 @@ def _diagnose(
     best = base if sharp is None else sharp
     departures = find_departures(verdict.baseline.candidate, observation)
     left = find_departures(verdict.best.candidate, observation)
-    few, atlas = searched.few, searched.atlas
-    unseen: tuple[Unseen, ...] = ()
-    if named:
-        unseen = bound_beside(unit, few, atlas, verdict.best.candidate, best)
-    elif verdict.word == "consistent":
-        unseen = bound_causes(unit, few, atlas)
+    unseen = ()
+    if verdict.word != "unexplained":
+        unseen = limits(posterior, refined.summary, verdict.best.effects if named else (), without)
     proposal = _proposal(unit, verdict, observation, seed, executor, progress)
     # Chance of its own: sizing what is left beside the answer does not change the answer.
     models = models_left(verdict, best, base if named else best, observation, rng.spawn(1)[0])
@@ -208,7 +205,6 @@ def _diagnose(
         unseen=unseen,
         models=models,
         believed=believed_document(unit),
-        cut_short=searched.given_up or (searched.spared and verdict.word == "unexplained"),
     )
 
 
@@ -270,10 +266,6 @@ def _proposal(
 
 def _warnings(diagnosis: Diagnosis) -> tuple[str, ...]:
     found, observation = [], diagnosis.observation
-    if diagnosis.cut_short:
-        found.append(
-            "not every set of causes was tried, as a search may simulate only so much motion"
-        )
     if diagnosis.verdict.word == "unexplained":
         found.append(
             "the contribution ratio is that of the plain model, which does not explain what was "

@@ -96,6 +96,11 @@ class Scales:
         ends = [p.range(self.prior.unit) for _, p in self.prior.parameters]
         return np.log(np.array([(max(low, 0.01 * high), high) for low, high in ends]))
 
+    def place(self, effect: str, parameter: str) -> int:
+        """Where a size stands among all of them."""
+        names = [(e, p.name) for e, p in self.prior.parameters]
+        return names.index((effect, parameter))
+
     def architecture(self, **shape: Any) -> Architecture:
         """A network for the unit; see `Architecture` for its shape."""
         prior = self.prior

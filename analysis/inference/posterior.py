@@ -7,7 +7,7 @@ library, and refines nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.causes import Hypothesis
 from analysis.executor import Executor
 from analysis.inference.checkpoint import Checkpoint, find_checkpoint
 from analysis.inference.examples import Scales, conditions
@@ -22,9 +23,14 @@ from analysis.inference.inputs import SweptLevels
 from analysis.inference.network import Densities, densities, set_logits, summarise
 from analysis.inference.nominal import Nominal, nominal_of, relative
 from analysis.observation import Observation
+from analysis.unseen import Unseen
+from sim.catalogue import CATALOGUE
 from sim.unit import Unit
 
-__all__ = ["Posterior", "SetPosterior", "swept_levels"]
+__all__ = ["Posterior", "SetPosterior", "limits", "swept_levels"]
+
+_WIDE = 1.96
+"""Standard deviations of a 95 % interval."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -148,6 +154,42 @@ class Posterior:
                 std = stretch * float(np.exp(found.size_log_std[0, place]))
                 sizes[effect, parameter.name] = (mean, std)
         return SetPosterior(names, probability, ratio / ratio.sum(), sizes)
+
+
+def limits(
+    posterior: Posterior,
+    summary: NDArray[np.float32],
+    named: Sequence[str] = (),
+    without: Collection[str] = (),
+) -> tuple[Unseen, ...]:
+    """How large each other cause may be and not show, beside what is named.
+
+    The 95 % interval of its size given that it is there too; open where it reaches the end of the
+    range, or what the datasheet says is on the other side.
+    """
+    unit, sets = posterior.scales.prior.unit, posterior.scales.sets
+    place = {effect: number for number, effect in enumerate(sets.effects)}
+    found = []
+    for effect in sets.effects:
+        members = tuple(sorted(place[e] for e in {*named, effect}))
+        if effect in {*named, *without} or members not in sets.index:
+            continue
+        parameter = CATALOGUE[effect].parameters[0]
+        one = posterior.given(summary, sets.index[members])
+        mean, std = one.sizes[effect, parameter.name]
+        ends = posterior.scales.size_ends[posterior.scales.place(effect, parameter.name)]
+        low, high = (float(np.exp(mean + sign * _WIDE * std)) for sign in (-1.0, 1.0))
+        least, most = np.exp(ends)
+        hypothesis = Hypothesis(unit, (effect,))
+        amid = hypothesis.amid[0]
+        from_zero = parameter.allowed[0] <= 0.0
+        shown = (
+            low if low > least and (amid or not from_zero) else None,
+            high if high < most and (amid or from_zero) else None,
+        )
+        known = parameter.nominal(unit)
+        found.append(Unseen(effect, parameter.name, parameter.unit_symbol, *shown, known))
+    return tuple(found)
 
 
 def swept_levels(observation: Observation) -> list[SweptLevels]:

@@ -7,30 +7,38 @@ verdict.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, islice
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.candidate import Candidate, Effects
 from analysis.causes import Hypothesis
 from analysis.executor import Executor
 from analysis.hunt import Hunt
 from analysis.inference.posterior import Posterior, SetPosterior
+from analysis.inference.sets import CauseSets
 from analysis.observation import Observation
+from analysis.placement import Reach
 from analysis.progress import Progress, part_of
+
+Vector = NDArray[np.float64]
 
 __all__ = ["Refined", "refine"]
 
 _SHARE, _MOST = 0.99, 8
-"""Sets that are refined hold this share of the probability; at most so many."""
+"""Sets that are refined first hold this share of the probability; at most so many."""
+
+_BESIDE = 4
+"""Sets that hold what leads and one more cause that are refined next."""
 
 _GROUPS = 6
 """Groups of five runs that a set gets in each round."""
 
 _ROUNDS, _CONTENDERS, _NEAR = 3, 4, 60.0
-"""Rounds after the first, sets that take part in each, and how far behind they may lie."""
+"""Rounds after these, sets that take part in each, and how far behind they may lie."""
 
 _WIDE, _LEAST_REACH, _MOST_REACH = 2.0, (0.06, 0.03), (0.35, 0.3)
 """Runs lie within so many standard deviations of the network's answer; least and most in ratio and
@@ -39,9 +47,13 @@ in sizes as shares of their range."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Refined:
-    """Candidates, the likeliest first, and what the network said of each of them."""
+    """Candidates, the likeliest first, and what the network said.
+
+    `summary` (1, hidden) of the observation; `proposed`: what it said of each candidate.
+    """
 
     candidates: list[Candidate]
+    summary: NDArray[np.float32]
     proposed: tuple[SetPosterior, ...]
 
 
@@ -63,43 +75,65 @@ def refine(
     """
     unit = posterior.scales.prior.unit
     summary = posterior.summary(observation, unit.tolerances)
-    proposed = posterior.likeliest(summary, _SHARE, tuple(without))[:_MOST]
-    index = posterior.scales.sets.index
-    place = {name: number for number, name in enumerate(posterior.scales.prior.effects)}
-    wanted = _with_parts([one.effects for one in proposed])
     probability = posterior.set_probabilities(summary, tuple(without))
-    numbers = {key: index[tuple(sorted(place[e] for e in key))] for key in wanted}
-    found = {k: posterior.given(summary, n, float(probability[n])) for k, n in numbers.items()}
-    rng = np.random.default_rng(seed)
+    order = np.argsort(-probability)
+    held = np.cumsum(probability[order])
+    first = order[: min(int(np.searchsorted(held, _SHARE)) + 1, _MOST)]
     report = part_of(progress, 0.0, 1.0, "simulating the likeliest causes")
-    fine = Hunt(unit, observation, rng, executor, report)
-    for key, one in found.items():
-        hypothesis = Hypothesis(unit, key)
-        at, std = _place(hypothesis, one)
-        least, most = (np.array([a, *[b] * (len(at) - 1)]) for a, b in (_LEAST_REACH, _MOST_REACH))
-        reach = np.clip(_WIDE * std, least, most)
-        fine.start({key: at}, _GROUPS, reach=(float(reach[0]), reach[1:]))
+    fine = Hunt(unit, observation, np.random.default_rng(seed), executor, report)
+    found: dict[Effects, SetPosterior] = {}
+
+    def look_at(numbers: Iterable[int]) -> None:
+        names = [tuple(sorted(posterior.scales.sets.names(int(n)))) for n in numbers]
+        new = {k: n for k, n in zip(names, numbers, strict=True) if k not in found}
+        for key, number in new.items():
+            found[key] = posterior.given(summary, int(number), float(probability[number]))
+            at, reach = _placed(Hypothesis(unit, key), found[key], fine)
+            fine.start({key: at}, _GROUPS, reach=reach)
+
+    sets = posterior.scales.sets
+    look_at([*first, *_parts(sets, int(first[0]))])
     fine.hear()
+    look_at(_supersets(posterior, fine.best.hypothesis.effects, probability))
     for _ in range(_ROUNDS):
         near = fine.leading(_CONTENDERS, _NEAR)
         parts = [key for key in found if set(key) < set(near[0])]
         fine.settle(list(dict.fromkeys([*near, *parts])), _GROUPS)
     fine.hear()
     candidates = sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
-    return Refined(candidates, tuple(found.values()))
+    return Refined(candidates, summary, tuple(found.values()))
 
 
-def _with_parts(sets: Sequence[Effects]) -> list[Effects]:
-    """Sets, every part of the first of them, and the baseline."""
-    first = sets[0]
-    parts = [part for count in range(len(first)) for part in combinations(first, count)]
-    return list(dict.fromkeys([*(tuple(sorted(one)) for one in sets), *map(tuple, parts), ()]))
+def _parts(sets: CauseSets, number: int) -> list[int]:
+    """Every part of a set, the empty one among them."""
+    whole = sets.places[number]
+    return [sets.index[one] for k in range(len(whole)) for one in combinations(whole, k)]
 
 
-def _place(hypothesis: Hypothesis, one: SetPosterior) -> tuple[np.ndarray, np.ndarray]:
-    """Where a set lies by the network, and its standard deviations, in coordinates (d,)."""
+def _supersets(
+    posterior: Posterior, leader: Effects, probability: NDArray[np.float64]
+) -> list[int]:
+    """The likeliest sets that hold a leader and one more cause."""
+    sets = posterior.scales.sets
+    members = {sets.effects.index(effect) for effect in leader}
+    order = np.argsort(-probability)
+    holding = (n for n in order if members < set(sets.places[n]))
+    one_more = (int(n) for n in holding if sets.sizes[n] == len(members) + 1 and probability[n])
+    return list(islice(one_more, _BESIDE if leader else 0))
+
+
+def _placed(hypothesis: Hypothesis, one: SetPosterior, fine: Hunt) -> tuple[Vector, Reach]:
+    """Where the runs of a set lie (d,), and how far about it.
+
+    By the network, and where a part of it leads, by that for what it holds.
+    """
     low, high = hypothesis.logs[:, 0], hypothesis.logs[:, 1]
     known = np.array([one.sizes[e, p.name] for e, p in hypothesis.parameters]).reshape(-1, 2)
-    at = np.clip((known[:, 0] - low) / (high - low), 0.02, 0.98)
-    std = known[:, 1] / (high - low)
-    return np.append(one.ratio_mean, at), np.append(one.ratio_std, std)
+    at = np.append(one.ratio_mean, (known[:, 0] - low) / (high - low))
+    std = np.append(one.ratio_std, known[:, 1] / (high - low))
+    least, most = (np.array([a, *[b] * (len(at) - 1)]) for a, b in (_LEAST_REACH, _MOST_REACH))
+    reach = np.clip(_WIDE * std, least, most)
+    if fine.found and set(part := fine.best.hypothesis.effects) < set(hypothesis.effects):
+        shared = [True, *(effect in part for effect, _ in hypothesis.parameters)]
+        at[shared], reach[shared] = fine.best.best.place, np.minimum(reach, 4.0 * least)[shared]
+    return np.clip(at, 0.02, 0.98), (float(reach[0]), reach[1:])
