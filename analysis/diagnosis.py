@@ -39,6 +39,7 @@ from analysis.stated_error import error_doubts
 from analysis.surely_off import hold_against_datasheet
 from analysis.swept import check_together, unit_doubts
 from analysis.thinning import thin_all
+from analysis.unseen import Unseen
 from analysis.verdict import Judged, Verdict, judge_candidates
 from daq.errors import AnalysisError
 from daq.frf import FrequencyResponse
@@ -151,6 +152,11 @@ def _diagnose(
             progress(0.8 * share, text)
 
     posterior = Posterior.find(unit, cache, executor)
+    if posterior is None:
+        raise AnalysisError(
+            f"no posterior for unit {unit.name} was trained, nor for one like it; run: "
+            "lashbench prepare --unit FILE"
+        )
     refined = refine(
         posterior, observed, without=without, seed=seed, executor=executor, progress=early
     )
@@ -182,7 +188,7 @@ def _diagnose(
     best = base if sharp is None else sharp
     departures = find_departures(verdict.baseline.candidate, observation)
     left = find_departures(verdict.best.candidate, observation)
-    unseen = ()
+    unseen: tuple[Unseen, ...] = ()
     if verdict.word != "unexplained":
         unseen = limits(posterior, refined.summary, verdict.best.effects if named else (), without)
     proposal = _proposal(unit, verdict, observation, seed, executor, progress)

@@ -1,20 +1,22 @@
-"""Simulating ahead what a sweep's estimate and its diagnosis will be held against.
+"""Making ahead what estimates and diagnoses need: the posterior of a unit, the runs of a sweep.
 
-Owns which of it does not depend on what will be measured, and in which order it
-is made: runs at every place that an estimate of it alone may ask for, then what a search
-starts from. It judges nothing; what it makes lies where both look for it.
+Owns which of it does not depend on what will be measured, and where it is kept: where the
+estimate and the diagnosis look for it. It judges nothing.
 """
 
 from __future__ import annotations
 
 import errno
 import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis.atlas import are_atlases_kept, coarse_stride, make_atlas
 from analysis.estimate import free_axes
 from analysis.executor import Executor
+from analysis.inference.checkpoint import Checkpoint, find_checkpoint, posterior_name
+from analysis.inference.nominal import nominal_families, nominal_of
+from analysis.inference.posterior import lent_checkpoint
 from analysis.lattice import every_family
 from analysis.library import are_kept, run_families
 from analysis.observation import Observation
@@ -25,10 +27,13 @@ from daq.trust import distrust
 from sim.effort import counting
 from sim.unit import Unit
 
-__all__ = ["Prepared", "prepare_sweep"]
+__all__ = ["Prepared", "prepare_sweep", "prepare_unit"]
 
 _AT_ONCE = 8
 """Families that are simulated before they are kept: what is interrupted loses no more."""
+
+_RATE_FROM_ANOTHER = 3e-4
+"""Learning rate where training begins with a posterior that was trained before."""
 
 _ROOM_BYTES = 1 << 15
 """Less than any file that is kept."""
@@ -43,6 +48,41 @@ class Prepared:
     needed: int
     before: int
     kept: int
+
+
+def prepare_unit(
+    unit: Unit,
+    machines: int,
+    cache: Path,
+    *,
+    executor: Executor | None = None,
+    told: Callable[[str], None] = lambda text: None,
+) -> Checkpoint:
+    """Train the posterior of a unit on so many simulated machines, and keep it.
+
+    It serves every sweep of the unit. What was interrupted goes on. Training begins with the
+    posterior that comes with lashbench, of this unit or of another one with as many stages.
+
+    Raises
+    ------
+    LashbenchError
+        If there is no room to keep anything.
+    InputError
+        If JAX is not installed, nothing can be written into the folder, or others may write there.
+    AnalysisError
+        If a motion grew without bound.
+    """
+    from analysis.inference.campaign import Recipe, train_unit
+
+    _check_usable(cache)
+    name = posterior_name(unit)
+    runs = cache / name.removesuffix(".npz").replace("posterior", "training")
+    runs.mkdir(exist_ok=True)
+    start = find_checkpoint(unit) or lent_checkpoint(unit)
+    recipe = Recipe(rate=_RATE_FROM_ANOTHER) if start else Recipe()
+    return train_unit(
+        unit, cache / name, runs, machines, recipe, start, executor=executor, told=told
+    )
 
 
 def prepare_sweep(
@@ -79,27 +119,25 @@ def prepare_sweep(
         If a motion grew without bound.
     """
     _check_usable(cache)
-    searched = unit.stages == 2
     families = every_family(free_axes(unit), observation, spread_of(unit), seed=0)
-    coarse = observation.thinned(coarse_stride(observation))
+    parts = [part for part, _ in observation.by_plan()] if unit.stages == 2 else []
 
     def kept() -> list[bool]:
-        runs = [are_kept(unit, family, observation, cache) for family in families]
-        atlases = (are_atlases_kept(unit, coarse, cache, rare=rare) for rare in (False, True))
-        return runs + (sum(atlases, []) if searched else [])
+        found = [are_kept(unit, family, observation, cache) for family in families]
+        plain = nominal_families(unit)
+        return found + [are_kept(unit, one, part, cache) for part in parts for one in plain]
 
     before = kept()
     with counting() as effort:
-        share = 0.5 if searched else 1.0
         for first in range(0, len(families), _AT_ONCE):
             some = families[first : first + _AT_ONCE]
             low, high = first / len(families), (first + len(some)) / len(families)
-            tell = part_of(progress, share * low, share * high, "for the estimate")
+            tell = part_of(progress, 0.9 * low, 0.9 * high, "for the estimate")
             run_families(unit, some, observation, cache=cache, executor=executor, progress=tell)
-        if searched:
-            for rare, low, high in ((False, 0.5, 0.85), (True, 0.85, 1.0)):
-                tell = part_of(progress, low, high, "for the diagnosis")
-                make_atlas(unit, coarse, cache, executor, tell, rare=rare)
+        for part in parts:
+            nominal_of(unit, part, cache, executor)
+        if progress is not None:
+            progress(1.0, "for the diagnosis")
     return Prepared(effort.simulated_s, len(before), sum(before), sum(kept()))
 
 

@@ -25,13 +25,16 @@ from analysis.inference.checkpoint import Checkpoint, read_checkpoint, write_che
 from analysis.inference.examples import Scales, read_batch
 from analysis.inference.network import densities, first_weights, set_logits, summarise
 from analysis.inference.runs import Batch, load_batch, save_batch, simulate_batch
-from daq.errors import AnalysisError
+from daq.errors import AnalysisError, InputError
 from sim.unit import Unit, load_unit
 
 __all__ = ["Recipe", "measure", "simulate_runs", "train_unit"]
 
 HELD_OUT = 20
 """One batch in so many is kept for measuring."""
+
+_AT_ONCE = 200
+"""Steps of training between two checkpoints."""
 
 _ATTEMPTS, _APART = 5, 10**7
 """A batch whose motion grew without bound is drawn anew under a number so far off."""
@@ -61,7 +64,7 @@ def simulate_runs(
     machines: int,
     recipe: Recipe,
     executor: Executor | None = None,
-    told: Callable[[int], None] = lambda machines: None,
+    told: Callable[[int], object] = lambda machines: None,
 ) -> list[Path]:
     """Files of batches that hold so many machines; those that are missing are simulated.
 
@@ -91,8 +94,9 @@ def train_unit(
     machines: int,
     recipe: Recipe | None = None,
     start: Checkpoint | None = None,
+    beside: Sequence[tuple[Unit, Path]] = (),
     executor: Executor | None = None,
-    told: Callable[[str], None] = lambda text: None,
+    told: Callable[[str], object] = lambda text: None,
 ) -> Checkpoint:
     """Make the posterior of a unit, or go on with one that was interrupted.
 
@@ -104,29 +108,47 @@ def train_unit(
         Folder of the batches.
     start
         A posterior, of another unit perhaps, whose weights training begins with.
+    beside
+        Other units with folders of their batches, which training sees as well: what the network
+        learns of one holds for others, as it reads both relative to their datasheets.
     told
         Told what is being done, with figures.
+
+    Raises
+    ------
+    InputError
+        If JAX is not installed.
+    AnalysisError
+        If a motion grew without bound.
     """
-    # Loads JAX, which nobody who answers needs.
-    from analysis.inference.training import Schedule, Trainer
+    try:
+        # JAX, which nobody who answers needs.
+        from analysis.inference.training import Schedule, Trainer
+    except ImportError as error:
+        raise InputError(
+            f"training needs JAX ({error}); install it: pip install 'lashbench[train]'"
+        ) from error
 
     recipe = recipe or Recipe()
     state = read_checkpoint(file)
     known = state or start
-    scales = Scales.of(unit) if known is None or known is start else Scales.from_facts(unit, state)
+    scales = Scales.of(unit) if state is None else Scales.from_facts(unit, state)
     files = simulate_runs(
         scales, runs, machines, recipe, executor, lambda held: told(f"{held} machines simulated")
     )
     batches = [load_batch(one) for one in files]
     held_out = batches[HELD_OUT - 1 :: HELD_OUT] or batches[-1:]
-    seen = [one for number, one in enumerate(batches) if number % HELD_OUT != HELD_OUT - 1]
-    count = sum(map(len, seen))
+    own = [one for number, one in enumerate(batches) if number % HELD_OUT != HELD_OUT - 1]
+    seen = [(scales, one) for one in own]
+    for other, folder in beside:
+        others = Scales.of(other)
+        seen += [(others, load_batch(one)) for one in sorted(folder.glob("*.npz"))]
+    count = sum(len(one) for _, one in seen)
     steps = max(int(recipe.epochs * count / recipe.examples), 1)
     schedule = Schedule(steps, recipe.examples, recipe.rate, recipe.dropout)
     if state is None or state.machines != count:
-        shape = start.shape if start else scales.architecture(**recipe.shape or {})
-        weights = start.weights if start else first_weights(shape, np.random.default_rng(0))
-        weights = known.weights if known else weights
+        shape = known.shape if known else scales.architecture(**recipe.shape or {})
+        weights = known.weights if known else first_weights(shape, np.random.default_rng(0))
         state = Checkpoint(
             unit.name, scales.marks.arf_hz, scales.marks.rf_hz, scales.most_v, shape, weights,
             recipe.seed, len(files), count,
@@ -141,10 +163,6 @@ def train_unit(
         figures = ", ".join(f"{name} {value:.3f}" for name, value in state.figures.items())
         told(f"step {state.steps} of {steps}: loss {progress.loss}, {figures}")
     return state
-
-
-_AT_ONCE = 200
-"""Steps of training between two checkpoints."""
 
 
 def measure(scales: Scales, state: Checkpoint, batches: list[Batch]) -> dict[str, float]:
@@ -213,6 +231,7 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--folder", type=Path, required=True)
     parser.add_argument("--file", type=Path)
     parser.add_argument("--start", type=Path)
+    parser.add_argument("--beside", nargs=2, action="append", default=[])
     for name in ("seed", "first"):
         parser.add_argument(f"--{name}", type=int, default=getattr(Recipe(), name))
     for name in ("epochs", "rate", "dropout"):
@@ -227,7 +246,8 @@ def main(arguments: Sequence[str]) -> int:
         given.machines,
         recipe,
         start,
-        told=lambda text: print(text, file=sys.stderr, flush=True),
+        [(load_unit(name), Path(folder)) for name, folder in given.beside],
+        told=lambda text: sys.stderr.write(f"{text}\n"),
     )
     return 0
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from io import BytesIO
@@ -23,7 +24,14 @@ from daq.trust import own_folder, read_own
 from sim.catalogue import CATALOGUE
 from sim.unit import Unit
 
-__all__ = ["Checkpoint", "find_checkpoint", "posterior_name", "read_checkpoint", "write_checkpoint"]
+__all__ = [
+    "Checkpoint",
+    "find_checkpoint",
+    "posterior_name",
+    "read_checkpoint",
+    "shipped_checkpoints",
+    "write_checkpoint",
+]
 
 EDITION = 2
 """Counted up whenever inputs, prior, network or engine change what weights mean."""
@@ -71,6 +79,13 @@ def find_checkpoint(unit: Unit, cache: Path | None = None) -> Checkpoint | None:
         with suppress(Exception):
             return _parsed(content)
     return None
+
+
+def shipped_checkpoints() -> Iterator[Checkpoint]:
+    """The posteriors that come with lashbench."""
+    for file in sorted(posterior_folder().glob("posterior-*.npz")):
+        with suppress(Exception):
+            yield _parsed(file.read_bytes())
 
 
 def read_checkpoint(file: Path) -> Checkpoint | None:

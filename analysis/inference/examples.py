@@ -188,7 +188,10 @@ def read_batch(
         plan.integrate_cycles,
         plan.dc_offset_v,
     )
-    plain = batch.plain_mean[:, levels][:, :, columns], batch.plain_variance[:, levels][..., columns]
+    plain = (
+        batch.plain_mean[:, levels][:, :, columns],
+        batch.plain_variance[:, levels][..., columns],
+    )
     (departures,), believed = relative([(swept, expected(*plain))])
     points, facts = scales.inputs(swept, departures)
     padded, rows = _padded(points, facts)
@@ -198,7 +201,10 @@ def read_batch(
     return Examples(
         points=padded,
         rows=rows,
-        conditions=np.concatenate([conditions(batch.tolerance, batch.total_known, scatter_known, phase_known), believed], axis=1),
+        conditions=np.concatenate(
+            [conditions(batch.tolerance, batch.total_known, scatter_known, phase_known), believed],
+            axis=1,
+        ),
         set=np.array([index[tuple(np.flatnonzero(e))] for e in batch.effects], dtype=np.int32),
         chosen=batch.effects.astype(np.float32),
         ratio=batch.ratio,

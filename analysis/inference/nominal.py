@@ -23,7 +23,16 @@ from analysis.observation import Observation
 from daq.plan import SweepPlan
 from sim.unit import Unit
 
-__all__ = ["FACTS", "Nominal", "compare", "expected", "nominal_of", "nominal_runs", "relative"]
+__all__ = [
+    "FACTS",
+    "Nominal",
+    "compare",
+    "expected",
+    "nominal_families",
+    "nominal_of",
+    "nominal_runs",
+    "relative",
+]
 
 RUNS = 32
 """Machines of the datasheet, their ratios evenly over 0 to 1."""
@@ -76,9 +85,7 @@ def nominal_of(
     executor: Executor | None = None,
 ) -> Nominal:
     """The datasheet's machine in the sweep of an observation of one plan; its runs are kept."""
-    machines = _machines(unit)
-    halves = [machines[::2], machines[1::2]]
-    draws = run_families(unit, halves, observation, cache=cache, executor=executor)
+    draws = run_families(unit, nominal_families(unit), observation, cache=cache, executor=executor)
     order = np.argsort(np.concatenate([np.arange(0, RUNS, 2), np.arange(1, RUNS, 2)]))
     ((plan, rows),) = observation.plans
     shape = (RUNS, len(plan.levels_vpk), len(plan.frequencies_hz))
@@ -87,6 +94,12 @@ def nominal_of(
         draws.mean[order][:, place].astype(np.complex64).reshape(shape),
         draws.variance[order][:, place].astype(np.float32).reshape(shape),
     )
+
+
+def nominal_families(unit: Unit) -> tuple[tuple[Machine, ...], tuple[Machine, ...]]:
+    """The machines that are simulated of a datasheet, in two halves for two cores."""
+    machines = _machines(unit)
+    return machines[::2], machines[1::2]
 
 
 def _machines(unit: Unit) -> tuple[Machine, ...]:
@@ -146,7 +159,8 @@ def compare(
     # Bounded, so that a motion in another state over a stretch of the sweep costs no more.
     cost = np.where(np.isfinite(z2), 8.0 * z2 / (8.0 + z2) + np.log(variance), 0.0)
     log_likelihood = -0.5 * cost.sum(axis=(2, 3, 4)) / _HEAT
-    return log_likelihood, off / np.sqrt(variance)
+    z = np.asarray(off / np.sqrt(variance), dtype=np.float32)
+    return np.asarray(log_likelihood, dtype=np.float32), z
 
 
 def relative(

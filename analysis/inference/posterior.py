@@ -17,17 +17,18 @@ from numpy.typing import NDArray
 
 from analysis.causes import Hypothesis
 from analysis.executor import Executor
-from analysis.inference.checkpoint import Checkpoint, find_checkpoint
+from analysis.inference.checkpoint import Checkpoint, find_checkpoint, shipped_checkpoints
 from analysis.inference.examples import Scales, conditions
 from analysis.inference.inputs import SweptLevels
 from analysis.inference.network import Densities, densities, set_logits, summarise
 from analysis.inference.nominal import Nominal, nominal_of, relative
+from analysis.inference.prior import Prior
 from analysis.observation import Observation
 from analysis.unseen import Unseen
 from sim.catalogue import CATALOGUE
 from sim.unit import Unit
 
-__all__ = ["Posterior", "SetPosterior", "limits", "swept_levels"]
+__all__ = ["Posterior", "SetPosterior", "lent_checkpoint", "limits", "swept_levels"]
 
 _WIDE = 1.96
 """Standard deviations of a 95 % interval."""
@@ -63,23 +64,30 @@ class SetPosterior:
 class Posterior:
     """The trained posterior of one unit.
 
-    `nominal`: the datasheet's machine in the sweep of an observation.
+    `nominal`: the datasheet's machine in the sweep of an observation. `lent_by`: the unit that it
+    was trained for, where that is another one, else empty.
     """
 
     scales: Scales
     checkpoint: Checkpoint
     nominal: Callable[[Observation], Nominal]
+    lent_by: str = ""
 
     @classmethod
     def find(
         cls, unit: Unit, cache: Path | None = None, executor: Executor | None = None
     ) -> Posterior | None:
-        """The posterior of a unit, from the cache or as it comes with lashbench."""
+        """The posterior of a unit, from the cache or as it comes with lashbench.
+
+        Where there is none, that of another unit: it reads an observation relative to the
+        datasheet, so that much of what it learned holds. None where no other has as many stages.
+        """
+        nominal = partial(nominal_of, unit, cache=cache, executor=executor)
         found = find_checkpoint(unit, cache)
-        if found is None:
-            return None
-        scales = Scales.from_facts(unit, found)
-        return cls(scales, found, partial(nominal_of, unit, cache=cache, executor=executor))
+        if found is not None:
+            return cls(Scales.from_facts(unit, found), found, nominal)
+        lent = lent_checkpoint(unit)
+        return None if lent is None else cls(Scales.of(unit), lent, nominal, lent.unit)
 
     def summary(
         self,
@@ -154,6 +162,17 @@ class Posterior:
                 std = stretch * float(np.exp(found.size_log_std[0, place]))
                 sizes[effect, parameter.name] = (mean, std)
         return SetPosterior(names, probability, ratio / ratio.sum(), sizes)
+
+
+def lent_checkpoint(unit: Unit) -> Checkpoint | None:
+    """A posterior of another unit that has the same causes, sizes and datasheet values."""
+    prior = Prior(unit)
+    counts = len(prior.effects), len(prior.parameters), len(prior.symbols)
+    for one in shipped_checkpoints():
+        shape = one.shape
+        if (shape.effects, shape.parameters, shape.symbols) == counts:
+            return one
+    return None
 
 
 def limits(

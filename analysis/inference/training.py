@@ -21,7 +21,10 @@ from analysis.inference.examples import ROWS, Examples, Scales, read_batch
 from analysis.inference.network import Architecture, densities, set_logits, summarise
 from analysis.inference.runs import Batch
 
-__all__ = ["Progress", "Schedule", "Trainer"]
+__all__ = ["Progress", "Run", "Schedule", "Trainer"]
+
+Run = tuple[Scales, Batch]
+"""Runs, and the scales of the unit that they are of."""
 
 _SHARES = {"set": 1.0, "ratio": 0.5, "size": 0.3, "error": 0.2, "total": 0.05}
 """How much each part of the loss counts. The set and the ratio are what is asked for."""
@@ -67,13 +70,13 @@ class Trainer:
     Parameters
     ----------
     scales, shape
-        The unit, and the network for it.
+        A unit whose sets of causes are told apart, and the network for it.
     schedule
         Of all calls of `train` together.
     """
 
     def __init__(self, scales: Scales, shape: Architecture, schedule: Schedule) -> None:
-        self._scales, self._schedule = scales, schedule
+        self._schedule = schedule
         self._optimiser = optax.chain(
             optax.clip_by_global_norm(1.0),
             optax.scale_by_adam(b2=0.99),
@@ -93,18 +96,18 @@ class Trainer:
         self._step = jax.jit(step)
 
     def train(
-        self, weights: dict[str, Any], batches: Sequence[Batch], first: int, steps: int
+        self, weights: dict[str, Any], runs: Sequence[Run], first: int, steps: int
     ) -> tuple[dict[str, Any], Progress]:
-        """Make some steps of the schedule, from the first of a number; weights, what it came to.
+        """Make some steps of the schedule on some runs, from the step of a number.
+
+        Weights, and what it came to.
 
         That number draws the order, the bench's part of the examples, and dropout.
         """
         if self._state is None:
             self._state = self._optimiser.init(weights)
         key, began_s, recent = jax.random.PRNGKey(first), time.process_time(), []
-        stream = mixed_examples(
-            self._scales, batches, self._schedule.examples, np.random.default_rng([first, 1])
-        )
+        stream = mixed_examples(runs, self._schedule.examples, np.random.default_rng([first, 1]))
         for number in range(first, first + steps):
             key, one = jax.random.split(key)
             some = next(stream)
@@ -119,22 +122,18 @@ class Trainer:
         )
 
 
-def mixed_examples(
-    scales: Scales,
-    batches: Sequence[Batch],
-    count: int,
-    rng: np.random.Generator,
-) -> Iterator[Examples]:
+def mixed_examples(runs: Sequence[Run], count: int, rng: np.random.Generator) -> Iterator[Examples]:
     """Examples in lots of `count`, from many batches at a time, for ever.
 
     A lot holds examples of the same number of rows.
     """
     pools: dict[int, list[Examples]] = {rows: [] for rows in ROWS}
     while True:
-        order = rng.permutation(len(batches))
+        order = rng.permutation(len(runs))
         for first in range(0, len(order), _POOL):
             for number in order[first : first + _POOL]:
-                some = read_batch(scales, batches[number], rng)
+                scales, batch = runs[number]
+                some = read_batch(scales, batch, rng)
                 pools[some.rows.shape[1]].append(some)
             for rows, pool in pools.items():
                 if sum(map(len, pool)) < _POOL * count // 8:

@@ -1,6 +1,6 @@
-"""``lashbench prepare``: simulate ahead what a sweep will be held against.
+"""``lashbench prepare``: train the posterior of a unit, or simulate ahead what a sweep needs.
 
-Owns the options of the verb. What is worth simulating ahead is the analysis's.
+Owns the options of the verb. What is worth making ahead is the analysis's.
 """
 
 from __future__ import annotations
@@ -21,8 +21,12 @@ from tui.reading_options import NO_LAYOUT, LayoutOptions, ReadingOptions, read_f
 if TYPE_CHECKING:
     from analysis.observation import Observation
     from daq.plan import Direction
+    from sim.unit import Unit
 
 __all__ = ["prepare"]
+
+_MACHINES = 30_000
+"""Machines of a posterior: about three quarters of an hour of two cores."""
 
 
 def prepare(
@@ -30,6 +34,7 @@ def prepare(
     /,
     *,
     unit: UnitName,
+    machines: Whole | None = None,
     level: list[Real] | None = None,
     start: Real | None = None,
     stop: Real | None = None,
@@ -46,16 +51,18 @@ def prepare(
     json: Json = False,
     console: Injected,
 ) -> None:
-    """Simulate ahead what the estimate and the diagnosis of a sweep will need.
+    """Train what the diagnosis of a unit needs, or simulate ahead what a sweep needs.
 
-    It depends on the unit and the sweep alone, so that it can be made before a
-    measurement, or while one runs; every measurement of that sweep is then
-    estimated in seconds. Give the options of `measure`, or a response of such a sweep.
+    Without a sweep: the posterior of the unit is trained on simulated machines, for every sweep of
+    it. It can be interrupted, and goes on where it was. With the options of `measure`, or with a
+    response: the runs that the estimate and the diagnosis of such a sweep are compared with.
 
     Parameters
     ----------
     file
         A response of the sweep, in place of the options below, which then complete it.
+    machines
+        Machines to simulate for the posterior; 30000 if left out. More make it sharper.
     level
         Source level in V peak; repeat it for several.
     start
@@ -84,6 +91,13 @@ def prepare(
         settle_cycles, integrate_cycles, offset,
     )  # fmt: skip
     subject = load_unit(unit).with_tolerance(tolerance_shares(tolerance))
+    if file is None and not options.given and recipe is None:
+        _train(subject, _MACHINES if machines is None else machines, cluster, json, console)
+        return
+    if machines is not None:
+        raise InputError(
+            "--machines: the posterior serves every sweep; leave out the options of a sweep"
+        )
     observation = _observation(file, options, recipe, layout, console)
     from analysis.preparation import prepare_sweep
 
@@ -119,6 +133,33 @@ def prepare(
     else:
         console.data(
             f"{subject.name}: {done.simulated_s:.0f} s of motion simulated in {elapsed_s:.0f} s, "
+            f"kept in {folder}"
+        )
+
+
+def _train(subject: Unit, machines: int, cluster: str | None, json: bool, console: Console) -> None:
+    if machines < 1:
+        raise InputError(f"--machines: {machines} is too few; give 1 or more")
+    from analysis.preparation import prepare_unit
+
+    began, folder = time.perf_counter(), cache_folder()
+    with executor_at(cluster) as executor:
+        made = prepare_unit(subject, machines, folder, executor=executor, told=console.note)
+    elapsed_s = time.perf_counter() - began
+    if json:
+        console.document(
+            {
+                "unit": subject.name,
+                "machines": made.machines,
+                "steps": made.steps,
+                "figures": made.figures,
+                "kept_in": str(folder),
+                "elapsed_s": elapsed_s,
+            }
+        )
+    else:
+        console.data(
+            f"{subject.name}: posterior trained on {made.machines} machines in {elapsed_s:.0f} s, "
             f"kept in {folder}"
         )
 
