@@ -1,7 +1,13 @@
 import numpy as np
 import pytest
 
-from analysis.inference.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+from analysis.inference.checkpoint import (
+    Checkpoint,
+    find_checkpoint,
+    posterior_name,
+    read_checkpoint,
+    write_checkpoint,
+)
 from analysis.inference.examples import Scales
 from analysis.inference.inputs import CHANNELS, MOST_POINTS, SweptLevels, network_inputs
 from analysis.inference.network import densities, first_weights, set_logits, summarise
@@ -9,13 +15,14 @@ from analysis.inference.plans import Landmarks, reference_response
 from analysis.inference.posterior import Posterior, swept_levels
 from analysis.inference.prior import Prior
 from analysis.observation import observe
+from daq.configs import config_path
 from daq.frf import FrequencyResponse
 from sim.unit import load_unit
 
 
 @pytest.fixture(scope="module")
 def scales():
-    return Scales(Prior(load_unit("adss")), Landmarks(116.0, 150.0))
+    return Scales(Prior(load_unit("adss")), Landmarks(116.0, 150.0), 5.0)
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +31,8 @@ def posterior(scales):
     rng = np.random.default_rng(0)
     weights = {k: w + 0.1 * rng.standard_normal(w.shape).astype(np.float32)
                for k, w in first_weights(shape, rng).items()}  # fmt: skip
-    return Posterior(scales, Checkpoint("adss", shape, weights, 0))
+    checkpoint = Checkpoint("ADSS", 116.0, 150.0, 5.0, shape, weights, 0)
+    return Posterior(scales, checkpoint, lambda part: None)
 
 
 def swept(gain, frequency_hz, levels_vpk, **changed):
@@ -44,11 +52,17 @@ def swept(gain, frequency_hz, levels_vpk, **changed):
     return SweptLevels(**content | changed)
 
 
+def read(scales, one):
+    """Inputs of a sweep that departs nowhere from the datasheet's machine."""
+    count, levels, points = one.gain.shape
+    return scales.inputs(one, np.zeros((count, 4, levels, points), dtype=np.float32))
+
+
 def test_reference_reads_as_zero(scales):
     """A response equal to the reference has no log gain and no phase beyond it."""
     frequency_hz = np.linspace(100.0, 180.0, 20)
     reference = reference_response(scales.prior.unit, frequency_hz)
-    points, _ = scales.inputs(swept(reference[None, None], frequency_hz, [2.0]))
+    points, _ = read(scales, swept(reference[None, None], frequency_hz, [2.0]))
     for channel in ("gain", "phase_sin", "phase_cos"):
         np.testing.assert_allclose(points[0, 0, CHANNELS.index(channel), :20], 0.0, atol=1e-5)
     assert points[0, 0, 0].sum() == 20
@@ -58,7 +72,7 @@ def test_reference_reads_as_zero(scales):
 def test_factor_reads_as_log_gain(scales, factor):
     frequency_hz = np.linspace(100.0, 180.0, 20)
     gain = factor * reference_response(scales.prior.unit, frequency_hz)
-    points, _ = scales.inputs(swept(gain[None, None], frequency_hz, [2.0]))
+    points, _ = read(scales, swept(gain[None, None], frequency_hz, [2.0]))
     expected = np.log(factor)
     np.testing.assert_allclose(points[0, 0, CHANNELS.index("gain"), :20], expected, rtol=1e-5)
 
@@ -66,8 +80,9 @@ def test_factor_reads_as_log_gain(scales, factor):
 def test_many_points_are_averaged_with_no_point_lost():
     frequency_hz = np.linspace(100.0, 180.0, 200)
     ramp = np.exp(np.linspace(0.0, 1.0, 200))
+    one = swept(ramp[None, None], frequency_hz, [1.0])
     points, _ = network_inputs(
-        swept(ramp[None, None], frequency_hz, [1.0]), np.ones(200), (110.0, 150.0), 5.0
+        one, np.ones(200), (110.0, 150.0), 5.0, np.zeros((1, 4, 1, 200), dtype=np.float32)
     )
     gain = points[0, 0, CHANNELS.index("gain")]
     assert gain.shape == (MOST_POINTS,)
@@ -79,7 +94,7 @@ def test_missing_point_leaves_no_trace(scales):
     frequency_hz = np.linspace(100.0, 180.0, 20)
     gain = np.ones((1, 1, 20), dtype=complex)
     gain[0, 0, 7] = np.nan
-    points, _ = scales.inputs(swept(gain, frequency_hz, [2.0]))
+    points, _ = read(scales, swept(gain, frequency_hz, [2.0]))
     assert np.all(points[0, 0, :, 7] == 0.0)
     assert np.all(np.isfinite(points))
 
@@ -88,7 +103,7 @@ def inputs_of(posterior, levels, rng):
     scales = posterior.scales
     frequency_hz = np.linspace(100.0, 180.0, 30)
     gain = rng.standard_normal((2, len(levels), 30)) + 2.0
-    points, facts = scales.inputs(swept(gain, frequency_hz, levels))
+    points, facts = read(scales, swept(gain, frequency_hz, levels))
     rows = np.concatenate([facts, np.ones((2, len(levels), 1), dtype=np.float32)], axis=2)
     conditions = rng.standard_normal((2, posterior.checkpoint.shape.conditions))
     return points, rows, conditions.astype(np.float32)
@@ -128,12 +143,25 @@ def test_set_logits_are_sums_over_members(posterior):
 
 
 def test_checkpoint_round_trip(posterior, tmp_path):
-    save_checkpoint(tmp_path, posterior.checkpoint)
-    loaded = load_checkpoint(tmp_path)
+    write_checkpoint(tmp_path / "one.npz", posterior.checkpoint)
+    loaded = read_checkpoint(tmp_path / "one.npz")
     assert loaded.shape == posterior.checkpoint.shape
     for name, values in posterior.checkpoint.weights.items():
         np.testing.assert_allclose(loaded.weights[name], values, rtol=2e-3, atol=1e-4)
-    assert load_checkpoint(tmp_path / "elsewhere") is None
+    assert read_checkpoint(tmp_path / "elsewhere.npz") is None
+
+
+def test_checkpoint_is_found_by_physics_alone(posterior, tmp_path):
+    """Name, limits and tolerance do not matter; a changed inertia does; a damaged file is none."""
+    unit = load_unit(str(config_path("templates", "two-stage")))
+    file = tmp_path / posterior_name(unit)
+    write_checkpoint(file, posterior.checkpoint)
+    renamed = unit.model_copy(update={"name": "other"}).with_tolerance({"R_m": 0.1})
+    assert find_checkpoint(renamed, tmp_path).shape == posterior.checkpoint.shape
+    changed = unit.with_parameters(J_L=1.01 * unit.parameters["J_L"])
+    assert find_checkpoint(changed, tmp_path) is None
+    file.write_bytes(file.read_bytes()[:-200])
+    assert find_checkpoint(unit, tmp_path) is None
 
 
 def test_observation_reaches_network_in_order(posterior):

@@ -106,7 +106,7 @@ def test_batch_depends_on_seed_and_number_alone(prior, marks, tmp_path):
     assert loaded.plan == first.plan
     for name in ("mean", "variance", "effects", "sizes", "tolerance", "errors", "ratio"):
         np.testing.assert_array_equal(getattr(loaded, name), getattr(first, name))
-    scales = Scales(prior, marks)
+    scales = Scales(prior, marks, 5.0)
     examples = read_batch(scales, first, np.random.default_rng(0))
     assert len(examples) == len(first)
     for number, one in zip(examples.set, first.effects, strict=True):

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.inference.checkpoint import load_checkpoint
+from analysis.inference.checkpoint import read_checkpoint
 from analysis.inference.examples import Scales, read_batch
 from analysis.inference.network import first_weights, set_logits, summarise
 from analysis.inference.plans import Landmarks
@@ -14,36 +14,18 @@ SMALL = {"widths": (8, 8), "blocks": 1, "hidden": 32, "queries": 2}
 
 
 @pytest.fixture(scope="module")
-def trained(tmp_path_factory):
-    """Two rounds of training, the second from the checkpoint of the first."""
-    from analysis.inference.campaign import Rounds, train_unit
-
-    folder = tmp_path_factory.mktemp("posterior")
-    rounds = Rounds(batches=2, steps=40, examples=32, rate=3e-3)
-    unit, told = load_unit("adss"), []
-    for machines in (1, 100):
-        train_unit(unit, folder, machines, rounds, SMALL, told=told.append)
-    return folder, told
+def scales():
+    return Scales(Prior(load_unit("adss")), Landmarks(116.0, 150.0), 5.0)
 
 
-@pytest.mark.study
-def test_training_goes_on_from_its_checkpoint(trained):
-    folder, told = trained
-    last = load_checkpoint(folder)
-    assert [one.steps for one in told] == [40, 80]
-    assert last.machines == told[-1].machines >= 100 > told[0].machines
-    assert last.batches == 4
-
-
-def test_numpy_computes_what_jax_trains():
+def test_numpy_computes_what_jax_trains(scales):
     """One network, two array libraries: logits agree to single precision."""
     import jax.numpy as jnp
 
-    scales = Scales(Prior(load_unit("adss")), Landmarks(116.0, 150.0))
     shape = scales.architecture(**SMALL)
     rng = np.random.default_rng(0)
     weights = first_weights(shape, rng)
-    points = rng.standard_normal((3, 2, 14, 64)).astype(np.float32)
+    points = rng.standard_normal((3, 2, 18, 64)).astype(np.float32)
     points[:, :, 0] = 1.0
     rows = np.ones((3, 2, 6), dtype=np.float32)
     conditions = rng.standard_normal((3, shape.conditions)).astype(np.float32)
@@ -55,17 +37,43 @@ def test_numpy_computes_what_jax_trains():
 
 
 @pytest.mark.study
-def test_training_learns_what_a_batch_shows():
+def test_training_learns_what_a_batch_shows(scales):
     """On one batch of runs the loss falls far below that of the prior."""
     from analysis.inference.runs import simulate_batch
     from analysis.inference.training import Schedule, Trainer
 
-    scales = Scales(Prior(load_unit("adss")), Landmarks(116.0, 150.0))
     shape = scales.architecture(**SMALL)
     batch = simulate_batch(scales.prior, scales.marks, 1, 0)
     weights = first_weights(shape, np.random.default_rng(0))
-    trainer = Trainer(scales, shape, Schedule(150, 32, 5e-3, dropout=0.0))
-    weights, _ = trainer.train(weights, [batch], 1)
-    _, progress = trainer.train(weights, [batch], 2)
+    trainer = Trainer(scales, shape, Schedule(300, 32, 5e-3, dropout=0.0))
+    weights, _ = trainer.train(weights, [(scales, batch)], 0, 150)
+    _, progress = trainer.train(weights, [(scales, batch)], 150, 150)
     known = read_batch(scales, batch, np.random.default_rng(0))
     assert progress.loss["set"] < 0.6 * -scales.sets.log_prior[known.set].mean()
+
+
+@pytest.mark.study
+def test_training_that_was_interrupted_goes_on(tmp_path):
+    """Runs that are there are not simulated again, and steps that were made are kept."""
+    from analysis.inference.campaign import Recipe, train_unit
+
+    unit, file = load_unit("adss"), tmp_path / "posterior.npz"
+    recipe = Recipe(epochs=2.0, examples=32, rate=3e-3, shape=SMALL)
+    told = []
+
+    def stop(text):
+        told.append(text)
+        if text.startswith("step"):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train_unit(unit, file, tmp_path, 150, recipe, told=stop)
+    kept = {one: one.stat().st_mtime_ns for one in tmp_path.glob("0*.npz")}
+    state = read_checkpoint(file)
+    assert state.steps > 0
+    assert state.machines >= 90
+    done = train_unit(unit, file, tmp_path, 150, recipe)
+    assert {one: one.stat().st_mtime_ns for one in tmp_path.glob("0*.npz")} == kept
+    assert done.steps == state.steps
+    more = train_unit(unit, file, tmp_path, 250, recipe)
+    assert more.machines > done.machines
