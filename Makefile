@@ -9,13 +9,14 @@ READY := .venv/.ready
 
 LOWEST := .venv/lowest
 
-.PHONY: help demo test tests check lowest bench blind faults fuzz soak docs audit lock clean
+.PHONY: help demo test tests check lowest train training bench blind faults fuzz soak docs audit lock clean
 
 help:
 	@echo "make demo    the whole job without hardware; results in demo/"
 	@echo "make test    all checks and tests"
 	@echo "make check   style, types, floors and links; under a minute"
 	@echo "make lowest  some tests with the lowest versions that are allowed; two minutes"
+	@echo "make train   train the posteriors further, MACHINES=200000 each; some hours"
 	@echo "make bench   benchmarks"
 	@echo "make blind   hide effects and have the diagnosis find them; some hours"
 	@echo "make faults  hundreds of sessions with something going wrong in each; half an hour"
@@ -51,6 +52,18 @@ lowest: $(LOWEST)/.ready
 	  tests/daq/test_formats_lossless.py tests/daq/test_formats_sdf.py tests/daq/test_formats_uff.py \
 	  tests/daq/test_store.py tests/daq/test_transports_visa.py tests/tui/test_cli.py \
 	  tests/tui/test_app_way.py tests/analysis/test_response_figure.py tests/sim/test_compiling.py
+
+MACHINES ?= 200000
+
+train: $(READY)
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[train]'
+	@for unit in adss edss; do $(BIN)/python -m analysis.inference.campaign --unit $$unit \
+	  --machines $(MACHINES) --folder build/runs/$$unit || exit 1; done
+
+# Training needs what nobody who measures does.
+training: $(READY)
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[train]'
+	@$(BIN)/python -m pytest -m "study or not study" tests/analysis/inference/test_inference_training.py
 
 bench: $(READY)
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check --constraint requirements.lock \

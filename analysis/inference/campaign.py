@@ -4,7 +4,7 @@ Owns the order of the work: simulate the batches that are missing, train on all 
 schedule, measure on batches that training never sees, and save. Batches are files, so that what is
 interrupted loses one of them at most. Answers are made by `analysis.inference.posterior`.
 
-    python -m analysis.inference.campaign --unit adss --machines 100000 --folder build/adss
+    python -m analysis.inference.campaign --unit adss --machines 200000 --folder build/runs/adss
 """
 
 from __future__ import annotations
@@ -21,10 +21,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.executor import Executor, LocalExecutor
-from analysis.inference.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
+from analysis.inference.checkpoint import (
+    Checkpoint,
+    posterior_name,
+    read_checkpoint,
+    write_checkpoint,
+)
 from analysis.inference.examples import Scales, read_batch
 from analysis.inference.network import densities, first_weights, set_logits, summarise
 from analysis.inference.runs import Batch, load_batch, save_batch, simulate_batch
+from daq.configs import posterior_folder
 from daq.errors import AnalysisError, InputError
 from sim.unit import Unit, load_unit
 
@@ -241,7 +247,7 @@ def main(arguments: Sequence[str]) -> int:
     start = None if given.start is None else read_checkpoint(given.start)
     train_unit(
         load_unit(given.unit),
-        given.file or given.folder / "posterior.npz",
+        given.file or posterior_folder() / posterior_name(load_unit(given.unit)),
         given.folder,
         given.machines,
         recipe,
