@@ -97,17 +97,23 @@ class Hunt:
         return Hunt(self.unit, few, self._rng, self._executor, self.report(), noise_v)
 
     def start(
-        self, places: Starts, groups: int, of_many: int = 0, *, reach: Reach | None = None
+        self,
+        places: Starts,
+        groups: int,
+        of_many: int = 0,
+        *,
+        reach: Reach | Mapping[Effects, Reach] | None = None,
     ) -> None:
         """Simulate hypotheses about places, or more of them than before about other places.
 
         In so many groups each; in `of_many`, if more, those with many coordinates. `reach`: how far
-        about them, if that is known.
+        about them, of all or of each, if that is known.
         """
         wanted: list[Group] = []
         for key, place in places.items():
             count = max(groups, of_many if len(place) >= _MANY else 0)
-            wanted += groups_about(Hypothesis(self.unit, key), place, count, self._rng, reach)
+            own = reach[key] if isinstance(reach, Mapping) else reach
+            wanted += groups_about(Hypothesis(self.unit, key), place, count, self._rng, own)
         self._simulate(wanted)
         known = {key: self.found[key].best.place for key in places if key in self.found}
         self._form({**places, **known})

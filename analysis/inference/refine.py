@@ -34,8 +34,8 @@ _SHARE, _MOST = 0.99, 8
 _BESIDE = 4
 """Sets that hold what leads and one more cause that are refined next."""
 
-_GROUPS = 6
-"""Groups of five runs that a set gets in each round."""
+_FIRST_GROUPS, _GROUPS = 4, 6
+"""Groups of five runs that a set gets at first, and in each round."""
 
 _ROUNDS, _CONTENDERS, _NEAR = 3, 4, 60.0
 """Rounds after these, sets that take part in each, and how far behind they may lie."""
@@ -88,8 +88,10 @@ def refine(
         new = {k: n for k, n in zip(names, numbers, strict=True) if k not in found}
         for key, number in new.items():
             found[key] = posterior.given(summary, int(number), float(probability[number]))
-            at, reach = _placed(Hypothesis(unit, key), found[key], fine)
-            fine.start({key: at}, _GROUPS, reach=reach)
+        placed = {key: _placed(Hypothesis(unit, key), found[key], fine) for key in new}
+        places = {key: place for key, (place, _) in placed.items()}
+        reaches = {key: reach for key, (_, reach) in placed.items()}
+        fine.start(places, _FIRST_GROUPS, reach=reaches)
 
     sets = posterior.scales.sets
     look_at([*first, *_parts(sets, int(first[0]))])

@@ -6,8 +6,9 @@ import pytest
 from measuring import QUICK, SHORT, measuring
 
 import analysis.preparation as module
-from analysis.atlas import coarse_stride, make_atlas
 from analysis.estimate import estimate_response
+from analysis.inference.checkpoint import posterior_name, read_checkpoint
+from analysis.inference.nominal import nominal_of
 from analysis.observation import USUAL_NOISE_V, observe, unread
 from daq.configs import config_path
 from daq.formats import read_response
@@ -25,9 +26,7 @@ def cache(tmp_path, monkeypatch):
     return tmp_path / "cache" / "lashbench"
 
 
-def test_a_sweep_that_was_prepared_is_estimated_and_searched_without_simulating(
-    run, cache, tmp_path
-):
+def test_a_sweep_that_was_prepared_is_estimated_without_simulating(run, cache, tmp_path):
     words = ["--unit", "adss", *SHORT, *QUICK, "--offset", "0.5", "--json"]
     code, out, _ = run("prepare", *words, history=False)
     assert code == 0
@@ -40,9 +39,7 @@ def test_a_sweep_that_was_prepared_is_estimated_and_searched_without_simulating(
     kept = sorted(cache.iterdir())
     response = read_response(file)
     assert estimate_response(response, ADSS, cache=cache).simulated_s == 0.0
-    seen = observe(response)
-    for rare in (False, True):
-        make_atlas(ADSS, seen.thinned(coarse_stride(seen)), cache, rare=rare)
+    nominal_of(ADSS, observe(response), cache)
     assert sorted(cache.iterdir()) == kept
     # A response says which sweep is meant, too, and nothing is left to be made of this one.
     code, out, _ = run("prepare", file, "--unit", "adss", history=False)
@@ -58,7 +55,7 @@ def test_one_that_was_interrupted_goes_on(tmp_path, monkeypatch):
         made.append(len(families))
         return whole(unit, families, *rest, **options)
 
-    monkeypatch.setattr(module, "make_atlas", lambda *_, **__: {})
+    monkeypatch.setattr(module, "nominal_of", lambda *_, **__: None)
     with monkeypatch.context() as patch:
         patch.setattr(module, "run_families", stopping)
         with pytest.raises(KeyboardInterrupt):
@@ -76,7 +73,9 @@ def test_one_that_was_interrupted_goes_on(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--unit", "adss"], "--level, --start, --stop, --points is missing"),
+        (["--unit", "adss", "--level", "2"], "--start, --stop, --points is missing"),
+        (["--unit", "adss", *SHORT, "--machines", "10"], "--machines"),
+        (["--unit", "adss", "--machines", "0"], "0 is too few"),
         (["--unit", "adss", *SHORT[:-2]], "--points is missing"),
         (["x.csv", "--unit", "adss", "--start", "2"], "not both"),
         (["x.csv", "--unit", "adss", "--level", "2", "--level", "3"], "give --level once"),
@@ -136,3 +135,20 @@ def test_on_a_disk_without_room_nothing_is_simulated(small_disk, monkeypatch, ca
     assert out == ""
     assert "nothing could be kept there (No space left on device), and nothing was" in err
     assert err.count("\n") == 1
+
+
+def test_the_posterior_of_a_unit_is_trained_for_every_sweep(run, cache):
+    """Of another unit than the shipped ones; a second call finds it and trains no further."""
+    pytest.importorskip("jax", reason="training needs the extra `train`")
+    unit = config_path("templates", "two-stage")
+    words = ["prepare", "--unit", str(unit), "--machines", "90", "--json"]
+    code, out, err = run(*words, history=False)
+    assert code == 0
+    said = json.loads(out)
+    made = read_checkpoint(cache / posterior_name(load_unit(str(unit))))
+    assert said["machines"] == made.machines
+    assert said["steps"] == made.steps > 0
+    assert "machines simulated" in err
+    code, again, _ = run(*words, history=False)
+    assert code == 0
+    assert json.loads(again)["steps"] == made.steps

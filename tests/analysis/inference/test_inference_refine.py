@@ -1,0 +1,58 @@
+"""Refinement, where everything but the simulations and the training is real."""
+
+import numpy as np
+import pytest
+import synthetic_search as synthetic_runs
+from untrained import Untrained
+
+from analysis.inference.refine import refine
+from analysis.verdict import judge_candidates
+
+LAG, LOAD, MESH = "amplifier-lag", "load-inertia", "mesh1-damping"
+
+
+def observed(effects, sizes, seed=1):
+    return synthetic_runs.observed(effects, sizes, np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_what_is_hidden_is_found_among_what_is_proposed(runs, seed):
+    """A network that favours three causes alike, and says nothing of the ratio."""
+    found = refine(Untrained((LAG, LOAD, MESH)), observed((LOAD,), [0.8], seed), seed=seed)
+    verdict = judge_candidates(
+        found.candidates, found.candidates[0].surface.observation, np.random.default_rng(seed)
+    )
+    assert (verdict.word, verdict.best.effects) == ("explained", (LOAD,))
+    assert verdict.best.candidate.best.place == pytest.approx([0.4, 0.8], abs=0.1)
+
+
+def test_a_pair_is_found_where_only_its_causes_were_proposed(runs):
+    """Sets that hold the leader and one more cause are looked at, too."""
+    found = refine(Untrained((LAG, LOAD)), observed((LAG, LOAD), [0.7, 0.3]))
+    leader = found.candidates[0]
+    assert leader.hypothesis.effects == (LAG, LOAD)
+    assert leader.best.place == pytest.approx([0.4, 0.7, 0.3], abs=0.1)
+
+
+def test_the_plain_model_and_every_part_of_what_is_proposed_first_are_there(runs):
+    found = refine(Untrained((LAG, LOAD, MESH)), observed((LAG, LOAD, MESH), [0.8, 0.3, 0.7]))
+    first = max(found.proposed, key=lambda one: one.probability).effects
+    keys = {one.hypothesis.effects for one in found.candidates}
+    assert () in keys
+    for effect in first:
+        assert tuple(sorted(set(first) - {effect})) in keys
+    assert keys == set(runs)
+    assert len(found.proposed) == len(keys)
+
+
+def test_what_is_left_out_of_the_catalogue_is_not_simulated(runs):
+    found = refine(Untrained((LAG, LOAD)), observed((LOAD,), [0.8]), without=(LOAD,))
+    assert runs
+    assert not any(LOAD in one.hypothesis.effects for one in found.candidates)
+
+
+def test_the_same_seed_gives_the_same_candidates(runs):
+    seen = observed((LOAD,), [0.8])
+    first, again = (refine(Untrained((LAG, LOAD)), seen, seed=3).candidates for _ in range(2))
+    assert [one.hypothesis.effects for one in first] == [one.hypothesis.effects for one in again]
+    assert [o.best.log_likelihood for o in first] == [o.best.log_likelihood for o in again]
