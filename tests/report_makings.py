@@ -5,6 +5,7 @@ import pytest
 import synthetic
 
 import analysis.diagnosis as diagnosis_module
+from analysis import proposals
 from analysis.calibration import Calibrated
 from analysis.search import Searched
 from daq.frf import FrequencyResponse
@@ -89,7 +90,7 @@ def diagnosis(
     }
     searched = Searched(candidates, given_up, spared, seen, atlas)
     monkeypatch.setattr(diagnosis_module, "observe", lambda response: seen)
-    monkeypatch.setattr(diagnosis_module, "search_causes", lambda *_, **__: searched)
+    monkeypatch.setattr(proposals, "search_causes", lambda *_, **__: searched)
     monkeypatch.setattr(diagnosis_module, "propose_measurement", lambda *_, **__: None)
     monkeypatch.setattr(diagnosis_module, "sharpen_candidate", sharpened)
     return diagnosis_module.diagnose_response(response(), load_unit("adss"))

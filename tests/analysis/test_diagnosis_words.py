@@ -256,7 +256,7 @@ def test_a_few_points_are_refused_as_anything_explains_them(frequencies, told):
 
 
 def test_a_file_of_one_point_is_refused_before_anything_is_simulated(monkeypatch):
-    monkeypatch.setattr(module, "search_causes", lambda *_, **__: pytest.fail("searched"))
+    monkeypatch.setattr(module, "propose", lambda *_, **__: pytest.fail("searched"))
     response = makings.response()
     one = response.take(response.frequency_hz == response.frequency_hz[0])
     with pytest.raises(AnalysisError, match="1 usable frequency"):
