@@ -39,7 +39,7 @@ VERBS = {
     "diagnose": ("tui.commands.diagnose:diagnose", "Tell what the simulation gets wrong, and why."),
     "reproduce": ("tui.commands.reproduce:reproduce", "Compute the paper's tables and figures."),
     "measure": ("tui.commands.measure:measure", "Measure a unit on the bench."),
-    "prepare": ("tui.commands.prepare:prepare", "Train a unit's posterior, or simulate ahead for a sweep."),
+    "prepare": ("tui.commands.prepare:prepare", "Train a posterior, or simulate a sweep ahead."),
     "history": ("tui.commands.history:history", "List a bench's measurements and their trend."),
     "correct": ("tui.commands.correct:correct", "Correct what was said of a measurement."),
     "export": ("tui.commands.export:export", "Write a stored measurement to a file."),
