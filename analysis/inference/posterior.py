@@ -184,7 +184,7 @@ def limits(
     """How large each other cause may be and not show, beside what is named.
 
     The 95 % interval of its size given that it is there too; open where it reaches the end of the
-    range, or what the datasheet says is on the other side.
+    range. What the datasheet says lies inside: it may be so.
     """
     unit, sets = posterior.scales.prior.unit, posterior.scales.sets
     place = {effect: number for number, effect in enumerate(sets.effects)}
@@ -199,6 +199,9 @@ def limits(
         ends = posterior.scales.size_ends[posterior.scales.place(effect, parameter.name)]
         low, high = (float(np.exp(mean + sign * _WIDE * std)) for sign in (-1.0, 1.0))
         least, most = np.exp(ends)
+        known = parameter.nominal(unit)
+        if known is not None:
+            low, high = min(low, known), max(high, known)
         hypothesis = Hypothesis(unit, (effect,))
         amid = hypothesis.amid[0]
         from_zero = parameter.allowed[0] <= 0.0
@@ -206,7 +209,6 @@ def limits(
             low if low > least and (amid or not from_zero) else None,
             high if high < most and (amid or from_zero) else None,
         )
-        known = parameter.nominal(unit)
         found.append(Unseen(effect, parameter.name, parameter.unit_symbol, *shown, known))
     return tuple(found)
 
