@@ -87,20 +87,19 @@ def nominal_of(
 ) -> Nominal:
     """The datasheet's machine in the sweep of an observation of one plan; its runs are kept."""
     draws = run_families(unit, nominal_families(unit), observation, cache=cache, executor=executor)
-    order = np.argsort(np.concatenate([np.arange(0, RUNS, 2), np.arange(1, RUNS, 2)]))
     ((plan, rows),) = observation.plans
     shape = (RUNS, len(plan.levels_vpk), len(plan.frequencies_hz))
     place = np.argsort(rows)
     return expected(
-        draws.mean[order][:, place].astype(np.complex64).reshape(shape),
-        draws.variance[order][:, place].astype(np.float32).reshape(shape),
+        draws.mean[:, place].astype(np.complex64).reshape(shape),
+        draws.variance[:, place].astype(np.float32).reshape(shape),
     )
 
 
 def nominal_families(unit: Unit) -> tuple[tuple[Machine, ...], tuple[Machine, ...]]:
     """The machines that are simulated of a datasheet, in two halves for two cores."""
     machines = _machines(unit)
-    return machines[::2], machines[1::2]
+    return machines[: RUNS // 2], machines[RUNS // 2 :]
 
 
 def _machines(unit: Unit) -> tuple[Machine, ...]:
