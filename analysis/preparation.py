@@ -69,16 +69,21 @@ def prepare_unit(
     LashbenchError
         If there is no room to keep anything.
     InputError
-        If JAX is not installed, nothing can be written into the folder, or others may write there.
+        If the unit has one gear stage, JAX is not installed, nothing can be written into the
+        folder, or others may write there.
     AnalysisError
         If a motion grew without bound.
     """
     from analysis.inference.campaign import Recipe, train_unit
 
+    if unit.stages == 1:
+        raise InputError(
+            f"unit {unit.name} has one gear stage, and a diagnosis needs two: there is nothing to "
+            "train; estimate tells its backlash"
+        )
     _check_usable(cache)
     name = posterior_name(unit)
     runs = cache / name.removesuffix(".npz").replace("posterior", "training")
-    runs.mkdir(exist_ok=True)
     start = find_checkpoint(unit) or lent_checkpoint(unit)
     recipe = Recipe(rate=_RATE_FROM_ANOTHER) if start else Recipe()
     return train_unit(

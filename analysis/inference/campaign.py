@@ -1,8 +1,9 @@
 """Simulation and training of one unit's posterior, interruptible and resumable.
 
 Owns the order of the work: simulate the batches that are missing, train on all of them by one
-schedule, measure on batches that training never sees, and save. Batches are files, so that what is
-interrupted loses one of them at most. Answers are made by `analysis.inference.posterior`.
+schedule, measure on batches that training never sees, and save what is no worse than what training
+began with. Batches are files, so that what is interrupted loses one of them at most.
+Answers are made by `analysis.inference.posterior`.
 
     python -m analysis.inference.campaign --unit adss --machines 200000 --folder build/runs/adss
 """
@@ -38,6 +39,9 @@ __all__ = ["Recipe", "measure", "simulate_runs", "train_unit"]
 
 HELD_OUT = 20
 """One batch in so many is kept for measuring."""
+
+_STANDS = "training.npz"
+"""File of a training that has not ended."""
 
 _AT_ONCE = 200
 """Steps of training between two checkpoints."""
@@ -77,6 +81,7 @@ def simulate_runs(
     `told` of the machines that there are, from time to time.
     """
     executor = executor or LocalExecutor()
+    folder.mkdir(parents=True, exist_ok=True)
     files: list[Path] = []
     held, number = 0, recipe.first
     while held < machines:
@@ -106,14 +111,17 @@ def train_unit(
 ) -> Checkpoint:
     """Make the posterior of a unit, or go on with one that was interrupted.
 
+    What training began with is kept where it is better on batches that neither has seen.
+
     Parameters
     ----------
     file
-        Where the checkpoint is; it is written about every minute.
+        Where the posterior is kept; it appears when training has ended.
     runs
-        Folder of the batches.
+        Folder of the batches, and of where training stands, which is written about every minute.
     start
-        A posterior, of another unit perhaps, whose weights training begins with.
+        A posterior, of another unit perhaps, whose weights training begins with; that of `file`
+        if there is one.
     beside
         Other units with folders of their batches, which training sees as well: what the network
         learns of one holds for others, as it reads both relative to their datasheets.
@@ -136,19 +144,19 @@ def train_unit(
         ) from error
 
     recipe = recipe or Recipe()
-    state = read_checkpoint(file)
+    state, start = read_checkpoint(runs / _STANDS), read_checkpoint(file) or start
     known = state or start
     scales = Scales.of(unit) if state is None else Scales.from_facts(unit, state)
     files = simulate_runs(
         scales, runs, machines, recipe, executor, lambda held: told(f"{held} machines simulated")
     )
     batches = [load_batch(one) for one in files]
-    held_out = batches[HELD_OUT - 1 :: HELD_OUT] or batches[-1:]
-    own = [one for number, one in enumerate(batches) if number % HELD_OUT != HELD_OUT - 1]
-    seen = [(scales, one) for one in own]
+    apart = set(range(HELD_OUT - 1, len(batches), HELD_OUT)) or {len(batches) - 1}
+    held_out = [batches[number] for number in sorted(apart)]
+    seen = [(scales, one) for number, one in enumerate(batches) if number not in apart]
     for other, folder in beside:
         others = Scales.of(other)
-        seen += [(others, load_batch(one)) for one in sorted(folder.glob("*.npz"))]
+        seen += [(others, load_batch(one)) for one in sorted(folder.glob("[0-9]*.npz"))]
     count = sum(len(one) for _, one in seen)
     steps = max(int(recipe.epochs * count / recipe.examples), 1)
     schedule = Schedule(steps, recipe.examples, recipe.rate, recipe.dropout)
@@ -159,15 +167,23 @@ def train_unit(
             unit.name, scales.marks.arf_hz, scales.marks.rf_hz, scales.most_v, shape, weights,
             recipe.seed, len(files), count,
         )  # fmt: skip
-    trainer = Trainer(scales, state.shape, schedule)
+    trainer, trained = Trainer(scales, state.shape, schedule), state.steps < steps
     while state.steps < steps:
         more = min(_AT_ONCE, steps - state.steps)
         weights, progress = trainer.train(state.weights, seen, state.steps, more)
         state = replace(state, weights=weights, steps=state.steps + more)
         state = replace(state, figures=measure(scales, state, held_out))
-        write_checkpoint(file, state)
+        write_checkpoint(runs / _STANDS, state)
         figures = ", ".join(f"{name} {value:.3f}" for name, value in state.figures.items())
         told(f"step {state.steps} of {steps}: loss {progress.loss}, {figures}")
+    if start is not None and trained:
+        before = replace(state, weights=start.weights)
+        figures_before = measure(scales, before, held_out)
+        # Weights that grew without bound have no figure, and are no better.
+        if not state.figures["nll"] < figures_before["nll"]:
+            told("no better than what training began with, which is kept; simulate more machines")
+            state = replace(before, figures=figures_before)
+    write_checkpoint(file, state)
     return state
 
 

@@ -83,6 +83,7 @@ def test_one_that_was_interrupted_goes_on(tmp_path, monkeypatch):
         (["--unit", "adss", "--level", "2"], "--start, --stop, --points is missing"),
         (["--unit", "adss", *SHORT, "--machines", "10"], "--machines"),
         (["--unit", "adss", "--machines", "0"], "0 is too few"),
+        (["--unit", str(config_path("templates", "one-stage"))], "one gear stage"),
         (["--unit", "adss", *SHORT[:-2]], "--points is missing"),
         (["x.csv", "--unit", "adss", "--start", "2"], "not both"),
         (["x.csv", "--unit", "adss", "--level", "2", "--level", "3"], "give --level once"),

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["prepare"]
 
 _MACHINES = 30_000
-"""Machines of a posterior: about three quarters of an hour of two cores."""
+"""Machines of a posterior: some ten minutes of two cores, and as much for training."""
 
 
 def prepare(

@@ -69,9 +69,27 @@ def test_training_that_was_interrupted_goes_on(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         train_unit(unit, file, tmp_path, 150, recipe, told=stop)
     kept = {one: one.stat().st_mtime_ns for one in tmp_path.glob("0*.npz")}
-    state = read_checkpoint(file)
+    assert not file.exists(), "what is not trained to its end answers nothing"
+    state = read_checkpoint(tmp_path / "training.npz")
     assert state.steps > 0
     assert state.machines >= 90
     done = train_unit(unit, file, tmp_path, 150, recipe)
     assert {one: one.stat().st_mtime_ns for one in tmp_path.glob("0*.npz")} == kept
     assert done.steps == state.steps
+    assert read_checkpoint(file).steps == done.steps
+
+
+@pytest.mark.study
+def test_training_that_makes_it_worse_changes_nothing(tmp_path):
+    """A learning rate that destroys the weights: those that were there are kept, and it is said."""
+    from analysis.inference.campaign import Recipe, train_unit
+
+    unit, file, told = load_unit("adss"), tmp_path / "posterior.npz", []
+    first = train_unit(unit, file, tmp_path, 150, Recipe(epochs=2.0, examples=32, shape=SMALL))
+    (tmp_path / "training.npz").unlink()
+    again = train_unit(
+        unit, file, tmp_path, 150, Recipe(epochs=2.0, examples=32, rate=10.0), told=told.append
+    )
+    assert "which is kept" in told[-1]
+    for name, values in first.weights.items():
+        np.testing.assert_allclose(again.weights[name], values, rtol=2e-3, atol=1e-4)
