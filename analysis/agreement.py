@@ -15,7 +15,7 @@ from sim.compiling import njit, part
 
 __all__ = [
     "BLUR", "TAIL", "TAIL_SCALE", "agree", "invert", "lean", "log_shares",
-    "solve_plane", "total_densities", "weigh",
+    "solve_plane", "weigh",
 ]  # fmt: skip
 
 _RIDGE = 0.1
@@ -39,9 +39,6 @@ _UNKNOWN = np.array([0.5, 0.5, 1.5])
 is unlikely, but not as unlikely as its other motion would have it."""
 
 _ITERATIONS = 6
-
-_TOGETHER = 8
-"""Factors of which one logarithm is taken."""
 
 _ANY_ORDER = {"contract", "reassoc", "nsz", "arcp"}
 """Sums may be made in any order: vectors need it. NaN stays NaN."""
@@ -395,33 +392,6 @@ def log_density(apart, std):
     """Student's t, but for a constant."""
     scale = TAIL_SCALE * std
     return -0.5 * (TAIL + 1.0) * np.log1p((apart / scale) ** 2 / TAIL) - np.log(scale)
-
-
-@njit(nogil=True, cache=True, fastmath={"contract"}, error_model="numpy")
-def total_densities(mean, one_shift, other_shift, one_std, other_std):
-    """Summed log densities (m, n) of every one of m shifts together with every one of n others.
-
-    `mean` (columns,), NaN where nothing was observed; `one_shift`, `one_std` (m, columns),
-    `other_shift`, `other_std` (n, columns): the wider of the two scatters counts.
-    """
-    m, n = len(one_shift), len(other_shift)
-    known = np.flatnonzero(np.isfinite(mean))
-    found = np.empty((m, n))
-    for i in range(m):
-        for j in range(n):
-            total, tails, scales, held = 0.0, 1.0, 1.0, 0
-            for at in range(len(known)):
-                c = known[at]
-                scale = TAIL_SCALE * max(one_std[i, c], other_std[j, c])
-                z = (mean[c] + one_shift[i, c] + other_shift[j, c]) / scale
-                tails *= 1.0 + z * z / TAIL
-                scales *= scale
-                held += 1
-                if held == _TOGETHER:
-                    total -= 0.5 * (TAIL + 1.0) * np.log(tails) + np.log(scales)
-                    tails, scales, held = 1.0, 1.0, 0
-            found[i, j] = total - 0.5 * (TAIL + 1.0) * np.log(tails) - np.log(scales)
-    return found
 
 
 @njit(nogil=True, fastmath=_ANY_ORDER, error_model="numpy")

@@ -30,27 +30,20 @@ _PARTS = 2
 class Chart:
     """How places of a hypothesis look at the rows of an observation.
 
-    Where what is at the load has more than `most` sizes, if not told otherwise
-    the two parts of a complex number, these stand in for them, last; else
-    coordinates are the place itself.
+    Where what is at the load has more than two sizes, the two parts of a complex number
+    stand in for them, last; else coordinates are the place itself.
 
     `frequency_hz` (rows,).
     """
 
     hypothesis: Hypothesis
     frequency_hz: NDArray[np.float64]
-    most: int = _PARTS
-
-    @property
-    def at_load(self) -> bool:
-        """Whether all there is is linear, and at the load."""
-        return all(is_at_load(e) for e in self.hypothesis.effects)
 
     @cached_property
     def bent(self) -> NDArray[np.bool_]:
         """(d,): which coordinates of a place are replaced."""
         at_load = [is_at_load(e) for e, _ in self.hypothesis.parameters]
-        return np.array([False, *at_load]) & (sum(at_load) > self.most)
+        return np.array([False, *at_load]) & (sum(at_load) > _PARTS)
 
     @property
     def width(self) -> NDArray[np.float64]:
@@ -62,13 +55,7 @@ class Chart:
         """Coordinates (1 or rows, m, k) of places (m, d): one for all rows where they are alike."""
         if not self.bent.any():
             return places[None]
-        return self._felt(places, places[:, ~self.bent])
-
-    def felt(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The ratio and what the load reflects (rows, m, 3), of places (m, d)."""
-        return self._felt(places, places[:, :1])
-
-    def _felt(self, places: NDArray[np.float64], kept: NDArray[np.float64]) -> NDArray[np.float64]:
+        kept = places[:, ~self.bent]
         felt = reflections(self.hypothesis, places, self.frequency_hz).T
         beside = np.broadcast_to(kept, (*felt.shape, kept.shape[1]))
         return np.concatenate([beside, felt.real[..., None], felt.imag[..., None]], axis=2)

@@ -11,13 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.agreement import (
-    BLUR,
-    agree,
-    log_shares,
-    total_densities,
-    weigh,
-)
+from analysis.agreement import BLUR, agree, log_shares, weigh
 
 __all__ = ["Readings", "Runs", "compile_all"]
 
@@ -86,10 +80,9 @@ def compile_all() -> None:
         line.T[None].copy(), np.ones(k), 1.0, n, True, values.reshape(-1, n), every, values[:0],
         none, values, alike, Runs.smoothed_over([slice(0, rows)]), np.ones((3, rows)),
     )  # fmt: skip
-    observed, one, many = np.ones((3, rows), bool), np.ones(3 * rows), np.ones((2, 3 * rows))
+    observed, many = np.ones((3, rows), bool), np.ones((2, 3 * rows))
     share = np.ones((n, rows))
     readings = Readings(observed, many, np.ones(2), share, share, np.ones(rows))
     agree(runs, readings, line[None, None, 0], observed[0], True)
-    weigh(one, 1.0)
+    weigh(np.ones(n), 1.0)
     log_shares(share[:, 0].copy(), share, share, np.ones(rows))
-    total_densities(one, many, many, many, many)

@@ -21,11 +21,7 @@ from analysis.observation import Observation
 from analysis.surface import Fit, Surface
 from daq.frf import DB_PER_NEPER
 
-__all__ = ["AT_NOISE", "HeldOut", "hold_out", "hold_out_surface"]
-
-AT_NOISE = 1.05
-"""Standard deviations, root mean square, by which most single true causes miss levels that they
-were not fitted to, at most; 0.75 to 1.0 as a rule, but up to 1.3 where all is chatter."""
+__all__ = ["HeldOut", "hold_out", "hold_out_surface"]
 
 _JUMPS = 0.01
 """Share of readings that no branch of the motion makes: where it goes over from one to another the

@@ -33,13 +33,12 @@ class OwnRun:
     """A run of a hypothesis in place of the observation.
 
     `place` (d,): where it was made. `alone`: the hypothesis's surface from
-    the half of its runs that deviates otherwise, `others` (n,). `as_read` (3, rows): the run
+    the half of its runs that deviates otherwise. `as_read` (3, rows): the run
     with reading noise, minus the true observation; `quiet` (rows,): its state.
     """
 
     place: NDArray[np.float64]
     alone: Surface
-    others: NDArray[np.bool_]
     as_read: NDArray[np.float64]
     quiet: NDArray[np.bool_]
 
@@ -74,4 +73,4 @@ def own_runs(candidate: Candidate, rng: np.random.Generator) -> Iterator[OwnRun]
         alone = surface.of(others).against(as_read, quiet)
         if alone.lost(surface.places[i]) <= most_lost:
             taken += 1
-            yield OwnRun(surface.places[i], alone, others, as_read, quiet)
+            yield OwnRun(surface.places[i], alone, as_read, quiet)

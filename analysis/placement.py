@@ -1,14 +1,13 @@
 """Where the next simulations of a hypothesis go.
 
-Owns how groups are placed: evenly about a place from the coarse look or about an
-answer that was learned from runs, over all places that agree about as well as the
-best, or at a few sizes of a cause beside known ones. It simulates nothing.
+Owns how groups are placed: evenly about a place that is proposed or about an answer
+that was learned from runs, or over all places that agree about as well as the best.
+It simulates nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,7 @@ from analysis.causes import Hypothesis
 from analysis.likelihood import HEAT
 from analysis.population import Group
 
-__all__ = ["Reach", "groups_about", "groups_along", "groups_around", "groups_beside"]
+__all__ = ["Reach", "groups_about", "groups_along", "groups_around"]
 
 _RATIOS = 5
 """Machines in a group. At three levels they fill two narrow vectors or a wide one, so that groups
@@ -27,18 +26,6 @@ of ten take as long as twice as many of five, which have twice as many sizes."""
 
 Reach = tuple[float, float | NDArray[np.float64]]
 """How far groups about a place lie in ratio and in sizes, to either side."""
-
-_CLOSE, _FAR = (0.14, 0.06), (0.3, 0.12)
-"""Reach in ratio and in sizes about a place that the coarse look knows well, and about a pair's."""
-
-_OWN_REACH = {"payload-flexibility": np.array([0.2, 0.04, 0.3])}
-"""Reach in the sizes of causes that the coarse look knows otherwise: of what swings on the load it
-knows the resonance, the inertia less, and hardly the damping. With `_CLOSE` all runs of four such
-loads in seven lay beside the truth, and what was believed stayed there."""
-
-_AMID, _SOME, _IN_BAND, _KNOWN_RATIO_REACH = (0.36, 0.64), (0.4, 0.65), (0.1, 0.5, 0.9), 0.2
-"""Sizes of a further cause beside known ones: of a datasheet value amid its range and of others,
-and shares of the band. Reach in ratio about what is known: it trades off with the size."""
 
 _RATIO_REACH, _JITTER = 0.1, 0.01
 _WIDE, _LEAST_STD = 3.0, 0.015
@@ -53,14 +40,10 @@ def groups_about(
     best: NDArray[np.float64],
     groups: int,
     rng: np.random.Generator,
-    reach: Reach | None = None,
+    reach: Reach,
 ) -> Iterator[Group]:
-    """Groups about a place (d,), each of their sizes spread evenly.
-
-    If not told otherwise they reach further for several causes, whose place is put together from
-    what each does alone.
-    """
-    ratio_reach, size_reach = _reach(hypothesis) if reach is None else reach
+    """Groups about a place (d,), each of their sizes spread evenly."""
+    ratio_reach, size_reach = reach
     steps = np.array([rng.permutation(groups) for _ in range(hypothesis.d - 1)])
     for step in steps.T.reshape(groups, hypothesis.d - 1):
         offset = 2.0 * (step + rng.uniform(size=len(step))) / groups - 1.0
@@ -106,40 +89,6 @@ def groups_around(
         lean = float(np.sum(found.covariance[1:, 0] * offset / std[1:]))
         ratios = _ratios(found.mean[0] + lean, max(_WIDE * std[0], _RATIO_REACH), rng)
         yield Group(hypothesis, ratios, np.clip(sizes, 0.0, 1.0))
-
-
-def groups_beside(
-    known: Hypothesis,
-    place: NDArray[np.float64],
-    further: Hypothesis,
-    frequency_hz: NDArray[np.float64],
-    rng: np.random.Generator,
-) -> Iterator[Group]:
-    """Groups of known causes at a place (d,) and a further one at sizes all over its range.
-
-    What resonates by itself does so at frequencies of the band that was measured.
-    """
-    band = np.log([frequency_hz.min(), frequency_hz.max()])
-    lines = []
-    for (_, parameter), logs in zip(further.parameters, further.logs, strict=True):
-        if parameter.unit_symbol == "Hz":
-            at = band[0] + np.array(_IN_BAND) * np.ptp(band)
-            lines.append(np.clip((at - logs[0]) / np.ptp(logs), 0.0, 1.0))
-        else:
-            lines.append(np.array(_AMID if further.centred else _SOME))
-    for sizes in product(*lines[:2]):
-        # Of a third size, how well it is damped, a resonance tells least.
-        rest = [float(rng.choice(line)) for line in lines[2:]]
-        both, at = known.joined(place, further, np.array([*sizes, *rest]))
-        yield Group(both, _ratios(place[0], _KNOWN_RATIO_REACH, rng), at[1:])
-
-
-def _reach(hypothesis: Hypothesis) -> Reach:
-    if len(hypothesis.effects) > 1:
-        return _FAR
-    ratio_reach, size_reach = _CLOSE
-    own = [_OWN_REACH[e] for e in hypothesis.effects if e in _OWN_REACH]
-    return ratio_reach, own[0] if own else size_reach
 
 
 def _ratios(ratio: float, reach: float, rng: np.random.Generator) -> NDArray[np.float64]:

@@ -15,7 +15,6 @@ from sim.catalogue import CATALOGUE
 
 __all__ = [
     "EDGE",
-    "is_out_of_band",
     "is_out_of_sight",
     "is_pressed",
     "may_be_within_tolerance",
@@ -59,15 +58,8 @@ def is_out_of_sight(candidate: Candidate, place: NDArray[np.float64] | None = No
 
     At a place (d,), that of its best fit if not given.
     """
-    return is_out_of_band(candidate, _IN_SIGHT, place)
-
-
-def is_out_of_band(
-    candidate: Candidate, factor: float = 1.0, place: NDArray[np.float64] | None = None
-) -> bool:
-    """Whether it is a resonance outside all that was measured, by more than a factor."""
     hypothesis, measured = candidate.hypothesis, candidate.surface.observation.frequency_hz
-    low, high = measured.min() / factor, measured.max() * factor
+    low, high = measured.min() / _IN_SIGHT, measured.max() * _IN_SIGHT
     there = candidate.best.place if place is None else place
     values = zip(hypothesis.parameters, hypothesis.values(there), strict=True)
     return any(

@@ -18,7 +18,6 @@ from analysis.executor import Executor
 from analysis.observation import Observation
 from analysis.placement import groups_around
 from analysis.population import simulate_groups
-from analysis.purse import Purse
 from analysis.sizing import size_candidate, widen_if_open
 from sim.effort import counting
 from sim.unit import Unit
@@ -39,8 +38,9 @@ Little of it is in the data then, and what is told is as much chance of where ru
 hundred about the answer to one practice set, hundreds told ratios 0.04 apart in standard deviation,
 or 0.01 where all of them took part."""
 
-_FOR_THE_ANSWER = 0.12
-"""Share from which on there is no further round, of what a search may simulate beside it."""
+_SWEEPS, _LEAST_S = 180, 27_600.0
+"""There is no further round after so many machines, or so many seconds of motion where these are
+more. It is motion of a plain unit: what takes longer to step costs more (`sim.effort`)."""
 
 _APART = 1.5
 """Nor is either believed while the runs lie closer together than so many of those standard
@@ -66,9 +66,9 @@ def sharpen_candidate(
     key = candidate.hypothesis.effects
     found = size_candidate(candidate, observation, rng, _ENOUGH)
     widest: list[float] = []
+    most_s = max(_SWEEPS * sum(plan.duration_s for plan, _ in observation.plans), _LEAST_S)
     with counting() as effort:
-        purse = Purse.for_observation(observation, effort)
-        while len(widest) < _ROUNDS and not purse.has_spent(_FOR_THE_ANSWER):
+        while len(widest) < _ROUNDS and effort.worth_s <= most_s:
             std = np.sqrt(np.diag(found.covariance))
             widest.append(std.max())
             if std[0] > _BLUNT:

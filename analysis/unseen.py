@@ -1,7 +1,7 @@
 """What may be there beside what was found: a cause, and between which sizes it does not show.
 
 Owns the record of it, as a document and in words for a person. It imports nothing heavy, so that a
-screen may say it; the sizes are computed in `analysis.bounds`.
+screen may say it; the sizes are computed in `analysis.inference.posterior`.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ __all__ = ["Unseen", "describe_unseen", "head_unseen", "list_unseen"]
 class Unseen:
     """Between which sizes a cause may be there unseen, if no other is there but what is named.
 
-    `parameter` is its first; the others may be anything. `low`, `high`: the nearest sizes that are
-    ruled out, None where none is on that side. Most causes are absent at zero and have a `high`
-    alone; what may be off both ways is a datasheet value that lies amid its range.
+    `parameter` is its first; the others may be anything. `low`, `high`: ends of the 95 % interval
+    of its size, None where that is open on that side. Most causes are absent at zero and have a
+    `high` alone; what may be off both ways is a datasheet value that lies amid its range.
     """
 
     effect: str

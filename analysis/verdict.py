@@ -25,17 +25,13 @@ from analysis.plausibility import EDGE, may_be_within_tolerance
 
 __all__ = [
     "FALSE_ALARM",
-    "LEAST_GAIN",
-    "LEAST_LEAD",
     "UNEARNED",
     "WITHIN_TOLERANCE",
     "Judged",
     "Verdict",
     "Word",
-    "earns_its_name",
     "is_nothing_hidden",
     "judge_candidates",
-    "may_be_chance",
     "put_behind",
 ]
 
@@ -64,16 +60,10 @@ which of two that do alike is named first; no belief about benches rules the oth
 FALSE_ALARM = 20.0
 """By so much must a cause beat the baseline beyond its costs."""
 
-LEAST_LEAD = _PER_CAUSE + _PER_PARAMETER + FALSE_ALARM
-"""So much must one of one size lead by, in all, to be named."""
-
 _FURTHER = 5.0
 """By so much must a further cause beat a part that has it not, beyond its costs: what it brings in
 the part's own runs asks for the rest. Friction behind a filter's corner was 3.5 standard deviations
 beyond chance, and led by 34 where some 38 were asked with 10."""
-
-LEAST_GAIN = _PER_CAUSE + _PER_PARAMETER + _FURTHER
-"""So much must a further cause of one size lead a part by, in all, to be named beside it."""
 
 _SURE = 3.0 * HEAT
 """While it leads by less than this, that nothing is hidden has a twentieth of its probability or
@@ -91,10 +81,6 @@ that has it not, where the part alone may be the explanation. Of true ones behin
 nobody doubts the least brought 2.1, of false ones the most 1.6. Damped teeth were told to have
 friction beside them, which led by 304: at the lowest level a few of their own runs move as little
 as what was measured, and friction makes all do so. It brought 1.7."""
-
-_FOR_EACH = 0.5
-"""By so much more for each that was asked before it: who asks often enough meets chance. Behind a
-payload friction brought 1.6, and a gain, asked after it, 2.1."""
 
 _TIE = 20.0
 """The scores of two sets that say the same about everything differ by about as much, as each has
@@ -256,7 +242,7 @@ def judge_candidates(
     if (
         not best.effects
         or best.score < baseline.score + FALSE_ALARM
-        or may_be_chance(baseline.candidate, best.candidate, baseline.misfit, rng)
+        or _may_be_chance(baseline.candidate, best.candidate, baseline.misfit, rng)
     ):
         if baseline.adequate:
             return Verdict("consistent", baseline, judged, baseline)
@@ -275,7 +261,7 @@ def judge_candidates(
     return verdict
 
 
-def may_be_chance(
+def _may_be_chance(
     simpler: Candidate, best: Candidate, misfit: float, rng: np.random.Generator
 ) -> bool:
     """Whether a set leads a simpler one of some misfit as it does in runs of that one's own."""
@@ -283,15 +269,10 @@ def may_be_chance(
     return misfit <= UNLIKE and judge_chance(simpler, best, rng) > _BY_CHANCE
 
 
-def earns_its_name(
-    whole: Candidate, part: Candidate, rng: np.random.Generator, refused: int = 0
-) -> bool:
-    """Whether what a set explains beyond a part of it is more than it would explain by chance.
-
-    `refused`: how many others were asked the same before and did not.
-    """
+def _earns_its_name(whole: Candidate, part: Candidate, rng: np.random.Generator) -> bool:
+    """Whether what a set explains beyond a part of it is more than it would explain by chance."""
     share, beyond = judge_gain(part, whole, rng)
-    return share <= _BY_CHANCE and beyond >= _BEYOND + _FOR_EACH * refused
+    return share <= _BY_CHANCE and beyond >= _BEYOND
 
 
 def _worth_judging(candidates: Sequence[Candidate]) -> list[Candidate]:
@@ -353,7 +334,7 @@ def _part_that_will_do(
         part = one.effects and set(one.effects) < set(best.effects)
         if not part or not one.adequate:
             continue
-        if one.score > best.score - _FURTHER or not earns_its_name(
+        if one.score > best.score - _FURTHER or not _earns_its_name(
             best.candidate, one.candidate, rng
         ):
             return one
