@@ -72,8 +72,7 @@ bench: $(READY)
 
 blind: $(READY)
 	@$(BIN)/python -m pytest -m study tests/analysis/test_diagnosis.py tests/analysis/test_estimate.py \
-	  tests/analysis/test_pairs.py tests/analysis/test_paper.py tests/analysis/test_rarities.py \
-	  tests/analysis/test_search.py
+	  tests/analysis/test_paper.py
 	@$(BIN)/python tests/campaigns/blind_study.py
 	@$(BIN)/python tests/campaigns/ties.py
 	@$(BIN)/python tests/campaigns/smallest.py

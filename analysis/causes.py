@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.ensemble import LEAST_SHARE, Machine
-from sim.catalogue import CATALOGUE, EffectParameter
+from sim.catalogue import CATALOGUE, COMMON, EffectParameter
 from sim.effects import EffectSetting
 from sim.unit import Unit
 
@@ -76,15 +76,6 @@ class Hypothesis:
         kept = [effect in effects for effect, _ in self.parameters]
         return np.asarray(place)[[True, *kept]]
 
-    def joined(
-        self, place: NDArray[np.float64], other: Hypothesis, sizes: NDArray[np.float64]
-    ) -> tuple[Hypothesis, NDArray[np.float64]]:
-        """The hypothesis that holds both, at this one's place (d,) and with the other's sizes."""
-        both = Hypothesis(self.unit, tuple(sorted((*self.effects, *other.effects))))
-        known = dict(zip(self.parameters, place[1:], strict=True))
-        known |= dict(zip(other.parameters, sizes, strict=True))
-        return both, np.array([place[0], *(known[one] for one in both.parameters)])
-
     def settings(self, place: NDArray[np.float64]) -> tuple[EffectSetting, ...]:
         """The effects with their values at a place (d,)."""
         found: dict[str, dict[str, float]] = {effect: {} for effect in self.effects}
@@ -110,11 +101,6 @@ class Hypothesis:
             known is not None and bool(0.5 * known**2 < low * high < 2.0 * known**2)
             for known, (low, high) in zip(nominal, np.exp(self.logs), strict=True)
         ]
-
-    @property
-    def centred(self) -> bool:
-        """Whether there is one parameter, and that is a datasheet value amid its range."""
-        return self.amid == [True]
 
     @property
     def datasheet(self) -> NDArray[np.float64]:
@@ -177,8 +163,7 @@ class Hypothesis:
         return tuple(sorted({CATALOGUE[effect].site for effect in self.effects}))
 
 
-def every_single_cause(unit: Unit, rare: bool = False) -> Iterator[Hypothesis]:
-    """The hypotheses of one effect each, in the order of the catalogue: the usual or the rare."""
-    for effect in CATALOGUE.values():
-        if effect.rare == rare:
-            yield Hypothesis(unit, (effect.id,))
+def every_single_cause(unit: Unit) -> Iterator[Hypothesis]:
+    """The hypotheses of one usual effect each, in the order of the catalogue."""
+    for effect in COMMON:
+        yield Hypothesis(unit, (effect,))

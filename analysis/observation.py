@@ -112,11 +112,6 @@ class Observation:
             known.append((asdict(replace(plan, frequencies_hz=grid)), rows.tolist()))
         return known
 
-    def thinned(self, stride: int) -> Observation:
-        """Every `stride`-th frequency of each level only."""
-        kept = np.concatenate([np.arange(b.start, b.stop)[::stride] for b in self.blocks])
-        return self.at_rows(kept)
-
     def with_noise(self, noise_v: float) -> Observation:
         """The same reading with another noise of its own, V."""
         return replace(self, noise_v=noise_v, noise=self.noise * (noise_v / self.noise_v))

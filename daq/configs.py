@@ -1,4 +1,4 @@
-"""Where the files that come with lashbench are found: units, benches, recipes, samples, atlases.
+"""Where the files that come with lashbench are found: units, benches, recipes, samples, posteriors.
 
 Installed as a wheel they lie inside the package, in a checkout (an editable
 install) in `configs/` beside it. This module finds and lists files; it never
@@ -14,7 +14,6 @@ from typing import Literal
 from daq.errors import ConfigurationError
 
 __all__ = [
-    "atlas_folder",
     "config_names",
     "config_path",
     "kept_runs",
@@ -78,11 +77,6 @@ def sample_path(name: str) -> Path:
             f"sample {name!r} was not found; use one of: {', '.join(sample_names())}"
         )
     return _root() / "samples" / f"{name}.csv"
-
-
-def atlas_folder() -> Path:
-    """The folder of the atlases that come with lashbench, see `analysis.atlas`."""
-    return _root() / "atlases"
 
 
 def posterior_folder() -> Path:

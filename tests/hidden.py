@@ -76,7 +76,7 @@ def drawn_effect(unit: Unit, effect: str, rng: np.random.Generator) -> EffectSet
     for index, (_, parameter) in enumerate(hypothesis.parameters):
         low, high = hypothesis.logs[index]
         known = parameter.nominal(unit)
-        if hypothesis.centred:
+        if hypothesis.amid == [True]:
             off = rng.uniform(*SHARES) * rng.choice([-1.0, 1.0])
             values[parameter.name] = known * (1.0 + off)
         elif known is not None:

@@ -1,13 +1,15 @@
 """What a report is made of, without simulating: a response, an estimate, a diagnosis."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import synthetic
+from untrained import Untrained
 
 import analysis.diagnosis as diagnosis_module
-from analysis import proposals
 from analysis.calibration import Calibrated
-from analysis.search import Searched
+from analysis.inference.refine import Refined
 from daq.frf import FrequencyResponse
 from sim.unit import load_unit
 
@@ -74,23 +76,21 @@ def diagnosis(
     monkeypatch: pytest.MonkeyPatch,
     hidden: tuple[str, ...],
     judged: list[tuple[str, ...]],
-    given_up: bool = False,
-    spared: bool = False,
 ):
     """A real diagnosis of a synthetic world in which some effects are hidden.
 
-    But for further runs of what is named: these would be simulated, and of another world.
+    But for runs of what is proposed and of what is named: these would be simulated, and of another
+    world.
     """
     rng = np.random.default_rng(3)
     place = np.array([0.5, *([0.6] if hidden else [])])
     seen = synthetic.observation(synthetic.read(hidden, place, rng))
     candidates = [synthetic.candidate(seen, effects) for effects in [(), *judged]]
-    atlas = {
-        c.hypothesis.effects: c.population for c in candidates if len(c.hypothesis.effects) < 2
-    }
-    searched = Searched(candidates, given_up, spared, seen, atlas)
+    posterior = Untrained()
+    refined = Refined(candidates, posterior.summary(seen, {}), ())
     monkeypatch.setattr(diagnosis_module, "observe", lambda response: seen)
-    monkeypatch.setattr(proposals, "search_causes", lambda *_, **__: searched)
+    monkeypatch.setattr(diagnosis_module, "Posterior", SimpleNamespace(find=lambda *_: posterior))
+    monkeypatch.setattr(diagnosis_module, "refine", lambda *_, **__: refined)
     monkeypatch.setattr(diagnosis_module, "propose_measurement", lambda *_, **__: None)
     monkeypatch.setattr(diagnosis_module, "sharpen_candidate", sharpened)
     return diagnosis_module.diagnose_response(response(), load_unit("adss"))

@@ -97,21 +97,6 @@ def test_densities_are_students_t_and_nothing_where_nothing_was_observed():
     assert np.all(fit.density[:2][~known] == 0.0)
 
 
-def test_densities_of_two_shifts_together_are_summed_over_what_was_observed():
-    rng = np.random.default_rng(2)
-    mean = rng.standard_normal(29)
-    mean[[3, 17]] = np.nan
-    shifts = [rng.standard_normal((count, 29)) for count in (3, 4)]
-    stds = [rng.uniform(1e-3, 3.0, (count, 29)) for count in (3, 4)]
-    shifts[0][:, 17] = np.nan
-    found = agreement.total_densities(mean, *shifts, *stds)
-    for i in range(3):
-        for j in range(4):
-            together = mean + shifts[0][i] + shifts[1][j]
-            each = student(together, np.maximum(stds[0][i], stds[1][j]))
-            assert found[i, j] == pytest.approx(np.nansum(each), rel=1e-10)
-
-
 def test_leaning_is_the_most_probable_deviation():
     rng = np.random.default_rng(4)
     slope, truth = rng.standard_normal((3, 200)), np.array([0.4, -0.2, 0.0])
@@ -202,10 +187,7 @@ def test_a_scatter_is_smoothed_over_its_own_level_alone():
 
 def test_what_is_compiled_beforehand_is_what_a_fit_takes():
     expectation.compile_all()
-    functions = (
-        agreement.agree, agreement.log_shares, agreement.weigh,
-        agreement.total_densities,
-    )  # fmt: skip
+    functions = agreement.agree, agreement.log_shares, agreement.weigh
     before = [list(function.signatures) for function in functions]
     seen = observation(read(("load-inertia",), np.array([0.5, 0.4]), np.random.default_rng(0)))
     surface = candidate(seen, ("load-inertia",)).surface

@@ -12,6 +12,7 @@ from analysis.next_measurement import NextMeasurement
 from analysis.unseen import list_unseen
 from daq.errors import AnalysisError
 from daq.plan import SweepPlan
+from sim.catalogue import CATALOGUE
 from sim.unit import load_unit
 
 LOAD, STIFF, GAIN = ("load-inertia",), ("shaft-stiffness",), ("amplifier-gain",)
@@ -256,7 +257,7 @@ def test_a_few_points_are_refused_as_anything_explains_them(frequencies, told):
 
 
 def test_a_file_of_one_point_is_refused_before_anything_is_simulated(monkeypatch):
-    monkeypatch.setattr(module, "propose", lambda *_, **__: pytest.fail("searched"))
+    monkeypatch.setattr(module, "refine", lambda *_, **__: pytest.fail("simulated"))
     response = makings.response()
     one = response.take(response.frequency_hz == response.frequency_hz[0])
     with pytest.raises(AnalysisError, match="1 usable frequency"):
@@ -279,7 +280,7 @@ def test_where_nothing_was_found_it_is_told_what_may_be_there_all_the_same(
     plain = makings.diagnosis(monkeypatch, (), [LOAD, STIFF])
     assert plain.verdict.word == "consistent"
     told, document = plain.summary(), plain.to_json()["unseen"]
-    assert [one["effect"] for one in document] == [*LOAD, *STIFF]
+    assert [one["effect"] for one in document] == list(CATALOGUE)
     at = told.index("  what may be there unseen, each by itself:")
     lines = [f"    {text}" for text in list_unseen(document)]
     assert lines
@@ -291,7 +292,7 @@ def test_beside_what_is_named_it_is_told_what_else_may_be_there(monkeypatch):
     named = makings.diagnosis(monkeypatch, LOAD, [LOAD, STIFF])
     assert named.verdict.best.effects == LOAD
     told, document = named.summary(), named.to_json()["unseen"]
-    assert [one["effect"] for one in document] == [*STIFF]
+    assert [one["effect"] for one in document] == [e for e in CATALOGUE if e not in LOAD]
     at = told.index("  what may be there unseen beside what is named, each by itself:")
     assert told[at + 1] == f"    {list_unseen(document)[0]}"
 

@@ -5,13 +5,13 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from atlases import coarse_sweep, usual_families, usual_sweep
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from usual_runs import usual_families, usual_sweep
 
-from analysis.atlas import atlas_name
 from analysis.causes import Hypothesis
 from analysis.estimate import estimate_response
+from analysis.inference.checkpoint import posterior_name
 from analysis.library import run_name
 from analysis.observation import observe
 from analysis.swept import check_together
@@ -49,17 +49,19 @@ def through(format_: str, response: FrequencyResponse, folder: Path) -> Frequenc
 @pytest.mark.parametrize("name", ["adss", "edss"])
 def test_a_renamed_unit_finds_what_is_stored_of_its_physics(name, tmp_path):
     unit, mine = load_unit(name), load_unit(renamed(name, tmp_path))
-    coarse, sweep = coarse_sweep(name), usual_sweep(name)
-    for rare in (False, True):
-        assert atlas_name(mine, coarse, rare) == atlas_name(unit, coarse, rare)
-    family = usual_families(name)[0]
+    sweep, family = usual_sweep(name), usual_families(name)[0]
+    assert posterior_name(mine) == posterior_name(unit)
     assert run_name(mine, family, sweep) == run_name(unit, family, sweep)
 
 
-def test_every_parameter_tells_units_apart(tmp_path):
-    unit, coarse = load_unit("adss"), coarse_sweep("adss")
+def test_every_parameter_tells_units_apart():
+    unit, sweep, family = load_unit("adss"), usual_sweep("adss"), usual_families("adss")[0]
     others = [unit.with_parameters(**{s: 1.01 * v}) for s, v in unit.parameters.items()]
-    assert len({atlas_name(one, coarse) for one in (unit, *others)}) == len(others) + 1
+    for names in (
+        [posterior_name(one) for one in (unit, *others)],
+        [run_name(one, family, sweep) for one in (unit, *others)],
+    ):
+        assert len(set(names)) == len(others) + 1
 
 
 @pytest.mark.parametrize("name", ["adss", "edss"])

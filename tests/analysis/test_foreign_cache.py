@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from analysis.atlas import atlas_name, make_atlas
 from analysis.ensemble import Machine
 from analysis.library import run_families
 from analysis.observation import unread
@@ -32,14 +31,3 @@ def test_runs_of_others_are_not_believed(tmp_path, mode, factor):
     cache.chmod(mode)
     found = run_families(ADSS, FAMILIES, SEEN, cache=cache)
     np.testing.assert_array_equal(found.mean, factor * honest.mean)
-
-
-def test_an_atlas_of_others_is_not_believed(tmp_path):
-    cache = tmp_path / "cache"
-    honest = make_atlas(ADSS, SEEN, cache)
-    doctored(cache / atlas_name(ADSS, SEEN))
-    believed = make_atlas(ADSS, SEEN, cache)
-    np.testing.assert_array_equal(believed[()].mean, 2.0 * honest[()].mean)
-    cache.chmod(0o777)
-    anew = make_atlas(ADSS, SEEN, cache)
-    np.testing.assert_array_equal(anew[()].mean, honest[()].mean)

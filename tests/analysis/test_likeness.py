@@ -9,7 +9,7 @@ from synthetic import ADSS, FREQUENCIES
 
 from analysis import verdict as rules
 from analysis.causes import Hypothesis
-from analysis.likeness import is_felt_alike, plainer_places
+from analysis.likeness import is_felt_alike
 
 J_L = ADSS.load.J_L
 SWINGING, BRAKED, HEAVY, TIED = (
@@ -68,41 +68,6 @@ def test_what_is_not_at_the_load_must_be_the_same(extra):
 def test_nothing_is_like_a_set_with_as_many_sizes():
     assert not is_felt_alike(believed(HEAVY), believed(HEAVY))
     assert not is_felt_alike(believed(BRAKED), believed(HEAVY))
-
-
-@pytest.mark.parametrize(
-    ("payload", "extra", "plainer"),
-    [
-        (FAR_ABOVE, (), [HEAVY]), (FAR_BELOW, (), [BRAKED]), (AMID, (), []),
-        (FAR_ABOVE, ("shaft-damping",), [HEAVY]), (FAR_ABOVE, BRAKED, [HEAVY]),
-        # What is heavier already is heavier still, which is a part of the set.
-        (FAR_ABOVE, HEAVY, []),
-    ],
-)  # fmt: skip
-def test_sets_that_say_the_same_as_a_payload_are_known_with_their_place(payload, extra, plainer):
-    known = {"c_s1": 0.01, "B_L": 0.2, "J_L": 1.3 * J_L}
-    whole = Hypothesis(ADSS, tuple(sorted(SWINGING + extra)))
-    sizes = dict(zip(["J_p", "f_p", "zeta_p"], payload, strict=True)) | known
-    one = believed(whole.effects, [sizes[p.name] for _, p in whole.parameters])
-    found = plainer_places(one)
-    assert sorted(found) == sorted(tuple(sorted(key + extra)) for key in plainer)
-    # Who must not know a cause does not bring it in again.
-    assert plainer_places(one, {effect for key in plainer for effect in key}) == {}
-    for key, place in found.items():
-        there = Hypothesis(ADSS, key)
-        assert place[0] == pytest.approx(0.4)
-        values = dict(zip((p.name for _, p in there.parameters), there.values(place), strict=True))
-        if "load-inertia" in key:
-            # So heavy is the load with a payload that follows it.
-            assert values["J_L"] == pytest.approx(1.2 * J_L, rel=0.03)
-        if "shaft-damping" in key:
-            assert values["c_s1"] == pytest.approx(0.01)
-
-
-def test_nothing_is_plainer_than_a_cause_of_one_size():
-    assert plainer_places(believed(HEAVY)) == {}
-    assert plainer_places(believed(("amplifier-gain",))) == {}
-    assert plainer_places(believed(())) == {}
 
 
 @pytest.mark.parametrize(("alike", "rivals"), [(True, []), (False, [SWINGING])])

@@ -9,7 +9,6 @@ from synthetic import ADSS
 from analysis import verdict as rules
 from analysis.causes import Hypothesis
 from analysis.plausibility import (
-    is_out_of_band,
     is_out_of_sight,
     is_pressed,
     may_be_within_tolerance,
@@ -106,14 +105,12 @@ def test_a_resonance_far_outside_what_was_measured_is_out_of_sight(beside, reson
     surface = SimpleNamespace(observation=measured)
     one = SimpleNamespace(hypothesis=hypothesis, best=best, surface=surface)
     assert is_out_of_sight(one) is beyond
-    assert is_out_of_band(one) is not (100.0 < resonance_hz < 180.0)
 
 
 def test_what_has_no_resonance_is_never_out_of_sight():
     one = off_by(PAIR, 0.2, 0.0)
     one.surface.observation = SimpleNamespace(frequency_hz=np.array([1e4, 2e4]))
     assert not is_out_of_sight(one)
-    assert not is_out_of_band(one)
 
 
 def test_what_no_datasheet_knows_has_no_tolerance():

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from analysis.atlas import coarse_stride, make_atlas
 from analysis.causes import Hypothesis
 from analysis.observation import unread
 from analysis.population import Group, simulate_groups
@@ -30,7 +29,6 @@ def test_runs_are_kept_by_hypothesis_with_their_places():
 
 
 def test_no_groups_are_no_runs():
-    # A search asks for the pairs that are worth a closer look, and there may be none.
     assert runs([]) == {}
 
 
@@ -48,37 +46,6 @@ def test_the_same_seed_gives_the_same_runs():
     np.testing.assert_array_equal(runs(groups)[()].mean, runs(groups)[()].mean)
 
 
-def test_an_atlas_is_kept_and_read_again_and_a_damaged_one_is_made_anew(tmp_path, monkeypatch):
-    import analysis.atlas as module
-
-    monkeypatch.setattr(module, "_RATIOS", 1)
-    monkeypatch.setattr(module, "_SIZES", 1)
-    coarse = unread(SHORT, 1e-4)
-    first = make_atlas(ADSS, coarse, tmp_path)
-    (file,) = tmp_path.iterdir()
-    monkeypatch.setattr(module, "simulate_groups", None)
-    again = make_atlas(ADSS, coarse, tmp_path)
-    assert list(again) == list(first)
-    assert len(first) == 23
-    for key in first:
-        np.testing.assert_array_equal(again[key].mean, first[key].mean)
-    other = unread(SweepPlan((120.0, 141.0), (2.0,), settle_cycles=1, integrate_cycles=2), 1e-4)
-    with pytest.raises(TypeError):
-        make_atlas(ADSS, other, tmp_path)  # another plan is not read from this file
-    file.write_bytes(file.read_bytes()[:100])
-    with pytest.raises(TypeError):
-        make_atlas(ADSS, coarse, tmp_path)  # nor is a damaged file believed
-
-
-def test_a_folder_that_cannot_be_written_costs_nothing_but_time(tmp_path, monkeypatch):
-    import analysis.atlas as module
-
-    monkeypatch.setattr(module, "_RATIOS", 1)
-    monkeypatch.setattr(module, "_SIZES", 1)
-    (tmp_path / "file").write_text("")
-    assert make_atlas(ADSS, unread(SHORT, 1e-4), tmp_path / "file" / "below")
-
-
 def test_a_step_too_long_is_halved_before_giving_up(monkeypatch):
     import sim.response as module
 
@@ -94,13 +61,3 @@ def test_a_step_too_long_is_halved_before_giving_up(monkeypatch):
     # Lots of one group may be stepped side by side.
     assert steps[0] == (1e-5, 5e-6, 2.5e-6)
     assert sorted(set(steps)) == [(2.5e-6,), (5e-6, 2.5e-6), (1e-5, 5e-6, 2.5e-6)]
-
-
-def test_the_coarse_look_keeps_about_twenty_frequencies_a_level():
-    for points, stride in ((61, 3), (20, 1), (7, 1), (401, 20)):
-        plan = SweepPlan(tuple(np.linspace(100, 180, points)), (1.5, 2.5))
-        assert coarse_stride(unread(plan, 1e-4)) == stride
-    thinned = unread(SweepPlan(tuple(np.linspace(100, 180, 61)), (1.5, 2.5)), 1e-4).thinned(3)
-    assert len(thinned) == 42
-    assert thinned.plans[0][0].frequencies_hz[1] == pytest.approx(104.0)
-    np.testing.assert_array_equal(thinned.plans[0][1], np.arange(42))

@@ -10,8 +10,7 @@ import synthetic
 from analysis import sharpening
 from analysis.calibration import Calibrated
 from analysis.population import Population
-from analysis.purse import Purse
-from sim.effort import Effort, counting, spend
+from sim.effort import counting, spend
 
 TRUE = ("load-inertia",)
 
@@ -127,11 +126,11 @@ def test_it_gets_no_more_runs_than_are_enough(monkeypatch, asked):
     assert len(asked) == 2
 
 
-@pytest.mark.parametrize(("share", "rounds"), [(0.05, 3), (0.3, 1), (1e-9, 12)])
-def test_it_takes_no_more_than_a_share_of_what_a_search_may(monkeypatch, asked, share, rounds):
+@pytest.mark.parametrize(("share", "rounds"), [(0.42, 3), (2.5, 1), (1e-9, 12)])
+def test_it_takes_no_more_than_it_may(monkeypatch, asked, share, rounds):
     """A round that is begun is finished; what was simulated before does not count."""
     observed, made = observed_at(0), sharpening.simulate_groups
-    granted_s = Purse.for_observation(observed, Effort()).granted_s
+    granted_s = max(180 * observed.plans[0][0].duration_s, 27_600.0)
 
     def spending(*given):
         spend(1.0, share * granted_s)

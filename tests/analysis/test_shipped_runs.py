@@ -6,8 +6,8 @@ from zipfile import ZipFile
 
 import numpy as np
 import pytest
-from atlases import RUNS, agreement, usual_families, usual_sweep
 from hidden import BANDS_HZ
+from usual_runs import RUNS, agreement, usual_families, usual_sweep
 
 import analysis.library as module
 from analysis.estimate import estimate_response
@@ -48,8 +48,10 @@ def test_another_unit_or_sweep_is_simulated(name, monkeypatch):
     heavier = unit.with_parameters(J_L=1.1 * unit.parameters["J_L"])
     late = [tuple(replace(machine, seed=machine.seed + 1) for machine in families[-1])]
     for other, seen, some in (
-        (heavier, sweep, families), (unit, sweep.thinned(2), families), (unit, sweep, late),
-    ):  # fmt: skip
+        (heavier, sweep, families),
+        (unit, usual_sweep(name, (1.5, 2.5)), families),
+        (unit, sweep, late),
+    ):
         asked.clear()
         with pytest.raises(InterruptedError):
             run_families(other, some, seen)
@@ -84,7 +86,7 @@ def test_without_them_an_estimate_simulates(damage, name, tmp_path, monkeypatch)
 def test_this_engine_would_make_the_same_of_them(name):
     """False once in 10,000: runs from other starts at the same places."""
     seed, p = again(name)
-    assert p > 1e-4, f"seed {seed}: simulate them anew, python tests/atlases.py"
+    assert p > 1e-4, f"seed {seed}: simulate them anew, python tests/usual_runs.py"
 
 
 def test_that_would_be_seen_if_the_engine_made_another_machine_of_the_unit(name):

@@ -26,7 +26,7 @@ from yardsticks.page import replace_block
 from analysis.diagnosis import Diagnosis, diagnose_response
 
 KINDS = {"one cause": 0.45, "nothing": 0.15, "two causes": 0.25, "unknown cause": 0.15}
-CACHE = Path(__file__).parents[2] / ".venv" / "atlas"
+CACHE = Path(__file__).parents[2] / ".venv" / "runs"
 PAGE = Path(__file__).parents[2] / "docs" / "blind-study.md"
 
 

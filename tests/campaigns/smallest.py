@@ -27,8 +27,9 @@ from kept import Kept, drawn_seed
 from yardsticks.page import replace_block
 
 from analysis.causes import Hypothesis
+from analysis.inference.posterior import Posterior
+from analysis.inference.refine import refine
 from analysis.observation import observe
-from analysis.search import search_causes
 from analysis.verdict import judge_candidates
 from daq.plan import SweepPlan, spaced_frequencies
 from sim.effects import EffectSetting
@@ -72,7 +73,7 @@ def _first_value(hypothesis: Hypothesis, strength: float, sign: float = 1.0) -> 
     """Of the first parameter, which says how large an effect is."""
     parameter = hypothesis.parameters[0][1]
     known = parameter.nominal(hypothesis.unit)
-    if hypothesis.centred:
+    if hypothesis.amid == [True]:
         return known * float(np.exp(sign * _between(OFF, strength)))
     if known is not None:
         return known * float(np.exp(_between(GROWTH, strength)))
@@ -103,7 +104,7 @@ def is_named(effect: str, setting: EffectSetting, rng: np.random.Generator) -> b
     seed = int(rng.integers(2**31))
     swept = simulate(machine, ratio, PLAN, effects=(setting,), seed=seed)
     seen = observe(reading(swept, rng))
-    candidates = search_causes(UNIT, seen, cache=CACHE, seed=seed).candidates
+    candidates = refine(Posterior.find(UNIT, CACHE), seen, seed=seed).candidates
     verdict = judge_candidates(candidates, candidates[0].surface.observation, rng)
     return verdict.word in ("explained", "ambiguous") and verdict.best.effects == (effect,)
 

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-import synthetic_search as synthetic_runs
+import synthetic_runs
 from untrained import Untrained
 
-from analysis.inference.posterior import limits
 from analysis.inference.refine import refine
 from analysis.verdict import judge_candidates
 
@@ -57,19 +56,3 @@ def test_the_same_seed_gives_the_same_candidates(runs):
     first, again = (refine(Untrained((LAG, LOAD)), seen, seed=3).candidates for _ in range(2))
     assert [one.hypothesis.effects for one in first] == [one.hypothesis.effects for one in again]
     assert [o.best.log_likelihood for o in first] == [o.best.log_likelihood for o in again]
-
-
-@pytest.mark.parametrize("believed", [0.1, 0.9])
-def test_limits_hold_what_the_datasheet_says(believed):
-    """However far off it a size would be if it were a cause; and only of what is not named."""
-    network = Untrained()
-    network.checkpoint.weights["size.b"][: network.checkpoint.shape.parameters] = believed
-    summary = network.summary(None, {})
-    found = {one.effect: one for one in limits(network, summary, (LOAD,), (LAG,))}
-    assert not {LOAD, LAG} & set(found)
-    known = [one for one in found.values() if one.datasheet is not None]
-    assert len(known) > 8
-    for one in known:
-        assert one.low is None or one.low <= one.datasheet
-        assert one.high is None or one.high >= one.datasheet
-    assert any(one.low is not None or one.high is not None for one in known)

@@ -1,14 +1,11 @@
 """The simulations that come with lashbench, of the paper's units in their usual sweeps.
 
-``python tests/atlases.py`` makes them anew, the atlases of a diagnosis in configs/atlases and the
-runs of an estimate in configs/runs.zip, which is due when the engine, an effect or an edition
-has changed; tests say when.
+``python tests/usual_runs.py`` makes the runs of an estimate in configs/runs.zip anew, which is due
+when the engine or an edition has changed; tests say when.
 """
 
 from __future__ import annotations
 
-import shutil
-from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from zipfile import ZipFile
@@ -17,19 +14,15 @@ import numpy as np
 from hidden import BANDS_HZ, LEVELS_VPK
 from numpy.typing import NDArray
 
-from analysis.atlas import Atlas, atlas_name, coarse_stride, simulate_atlas, write_atlas
-from analysis.ensemble import Draws
 from analysis.family import Family, read_families
 from analysis.lattice import RATIO, Families, every_family
 from analysis.library import run_name, write_runs
 from analysis.observation import Observation, unread
-from analysis.population import Population
 from analysis.spread import spread_of
 from daq.plan import SweepPlan, spaced_frequencies
 from sim.unit import load_unit
 
-FOLDER = Path(__file__).parents[1] / "configs" / "atlases"
-RUNS = FOLDER.parent / "runs.zip"
+RUNS = Path(__file__).parents[1] / "configs" / "runs.zip"
 POINTS = 61
 
 BITS = 11
@@ -46,22 +39,9 @@ def usual_sweep(unit: str, levels_vpk: tuple[float, ...] = LEVELS_VPK) -> Observ
     return unread(SweepPlan(spaced_frequencies(*BANDS_HZ[unit], POINTS), levels_vpk), 1e-3)
 
 
-def coarse_sweep(unit: str, levels_vpk: tuple[float, ...] = LEVELS_VPK) -> Observation:
-    """The coarse look at it that an atlas is made for."""
-    whole = usual_sweep(unit, levels_vpk)
-    return whole.thinned(coarse_stride(whole))
-
-
-def rounded(atlas: Atlas) -> Atlas:
+def _fewer_digits(mean: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """The same readings with as many digits as they deserve, which a file keeps in a third."""
-    return {key: replace(one, **_fewer_digits(one)) for key, one in atlas.items()}
-
-
-def _fewer_digits(one: Population | Draws) -> dict[str, NDArray]:
-    return {
-        "mean": _rounded(one.mean.real, BITS) + 1j * _rounded(one.mean.imag, BITS),
-        "variance": _rounded(one.variance, VARIANCE_BITS),
-    }
+    return _rounded(mean.real, BITS) + 1j * _rounded(mean.imag, BITS)
 
 
 def _rounded(values: NDArray[np.float64], bits: int) -> NDArray[np.float64]:
@@ -89,22 +69,15 @@ def agreement(apart: NDArray[np.complex128], rng: np.random.Generator) -> float:
 
 
 def main() -> None:
-    """Write them all, and nothing else stays."""
-    shutil.rmtree(FOLDER, ignore_errors=True)
-    for name in BANDS_HZ:
-        unit, coarse = load_unit(name), coarse_sweep(name)
-        for rare in (False, True):
-            atlas = rounded(simulate_atlas(unit, coarse, rare=rare))
-            write_atlas(FOLDER / atlas_name(unit, coarse, rare), atlas)
+    """Write them all."""
     with ZipFile(RUNS, "w") as archive:
         for name in BANDS_HZ:
             unit, sweep = load_unit(name), usual_sweep(name)
             families = usual_families(name)
             tasks = [Family(unit, family, sweep.plans) for family in families]
             for family, (mean, variance) in zip(families, read_families(tasks), strict=True):
-                fewer = _fewer_digits(Draws(family, mean, variance))
                 content = BytesIO()
-                write_runs(content, (fewer["mean"], fewer["variance"]))
+                write_runs(content, (_fewer_digits(mean), _rounded(variance, VARIANCE_BITS)))
                 archive.writestr(run_name(unit, family, sweep), content.getvalue())
 
 
