@@ -1,4 +1,4 @@
-"""A hypothesis together with the runs made for it: what a search compares.
+"""A hypothesis together with the runs made for it: what a diagnosis compares.
 
 Owns how runs become a candidate: a surface over their places, cleared of what
 deviations of datasheet values do, and the best fit on it. It decides neither

@@ -1,4 +1,4 @@
-"""Hypotheses about what a unit has that its model lacks, as coordinates for a search.
+"""Hypotheses about what a unit has that its model lacks, and their coordinates.
 
 Owns the map between a hypothesis (a set of effects of the catalogue), its
 coordinates of order one, and machines that can be simulated. It judges nothing
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.ensemble import LEAST_SHARE, Machine
-from sim.catalogue import CATALOGUE, COMMON, EffectParameter
+from sim.catalogue import CATALOGUE, EffectParameter
 from sim.effects import EffectSetting
 from sim.unit import Unit
 
@@ -165,5 +165,6 @@ class Hypothesis:
 
 def every_single_cause(unit: Unit) -> Iterator[Hypothesis]:
     """The hypotheses of one usual effect each, in the order of the catalogue."""
-    for effect in COMMON:
-        yield Hypothesis(unit, (effect,))
+    for effect in CATALOGUE.values():
+        if not effect.rare:
+            yield Hypothesis(unit, (effect.id,))

@@ -102,8 +102,8 @@ def diagnose_response(
     responses, doubts = thin_all(tuple(map(settled, responses)))
     if unit.stages == 1:
         raise AnalysisError(
-            f"unit {unit.name} has one gear stage, and the search shares the backlash out between "
-            "two; estimate tells its backlash"
+            f"unit {unit.name} has one gear stage, and a diagnosis needs two; "
+            "estimate tells its backlash"
         )
     observed = observe(*responses)
     _refuse_few(observed)

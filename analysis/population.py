@@ -1,6 +1,6 @@
 """Simulated runs of a hypothesis, at many places, in the sweep of an observation.
 
-Owns the making of runs for the search: machines in groups that share their
+Owns the making of runs for the diagnosis: machines in groups that share their
 linear part (so that they are stepped side by side), each group off its
 datasheet in its own way, and what a bench would have read from each run. It
 judges nothing.

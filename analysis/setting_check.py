@@ -151,7 +151,7 @@ def search_doubt(
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Doubt | None:
-    """Which setting, frequencies among them, is likely stated wrongly: asked before a search.
+    """Which setting, frequencies among them, is likely stated wrongly: asked before any cause is.
 
     Parameters
     ----------

@@ -47,7 +47,7 @@ def widen_if_open(
 ) -> Calibrated:
     """What was found of a candidate, or what is with more caution where that leaves much more open.
 
-    A search places runs ever closer about an answer; where the data say nothing, it seems known.
+    Rounds place runs ever closer about an answer; where the data say nothing, it seems known.
     """
     runs, width = candidate.population, _width(candidate)
     gain = spread_of(candidate.hypothesis.unit).gain

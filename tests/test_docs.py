@@ -177,11 +177,11 @@ def test_every_page_can_be_reached_from_the_index():
 
 def test_the_architecture_lists_every_decision_by_its_title():
     page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
-    listed = re.findall(r"^(\d+)\. \[.+\]\(decisions/(.+\.md)\)", page, re.MULTILINE)
+    listed = re.findall(r"^- \[(\d+\. .+)\]\(decisions/(.+\.md)\)$", page, re.MULTILINE)
     records = sorted((ROOT / "docs" / "decisions").glob("*.md"))
     assert [name for _, name in listed] == [file.name for file in records]
-    for (number, _), file in zip(listed, records, strict=True):
-        assert file.read_text(encoding="utf-8").startswith(f"# {number}. ")
+    for (title, _), file in zip(listed, records, strict=True):
+        assert file.read_text(encoding="utf-8").startswith(f"# {title}\n")
 
 
 def test_the_citation_is_of_this_version():

@@ -106,7 +106,7 @@ def least(repeats: int, work) -> Cost:
 
 
 USUAL, OWN = ("1.5", "2.5", "4"), ("1.4", "2.4", "3.8")
-"""Levels: for the usual ones what a search starts from comes with lashbench."""
+"""Levels: for the usual ones the runs of an estimate come with lashbench."""
 
 
 def sweep(folder: Path, levels: tuple[str, ...]) -> Path:
