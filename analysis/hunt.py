@@ -8,7 +8,6 @@ does not decide what to look at.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,21 +65,12 @@ class Hunt:
         return [k for k in ranked[:most] if likelihood[k] >= likelihood[ranked[0]] - behind]
 
     def start(self, places: Starts, groups: int, reach: Reach) -> None:
-        """Simulate hypotheses about places, or more of them than before about other places.
-
-        In so many groups each, `reach` about them.
-        """
+        """Simulate hypotheses about places, in so many groups each, `reach` about them."""
         wanted: list[Group] = []
         for key, place in places.items():
             wanted += groups_about(Hypothesis(self.unit, key), place, groups, self._rng, reach)
         self._simulate(wanted)
-        known = {key: self.found[key].best.place for key in places if key in self.found}
-        self._form({**places, **known})
-        for key in known:
-            one = self.found[key]
-            there = one.surface.climb(places[key])
-            if there.log_likelihood > one.best.log_likelihood:
-                self.found[key] = replace(one, best=there)
+        self._form(places)
 
     def settle(self, chosen: Sequence[Effects], groups: int) -> None:
         """Simulate more of some candidates, about what their runs tell of their parameters."""
