@@ -205,8 +205,7 @@ def _diagnose(
         unseen=proposed.unseen(verdict, best),
         models=models,
         believed=believed_document(unit),
-        cut_short=proposed.cut_short(verdict.word),
-        lent_by=proposed.lent_by,
+        lent_by=posterior.lent_by,
     )
 
 

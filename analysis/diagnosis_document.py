@@ -60,10 +60,9 @@ class Diagnosis:
     beside those of the set that stands first. `unseen`: how large each
     cause may be all the same where nothing is missing, or each other one beside what is named.
     `models`: every model that may be true with its backlash, the accepted or likeliest first.
-    `cut_short`: whether a search that found no explanation did not try every set that was worth
-    it, for what it may simulate. `believed`: what was believed of the datasheet
-    (`analysis.believed`). `lent_by`: the unit whose posterior was used, where this one has none.
-    `simulated_s`: seconds of motion that were simulated for it.
+    `believed`: what was believed of the datasheet (`analysis.believed`). `lent_by`: the unit whose
+    posterior was used, where this one has none. `simulated_s`: seconds of motion that were
+    simulated for it.
     """
 
     unit: str
@@ -80,9 +79,8 @@ class Diagnosis:
     harmonics: tuple[Harmonic, ...] = ()
     unseen: tuple[Unseen, ...] = ()
     models: tuple[Model, ...] = ()
-    cut_short: bool = False
-    lent_by: str = ""
     believed: Mapping[str, Any] = field(default_factory=dict)
+    lent_by: str = ""
     warnings: tuple[str, ...] = ()
     elapsed_s: float = 0.0
     simulated_s: float = 0.0

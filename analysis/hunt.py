@@ -24,6 +24,9 @@ from sim.unit import Unit
 
 __all__ = ["Hunt", "Starts"]
 
+Place = NDArray[np.float64]
+"""Coordinates (d,) of a hypothesis."""
+
 Starts = Mapping[Effects, NDArray[np.float64]]
 """Places (d,) from which hypotheses are looked at."""
 
@@ -64,13 +67,13 @@ class Hunt:
         ranked = sorted(likelihood, key=lambda key: -likelihood[key])
         return [k for k in ranked[:most] if likelihood[k] >= likelihood[ranked[0]] - behind]
 
-    def start(self, places: Starts, groups: int, reach: Reach) -> None:
-        """Simulate hypotheses about places, in so many groups each, `reach` about them."""
+    def start(self, starts: Mapping[Effects, tuple[Place, Reach]], groups: int) -> None:
+        """Simulate hypotheses about places, each within its reach, in so many groups each."""
         wanted: list[Group] = []
-        for key, place in places.items():
+        for key, (place, reach) in starts.items():
             wanted += groups_about(Hypothesis(self.unit, key), place, groups, self._rng, reach)
         self._simulate(wanted)
-        self._form(places)
+        self._form({key: place for key, (place, _) in starts.items()})
 
     def settle(self, chosen: Sequence[Effects], groups: int) -> None:
         """Simulate more of some candidates, about what their runs tell of their parameters."""

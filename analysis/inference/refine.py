@@ -88,10 +88,7 @@ def refine(
         new = {k: n for k, n in zip(names, numbers, strict=True) if k not in found}
         for key, number in new.items():
             found[key] = posterior.given(summary, int(number), float(probability[number]))
-        placed = {key: _placed(Hypothesis(unit, key), found[key], fine) for key in new}
-        places = {key: place for key, (place, _) in placed.items()}
-        reaches = {key: reach for key, (_, reach) in placed.items()}
-        fine.start(places, _FIRST_GROUPS, reach=reaches)
+        fine.start({k: _placed(Hypothesis(unit, k), found[k], fine) for k in new}, _FIRST_GROUPS)
 
     sets = posterior.scales.sets
     look_at([*first, *_parts(sets, int(first[0]))])

@@ -24,7 +24,7 @@ def looking(runs):
 def test_a_look_close_about_a_place_stays_there(looking):
     hunt = looking(1)
     key, place = ("amplifier-lag", "load-inertia"), np.array([0.4, 0.5, 0.8])
-    hunt.start({key: place}, 3, (0.1, 0.02))
+    hunt.start({key: (place, (0.1, 0.02))}, 3)
     assert np.all(abs(hunt.found[key].population.places - place) <= [0.1, 0.02, 0.02])
     assert (len(hunt.found), hunt.best) == (1, hunt.found[key])
 
@@ -32,7 +32,8 @@ def test_a_look_close_about_a_place_stays_there(looking):
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_further_runs_close_in_on_what_is_there(looking, seed):
     hunt = looking(seed)
-    hunt.start({LOAD: np.array([0.55, 0.6]), (): np.array([0.5])}, 6, (0.3, 0.3))
+    reach = (0.3, 0.3)
+    hunt.start({LOAD: (np.array([0.55, 0.6]), reach), (): (np.array([0.5]), reach)}, 6)
     for _ in range(2):
         hunt.settle([LOAD, ()], 6)
     assert hunt.leading(5) == [LOAD, ()]

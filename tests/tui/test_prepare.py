@@ -6,7 +6,6 @@ import pytest
 from measuring import QUICK, SHORT, measuring
 
 import analysis.preparation as module
-from analysis.atlas import coarse_stride, make_atlas
 from analysis.estimate import estimate_response
 from analysis.inference.checkpoint import posterior_name, read_checkpoint
 from analysis.inference.nominal import nominal_of
@@ -27,9 +26,7 @@ def cache(tmp_path, monkeypatch):
     return tmp_path / "cache" / "lashbench"
 
 
-def test_a_sweep_that_was_prepared_is_estimated_and_searched_without_simulating(
-    run, cache, tmp_path
-):
+def test_a_sweep_that_was_prepared_is_estimated_without_simulating(run, cache, tmp_path):
     words = ["--unit", "adss", *SHORT, *QUICK, "--offset", "0.5", "--json"]
     code, out, _ = run("prepare", *words, history=False)
     assert code == 0
@@ -42,10 +39,7 @@ def test_a_sweep_that_was_prepared_is_estimated_and_searched_without_simulating(
     kept = sorted(cache.iterdir())
     response = read_response(file)
     assert estimate_response(response, ADSS, cache=cache).simulated_s == 0.0
-    seen = observe(response)
-    for rare in (False, True):
-        make_atlas(ADSS, seen.thinned(coarse_stride(seen)), cache, rare=rare)
-    nominal_of(ADSS, seen, cache)
+    nominal_of(ADSS, observe(response), cache)
     assert sorted(cache.iterdir()) == kept
     # A response says which sweep is meant, too, and nothing is left to be made of this one.
     code, out, _ = run("prepare", file, "--unit", "adss", history=False)
@@ -61,7 +55,6 @@ def test_one_that_was_interrupted_goes_on(tmp_path, monkeypatch):
         made.append(len(families))
         return whole(unit, families, *rest, **options)
 
-    monkeypatch.setattr(module, "make_atlas", lambda *_, **__: {})
     monkeypatch.setattr(module, "nominal_of", lambda *_, **__: None)
     with monkeypatch.context() as patch:
         patch.setattr(module, "run_families", stopping)
