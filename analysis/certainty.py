@@ -25,10 +25,10 @@ and a cable for a load with 0.92."""
 def hold_against_doubt(verdict: Verdict) -> Verdict:
     """A verdict, or with what shares its probability as rivals, where it names something for sure.
 
-    Those are the fewest that with the best set hold nearly all that is believed, whether or not
-    something speaks against them, or more of the same causes with them. More than `FEW` causes,
-    which can fit nearly anything and stood for what nobody knew before, have their best part for a
-    rival, or the plain model.
+    Those are the fewest that with the best set, and with sets that hold its causes and more and do
+    no better, hold nearly all that is believed, whether or not something speaks against them. More
+    than `FEW` causes, which can fit nearly anything and stood for what nobody knew before, have
+    their best part for a rival, or the plain model.
     """
     if verdict.word != "explained":
         return verdict
@@ -47,7 +47,9 @@ def _who_shares(verdict: Verdict) -> tuple[Judged, ...]:
     others = [
         one
         for one in verdict.judged
-        if one is not verdict.best and one.objection != UNEARNED and not verdict.says_the_same(one)
+        if one is not verdict.best
+        and one.objection != UNEARNED
+        and not (verdict.holds(one) or verdict.says_the_same(one))
     ]
     others.sort(key=lambda one: -one.probability)
     held = verdict.probability + np.cumsum([0.0, *(one.probability for one in others)])

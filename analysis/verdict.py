@@ -168,10 +168,19 @@ class Verdict:
 
     @property
     def probability(self) -> float:
-        """Of the best set, with what is believed of sets that say the same with more sizes."""
+        """That the causes of the best set are there.
+
+        With what is believed of sets that say the same with more sizes, or hold these causes and
+        more.
+        """
         return self.best.probability + sum(
-            one.probability for one in self.judged if self.says_the_same(one)
+            one.probability for one in self.judged if self.holds(one) or self.says_the_same(one)
         )
+
+    def holds(self, one: Judged) -> bool:
+        """Whether a set has all the causes of the best set, and more, and does no better."""
+        more = bool(self.best.effects) and set(one.effects) > set(self.best.effects)
+        return more and one.score <= self.best.score
 
     def remark(self, one: Judged) -> str:
         """What speaks against a set, or makes it no rival; empty where nothing does."""
@@ -199,10 +208,7 @@ class Verdict:
         """
         if len(self.best.effects) > FEW:
             return False
-        holding = sum(
-            one.probability for one in self.judged if set(one.effects) > set(self.best.effects)
-        )
-        return self.probability + holding >= _LIKELY
+        return self.probability >= _LIKELY
 
     def _is_rival(self, one: Judged, believed: float) -> bool:
         behind, best = believed - one.score, set(self.best.effects)

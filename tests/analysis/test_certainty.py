@@ -34,7 +34,9 @@ def alike(monkeypatch):
         property(
             lambda self: (
                 self.best.probability
-                + sum(one.probability for one in self.judged if one.effects in same)
+                + sum(
+                    one.probability for one in self.judged if one.effects in same or self.holds(one)
+                )
             )
         ),
     )
@@ -56,10 +58,12 @@ def test_what_shares_more_than_a_twentieth_is_a_rival_refused_or_not(believed, w
     assert rivals(held) == ([(SHAFT,)] if word == "ambiguous" else [])
 
 
-def test_a_further_cause_beside_the_same_is_a_rival_too():
-    """An amplifier that a resistance stood for was believed by 0.70, and with a further cause."""
+def test_a_further_cause_that_does_no_better_is_no_rival():
+    """What is named is there in both; whether there is more is told as what is not seen."""
     verdict = told(standing((LOAD,), 0.7), standing((BRAKE, LOAD), 0.3))
-    assert rivals(hold_against_doubt(verdict)) == [(BRAKE, LOAD)]
+    held = hold_against_doubt(verdict)
+    assert (held.word, rivals(held)) == ("explained", [])
+    assert held.probability == pytest.approx(1.0)
 
 
 def test_what_leads_though_it_is_refused_is_a_rival():
