@@ -24,12 +24,13 @@ from analysis.certainty import hold_against_doubt
 from analysis.diagnosis_document import Cause, Diagnosis, Size
 from analysis.executor import Executor
 from analysis.harmonics import compare_harmonics
+from analysis.inference.posterior import Posterior, limits
+from analysis.inference.refine import refine
 from analysis.misfit import describe_departures, find_departures
 from analysis.models import models_left
 from analysis.next_measurement import NextMeasurement, propose_measurement
 from analysis.observation import Observation, observe
 from analysis.progress import Progress, part_of
-from analysis.proposals import Way, propose
 from analysis.second_thoughts import UNDOING, think_again
 from analysis.settled import settled
 from analysis.sharpening import sharpen_candidate
@@ -38,6 +39,7 @@ from analysis.stated_error import error_doubts
 from analysis.surely_off import hold_against_datasheet
 from analysis.swept import check_together, unit_doubts
 from analysis.thinning import thin_all
+from analysis.unseen import Unseen
 from analysis.verdict import Judged, Verdict, judge_candidates
 from daq.errors import AnalysisError
 from daq.frf import FrequencyResponse
@@ -64,7 +66,6 @@ def diagnose_response(
     seed: int = 0,
     executor: Executor | None = None,
     progress: Progress | None = None,
-    way: Way = "search",
 ) -> Diagnosis:
     """Diagnose a measured response, or several of one unit together.
 
@@ -86,8 +87,6 @@ def diagnose_response(
         Where runs are simulated; on this machine's cores if not given.
     progress
         Told the share done and what is being done, from the calling thread.
-    way
-        What chooses the sets of causes that are simulated.
 
     Raises
     ------
@@ -109,7 +108,7 @@ def diagnose_response(
     _refuse_few(observed)
     started = time.perf_counter()
     with counting() as effort:
-        found = _diagnose(observed, unit, without, cache, seed, executor, progress, way)
+        found = _diagnose(observed, unit, without, cache, seed, executor, progress)
         if found.verdict.word == "unexplained":
             best, rng = found.verdict.best.candidate, np.random.default_rng(seed)
             harmonics = compare_harmonics(responses, found.observation, best, rng)
@@ -146,18 +145,22 @@ def _diagnose(
     seed: int,
     executor: Executor | None,
     progress: Progress | None,
-    way: Way,
 ) -> Diagnosis:
 
     def early(share: float, text: str) -> None:
         if progress is not None:
             progress(0.8 * share, text)
 
-    proposed = propose(
-        way, unit, observed, without=without, cache=cache, seed=seed, executor=executor,
-        progress=early,
-    )  # fmt: skip
-    candidates = proposed.candidates
+    posterior = Posterior.find(unit, cache, executor)
+    if posterior is None:
+        raise AnalysisError(
+            f"no posterior for unit {unit.name} was trained, nor for one like it; run: "
+            "lashbench prepare --unit FILE"
+        )
+    refined = refine(
+        posterior, observed, without=without, seed=seed, executor=executor, progress=early
+    )
+    candidates = refined.candidates
     observation = candidates[0].surface.observation
     rng = np.random.default_rng(seed)
     verdict = judge_candidates(candidates, observation, rng)
@@ -185,6 +188,9 @@ def _diagnose(
     best = base if sharp is None else sharp
     departures = find_departures(verdict.baseline.candidate, observation)
     left = find_departures(verdict.best.candidate, observation)
+    unseen: tuple[Unseen, ...] = ()
+    if verdict.word != "unexplained":
+        unseen = limits(posterior, refined.summary, verdict.best.effects if named else (), without)
     proposal = _proposal(unit, verdict, observation, seed, executor, progress)
     # Chance of its own: sizing what is left beside the answer does not change the answer.
     models = models_left(verdict, best, base if named else best, observation, rng.spawn(1)[0])
@@ -202,7 +208,7 @@ def _diagnose(
         left_shape=describe_departures(left, observation),
         next_measurement=proposal,
         observation=observation,
-        unseen=proposed.unseen(verdict, best),
+        unseen=unseen,
         models=models,
         believed=believed_document(unit),
         lent_by=posterior.lent_by,
@@ -267,10 +273,6 @@ def _proposal(
 
 def _warnings(diagnosis: Diagnosis) -> tuple[str, ...]:
     found, observation = [], diagnosis.observation
-    if diagnosis.cut_short:
-        found.append(
-            "not every set of causes was tried, as a search may simulate only so much motion"
-        )
     if diagnosis.verdict.word == "unexplained":
         found.append(
             "the contribution ratio is that of the plain model, which does not explain what was "

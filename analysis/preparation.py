@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis.atlas import are_atlases_kept, coarse_stride, make_atlas
 from analysis.estimate import free_axes
 from analysis.executor import Executor
 from analysis.inference.checkpoint import Checkpoint, find_checkpoint, posterior_name
@@ -125,32 +124,25 @@ def prepare_sweep(
         If a motion grew without bound.
     """
     _check_usable(cache)
-    searched = unit.stages == 2
     families = every_family(free_axes(unit), observation, spread_of(unit), seed=0)
-    coarse = observation.thinned(coarse_stride(observation))
-    parts = [part for part, _ in observation.by_plan()] if searched else []
+    parts = [part for part, _ in observation.by_plan()] if unit.stages == 2 else []
 
     def kept() -> list[bool]:
-        runs = [are_kept(unit, family, observation, cache) for family in families]
-        atlases = (are_atlases_kept(unit, coarse, cache, rare=rare) for rare in (False, True))
-        plain = nominal_families(unit) if searched else ()
-        runs += [are_kept(unit, one, part, cache) for part in parts for one in plain]
-        return runs + (sum(atlases, []) if searched else [])
+        found = [are_kept(unit, family, observation, cache) for family in families]
+        plain = nominal_families(unit)
+        return found + [are_kept(unit, one, part, cache) for part in parts for one in plain]
 
     before = kept()
     with counting() as effort:
-        share = 0.5 if searched else 1.0
         for first in range(0, len(families), _AT_ONCE):
             some = families[first : first + _AT_ONCE]
             low, high = first / len(families), (first + len(some)) / len(families)
-            tell = part_of(progress, share * low, share * high, "for the estimate")
+            tell = part_of(progress, 0.9 * low, 0.9 * high, "for the estimate")
             run_families(unit, some, observation, cache=cache, executor=executor, progress=tell)
-        if searched:
-            for rare, low, high in ((False, 0.5, 0.85), (True, 0.85, 1.0)):
-                tell = part_of(progress, low, high, "for the diagnosis")
-                make_atlas(unit, coarse, cache, executor, tell, rare=rare)
-            for part in parts:
-                nominal_of(unit, part, cache, executor)
+        for part in parts:
+            nominal_of(unit, part, cache, executor)
+        if progress is not None:
+            progress(1.0, "for the diagnosis")
     return Prepared(effort.simulated_s, len(before), sum(before), sum(kept()))
 
 

@@ -3,7 +3,7 @@
 Owns one file of answers, a line of JSON a set; answers that are there are kept. Run it with the
 interpreter of the version in question, by the path of this file. It must not read a truth.
 
-    PYTHON tests/studies/answer.py FOLDER ANSWERS [--part K/N] [--by posterior]
+    PYTHON tests/studies/answer.py FOLDER ANSWERS [--part K/N] [--tolerance SHARE]
 """
 
 from __future__ import annotations
@@ -36,7 +36,6 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("answers", type=Path)
     parser.add_argument("--part", default="0/1")
-    parser.add_argument("--by", choices=["search", "posterior"], default="search")
     given = parser.parse_args()
     part, parts = map(int, given.part.split("/"))
     given.answers.parent.mkdir(parents=True, exist_ok=True)
@@ -49,13 +48,7 @@ def main() -> None:
         response = read_response(given.folder / f"{task['set']}.h5")
         used_s = time.process_time()
         found = diagnose_response(
-            response,
-            load_unit(task["unit"]),
-            without=task["withheld"],
-            cache=cache,
-            seed=place,
-            # Versions before there was a choice know no such word.
-            **({} if given.by == "search" else {"way": given.by}),
+            response, load_unit(task["unit"]), without=task["withheld"], cache=cache, seed=place
         )
         answer = {"set": task["set"], "processor_s": time.process_time() - used_s}
         content = found.to_json()

@@ -73,7 +73,7 @@ def calls(monkeypatch):
 
     made = []
 
-    def known(response, unit, *, further, cache, executor, progress, way="search"):
+    def known(response, unit, *, further, cache, executor, progress):
         assert executor is None
         made.append((response, unit, cache))
         made.extend((one, unit, cache) for one in further)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from daq.errors import InputError
 from tui.executors import executor_at
@@ -42,7 +42,6 @@ def diagnose(
     *further: Path,
     unit: UnitName,
     paper: bool = False,
-    by: Literal["search", "posterior"] = "search",
     plots: Plots = None,
     json: Json = False,
     as_is: bool = False,
@@ -65,9 +64,6 @@ def diagnose(
         Other sweeps of the same unit, diagnosed together with the first.
     paper
         Diagnose the paper's own measured frequencies and gains in place of a file.
-    by
-        What chooses the sets of causes that are simulated: a search over all of them, or the
-        trained posterior of the unit (under trial; see `prepare`).
     as_is
         Take a response as it stands, also if it looks like a mistake.
     """
@@ -78,8 +74,6 @@ def diagnose(
 
     if paper and given != NO_OPTIONS:
         raise InputError("--paper reads no file that an option could complete; leave it out")
-    if paper and by != "search":
-        raise InputError("--by is for responses; the paper's numbers have a search of their own")
     if paper and cluster is not None:
         raise InputError("--cluster is for responses; the paper's numbers are diagnosed here")
     subject = load_unit(unit).with_tolerance(tolerance_shares(tolerance))
@@ -106,7 +100,7 @@ def diagnose(
         said += _settings((response, *others), subject, as_is, executor, console)
         result = diagnose_response(
             response, subject, further=others, cache=cache_folder(), executor=executor,
-            progress=console.progress, way=by,
+            progress=console.progress,
         )  # fmt: skip
     if said:
         result = replace(result, warnings=(*said, *result.warnings))
