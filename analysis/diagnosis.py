@@ -35,6 +35,7 @@ from analysis.second_thoughts import UNDOING, think_again
 from analysis.settled import settled
 from analysis.sharpening import sharpen_candidate
 from analysis.sizing import size_candidate, widen_if_open
+from analysis.stages import Record
 from analysis.stated_error import error_doubts
 from analysis.surely_off import hold_against_datasheet
 from analysis.swept import check_together, unit_doubts
@@ -157,14 +158,17 @@ def _diagnose(
             f"no posterior for unit {unit.name} was trained, nor for one like it; run: "
             "lashbench prepare --unit FILE"
         )
-    refined = refine(
-        posterior, observed, without=without, seed=seed, executor=executor, progress=early
-    )
+    record = Record()
+    with record.stage("refine"):
+        refined = refine(
+            posterior, observed, without=without, seed=seed, executor=executor, progress=early
+        )
     candidates = refined.candidates
     observation = candidates[0].surface.observation
     rng = np.random.default_rng(seed)
-    verdict = judge_candidates(candidates, observation, rng)
-    base = size_candidate(verdict.baseline.candidate, observation, rng)
+    with record.stage("judge"):
+        verdict = record.verdict = judge_candidates(candidates, observation, rng)
+        base = size_candidate(verdict.baseline.candidate, observation, rng)
 
     def sharpened(one: Judged) -> Calibrated:
         late = part_of(progress, 0.8, 0.9, "sizing it")
@@ -172,16 +176,20 @@ def _diagnose(
 
     sharp = None
     if verdict.word != "unexplained":
-        sharp = sharpened(verdict.best)
-        held = hold_against_datasheet(verdict, sharp)
-        while held.best is not verdict.best and held.word != "unexplained":
-            # What is left of several causes, or none, is sized and asked the same.
-            verdict, sharp = held, sharpened(held.best)
+        with record.stage("sharpen"):
+            sharp = sharpened(verdict.best)
             held = hold_against_datasheet(verdict, sharp)
-        # Last, as what shares its probability is no reason to name what is the datasheet's.
-        held = hold_against_doubt(held)
-        # Chance of its own: where nothing is refused all comes out as if it were not asked.
-        verdict = think_again(held, sharp.mean, observation, rng.spawn(1)[0], executor)
+            while held.best is not verdict.best and held.word != "unexplained":
+                # What is left of several causes, or none, is sized and asked the same.
+                verdict, sharp = held, sharpened(held.best)
+                held = hold_against_datasheet(verdict, sharp)
+            record.verdict = held
+        with record.stage("criticise"):
+            # Last, as what shares its probability is no reason to name what is the datasheet's.
+            held = hold_against_doubt(held)
+            # Chance of its own: where nothing is refused all comes out as if it were not asked.
+            verdict = think_again(held, sharp.mean, observation, rng.spawn(1)[0], executor)
+            record.verdict = verdict
         sharp = None if verdict.word == "unexplained" else sharp
     named = verdict.word in ("explained", "ambiguous")
     base = widen_if_open(base, verdict.baseline.candidate, observation, rng)
@@ -191,9 +199,11 @@ def _diagnose(
     unseen: tuple[Unseen, ...] = ()
     if verdict.word != "unexplained":
         unseen = limits(posterior, refined.summary, verdict.best.effects if named else (), without)
-    proposal = _proposal(unit, verdict, observation, seed, executor, progress)
-    # Chance of its own: sizing what is left beside the answer does not change the answer.
-    models = models_left(verdict, best, base if named else best, observation, rng.spawn(1)[0])
+    with record.stage("next measurement"):
+        proposal = _proposal(unit, verdict, observation, seed, executor, progress)
+    with record.stage("models"):
+        # Chance of its own: sizing what is left beside the answer does not change the answer.
+        models = models_left(verdict, best, base if named else best, observation, rng.spawn(1)[0])
     if progress is not None:
         progress(1.0, "done")
     return Diagnosis(
@@ -212,6 +222,7 @@ def _diagnose(
         models=models,
         believed=believed_document(unit),
         lent_by=posterior.lent_by,
+        stages=tuple(record.stages),
     )
 
 

@@ -17,6 +17,7 @@ from analysis.misfit import Departure
 from analysis.models import Model, backlash_document, backlash_lines
 from analysis.next_measurement import CLEAR_SIGMA, NextMeasurement
 from analysis.observation import Observation
+from analysis.stages import Stage
 from analysis.swept import sweep_document, sweep_lines
 from analysis.unseen import Unseen, head_unseen, list_unseen
 from analysis.verdict import Judged, Verdict, is_nothing_hidden
@@ -61,8 +62,8 @@ class Diagnosis:
     cause may be all the same where nothing is missing, or each other one beside what is named.
     `models`: every model that may be true with its backlash, the accepted or likeliest first.
     `believed`: what was believed of the datasheet (`analysis.believed`). `lent_by`: the unit whose
-    posterior was used, where this one has none. `simulated_s`: seconds of motion that were
-    simulated for it.
+    posterior was used, where this one has none. `stages`: what each stage cost and led to.
+    `simulated_s`: seconds of motion that were simulated for it.
     """
 
     unit: str
@@ -81,6 +82,7 @@ class Diagnosis:
     models: tuple[Model, ...] = ()
     believed: Mapping[str, Any] = field(default_factory=dict)
     lent_by: str = ""
+    stages: tuple[Stage, ...] = ()
     warnings: tuple[str, ...] = ()
     elapsed_s: float = 0.0
     simulated_s: float = 0.0
@@ -198,6 +200,7 @@ class Diagnosis:
                 "extended": self.extended.structure,
             },
             "next_measurement": None if proposal is None else proposal.to_json(),
+            "info": [one.to_json() for one in self.stages],
             "warnings": list(self.warnings),
             "elapsed_s": self.elapsed_s,
             "simulated_s": self.simulated_s,

@@ -28,17 +28,21 @@ Vector = NDArray[np.float64]
 
 __all__ = ["Refined", "refine"]
 
-_SHARE, _MOST = 0.99, 8
+_SHARE, _MOST = 0.99, 24
 """Sets that are refined first hold this share of the probability; at most so many."""
 
-_BESIDE = 4
+_BESIDE = 6
 """Sets that hold what leads and one more cause that are refined next."""
 
-_FIRST_GROUPS, _GROUPS = 4, 6
-"""Groups of five runs that a set gets at first, and in each round."""
+_FIRST_GROUPS = 4
+"""Groups of five runs that a set gets at first."""
 
-_ROUNDS, _CONTENDERS, _NEAR = 3, 4, 60.0
-"""Rounds after these, sets that take part in each, and how far behind they may lie."""
+_ROUNDS = ((8, 600.0, 4), (4, 300.0, 6), (4, 150.0, 6), (4, 60.0, 6))
+"""Rounds after these: sets that take part at most, how far behind the first they may lie in
+log-likelihood, and groups that each gets. What few runs say of a set is that uncertain."""
+
+_PARTS = 600.0
+"""How far behind a part of what leads may lie and still take part in every round."""
 
 _WIDE, _LEAST_REACH, _MOST_REACH = 2.0, (0.06, 0.03), (0.35, 0.3)
 """Runs lie within so many standard deviations of the network's answer; least and most in ratio and
@@ -94,10 +98,11 @@ def refine(
     look_at([*first, *_parts(sets, int(first[0]))])
     fine.hear()
     look_at(_supersets(posterior, fine.best.hypothesis.effects, probability))
-    for _ in range(_ROUNDS):
-        near = fine.leading(_CONTENDERS, _NEAR)
-        parts = [key for key in found if set(key) < set(near[0])]
-        fine.settle(list(dict.fromkeys([*near, *parts])), _GROUPS)
+    for most, behind, groups in _ROUNDS:
+        near = fine.leading(most, behind)
+        # A part of what leads has fewer sizes to fit with, and may be all that there is.
+        parts = [key for key in fine.leading(len(found), _PARTS) if set(key) < set(near[0])]
+        fine.settle(list(dict.fromkeys([*near, *parts])), groups)
     fine.hear()
     candidates = sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
     return Refined(candidates, summary, tuple(found.values()))
