@@ -116,6 +116,11 @@ class Observation:
         """The same reading with another noise of its own, V."""
         return replace(self, noise_v=noise_v, noise=self.noise * (noise_v / self.noise_v))
 
+    def thinned(self, stride: int) -> Observation:
+        """Every `stride`-th frequency of each level only."""
+        kept = np.concatenate([np.arange(b.start, b.stop)[::stride] for b in self.blocks])
+        return self.at_rows(kept)
+
     def at_rows(self, kept: NDArray[np.int64]) -> Observation:
         """Some rows (ascending indices) only."""
         plans = []

@@ -34,15 +34,18 @@ _SHARE, _MOST = 0.99, 24
 _BESIDE = 6
 """Sets that hold what leads and one more cause that are refined next."""
 
+_FREQUENCIES = 20
+"""Frequencies of each level that the first look takes, or more."""
+
 _FIRST_GROUPS = 4
-"""Groups of five runs that a set gets at first."""
+"""Groups of five runs that a set gets at first, and again where it is kept."""
 
-_ROUNDS = ((8, 600.0, 4), (4, 300.0, 6), (4, 150.0, 6), (4, 60.0, 6))
-"""Rounds after these: sets that take part at most, how far behind the first they may lie in
-log-likelihood, and groups that each gets. What few runs say of a set is that uncertain."""
+_KEPT, _NEAR = 8, 600.0
+"""Sets that are kept after the first look: so many, no further behind in log-likelihood."""
 
-_PARTS = 600.0
-"""How far behind a part of what leads may lie and still take part in every round."""
+_ROUNDS = ((4, 200.0, 6), (4, 60.0, 8))
+"""Rounds on all frequencies: sets that take part at most, how far behind the first they may lie,
+and groups that each gets."""
 
 _WIDE, _LEAST_REACH, _MOST_REACH = 2.0, (0.06, 0.03), (0.35, 0.3)
 """Runs lie within so many standard deviations of the network's answer; least and most in ratio and
@@ -83,29 +86,58 @@ def refine(
     order = np.argsort(-probability)
     held = np.cumsum(probability[order])
     first = order[: min(int(np.searchsorted(held, _SHARE)) + 1, _MOST)]
-    report = part_of(progress, 0.0, 1.0, "simulating the likeliest causes")
-    fine = Hunt(unit, observation, np.random.default_rng(seed), executor, report)
+    rng = np.random.default_rng(seed)
+    longest = max(block.stop - block.start for block in observation.blocks)
+    few = observation.thinned(max(longest // _FREQUENCIES, 1))
+    report = part_of(progress, 0.0, 0.4, "simulating the likeliest causes")
+    coarse = Hunt(unit, few, rng, executor, report)
     found: dict[Effects, SetPosterior] = {}
+    reaches: dict[Effects, Reach] = {}
 
     def look_at(numbers: Iterable[int]) -> None:
         names = [tuple(sorted(posterior.scales.sets.names(int(n)))) for n in numbers]
         new = {k: n for k, n in zip(names, numbers, strict=True) if k not in found}
         for key, number in new.items():
             found[key] = posterior.given(summary, int(number), float(probability[number]))
-        fine.start({k: _placed(Hypothesis(unit, k), found[k], fine) for k in new}, _FIRST_GROUPS)
+        starts = {key: _placed(Hypothesis(unit, key), found[key], coarse) for key in new}
+        reaches.update({key: reach for key, (_, reach) in starts.items()})
+        coarse.start(starts, _FIRST_GROUPS)
 
     sets = posterior.scales.sets
     look_at([*first, *_parts(sets, int(first[0]))])
+    coarse.hear()
+    look_at(_supersets(posterior, coarse.best.hypothesis.effects, probability))
+    coarse.settle(_kept(coarse), _FIRST_GROUPS)
+    report = part_of(progress, 0.4, 1.0, "comparing the likeliest causes")
+    fine = Hunt(unit, observation, rng, executor, report)
+    kept = dict.fromkeys([*_kept(coarse), ()])
+    fine.start({k: (coarse.found[k].best.place, _nearer(reaches[k])) for k in kept}, _FIRST_GROUPS)
     fine.hear()
-    look_at(_supersets(posterior, fine.best.hypothesis.effects, probability))
     for most, behind, groups in _ROUNDS:
         near = fine.leading(most, behind)
-        # A part of what leads has fewer sizes to fit with, and may be all that there is.
-        parts = [key for key in fine.leading(len(found), _PARTS) if set(key) < set(near[0])]
-        fine.settle(list(dict.fromkeys([*near, *parts])), groups)
+        fine.settle(list(dict.fromkeys([*near, *_parts_of(near[0], fine)])), groups)
     fine.hear()
     candidates = sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
     return Refined(candidates, summary, tuple(found.values()))
+
+
+def _kept(coarse: Hunt) -> list[Effects]:
+    """Sets that the first look leaves, and parts of the first of them.
+
+    A part has fewer sizes to fit with, and may be all that there is.
+    """
+    near = coarse.leading(_KEPT, _NEAR)
+    return list(dict.fromkeys([*near, *_parts_of(near[0], coarse)]))
+
+
+def _parts_of(whole: Effects, fine: Hunt) -> list[Effects]:
+    """Parts of a set that are not out of the question."""
+    return [key for key in fine.leading(len(fine.found), _NEAR) if set(key) < set(whole)]
+
+
+def _nearer(reach: Reach) -> Reach:
+    """Half as far, where a first look has been taken."""
+    return max(0.5 * reach[0], _LEAST_REACH[0]), np.maximum(0.5 * reach[1], _LEAST_REACH[1])
 
 
 def _parts(sets: CauseSets, number: int) -> list[int]:
