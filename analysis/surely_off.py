@@ -42,9 +42,9 @@ def hold_against_datasheet(verdict: Verdict, found: Calibrated) -> Verdict:
     Verdict
         If all of it is within the tolerance of the datasheet, that nothing is missing. If the best
         set is of one cause, that nothing is missing, or that nothing explains it where
-        the plain model does not. If it is of several, that the rest is named, and the whole its
-        rival; or the rest is a rival, where its own runs are too few or too far to say that it will
-        do: all of them as the datasheet has that value are the rest.
+        the plain model does not. If it is of several, that the rest is named: the whole is the rest
+        where it has that value as the datasheet does. Where the rest by its own runs is refused, or
+        behind a set that does not hold it, it is a rival of the whole.
     """
     best = verdict.best
     named = verdict.word in ("explained", "ambiguous")
@@ -68,20 +68,26 @@ def hold_against_datasheet(verdict: Verdict, found: Calibrated) -> Verdict:
 
 
 def _with_part(verdict: Verdict, rest: Effects) -> Verdict:
-    """The rest of the best set named before the whole if it leads all others, or its rival."""
+    """The rest of the best set named before the whole if it leads all others, or its rival.
+
+    Sets that hold the rest are no others: with its sizes as the datasheet has them, each is the
+    rest.
+    """
     best, judged = verdict.best, verdict.judged
     part = next((one for one in judged if one.effects == rest), None)
     if part is None:
         return verdict
-    others = (one for one in judged if one.adequate and one is not best)
+    others = [one for one in judged if one.adequate and not set(one.effects) > set(rest)]
     if part.adequate and part.score >= max(one.score for one in others):
         judged = put_behind(judged, best, part, AS_THE_DATASHEET)
-        first, rival = _among(judged, rest), _among(judged, best.effects)
-    else:
-        first, rival = best, replace(part, objection="")
-        judged = tuple(rival if one is part else one for one in judged)
+        baseline = _among(judged, ())
+        also = tuple(_among(judged, e.effects) for e in verdict.also if not set(e.effects) > {*rest})
+        named = Verdict("explained", _among(judged, rest), judged, baseline, also)
+        return replace(named, word="ambiguous") if named.rivals else named
+    rival = replace(part, objection="")
+    judged = tuple(rival if one is part else one for one in judged)
     also = tuple(_among(judged, one.effects) for one in (*verdict.also, rival))
-    return Verdict("ambiguous", first, judged, _among(judged, ()), also)
+    return Verdict("ambiguous", best, judged, _among(judged, ()), also)
 
 
 def _among(judged: Sequence[Judged], effects: Effects) -> Judged:
