@@ -81,7 +81,8 @@ def _with_part(verdict: Verdict, rest: Effects) -> Verdict:
     if part.adequate and part.score >= max(one.score for one in others):
         judged = put_behind(judged, best, part, AS_THE_DATASHEET)
         baseline = _among(judged, ())
-        also = tuple(_among(judged, e.effects) for e in verdict.also if not set(e.effects) > {*rest})
+        apart = (one for one in verdict.also if not set(one.effects) > set(rest))
+        also = tuple(_among(judged, one.effects) for one in apart)
         named = Verdict("explained", _among(judged, rest), judged, baseline, also)
         return replace(named, word="ambiguous") if named.rivals else named
     rival = replace(part, objection="")

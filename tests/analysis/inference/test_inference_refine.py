@@ -34,15 +34,15 @@ def test_a_pair_is_found_where_only_its_causes_were_proposed(runs):
     assert leader.best.place == pytest.approx([0.4, 0.7, 0.3], abs=0.1)
 
 
-def test_the_plain_model_and_every_part_of_what_is_proposed_first_are_there(runs):
+def test_every_part_of_what_is_proposed_first_is_looked_at(runs):
     found = refine(Untrained((LAG, LOAD, MESH)), observed((LAG, LOAD, MESH), [0.8, 0.3, 0.7]))
     first = max(found.proposed, key=lambda one: one.probability).effects
-    keys = {one.hypothesis.effects for one in found.candidates}
-    assert () in keys
+    looked_at = {tuple(sorted(one.effects)) for one in found.proposed}
     for effect in first:
-        assert tuple(sorted(set(first) - {effect})) in keys
-    assert keys == set(runs)
-    assert len(found.proposed) == len(keys)
+        assert tuple(sorted(set(first) - {effect})) in looked_at
+    # The plain model is compared in any case, others where they came near.
+    keys = {one.hypothesis.effects for one in found.candidates}
+    assert {(), (LAG, LOAD, MESH)} <= keys <= looked_at
 
 
 def test_what_is_left_out_of_the_catalogue_is_not_simulated(runs):
