@@ -1,8 +1,8 @@
 """What speaks against a set of causes by itself.
 
 Owns the limits beyond which a set is no explanation, whatever the others do, fixed on simulated
-sets before any practice set was judged by them, but for one (`_STRUCTURED`; docs/decisions/0016)
-and what a jump is forgiven (docs/decisions/0029). It ranks nothing.
+sets before any practice set was judged by them, but for one (`_STRUCTURED`; docs/decisions, 16)
+and what a jump is forgiven (the same record). It ranks nothing.
 """
 
 from __future__ import annotations

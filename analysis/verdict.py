@@ -2,7 +2,7 @@
 
 Owns how sets are held against one another: what each is worth, who leads, by what it must lead, and
 who is a rival. Its thresholds were fixed on simulated sets before any practice set was judged by
-them, but for how near a rare rival is (docs/decisions/0039). What speaks against a set by itself is
+them, but for how near a rare rival is (docs/decisions/archive.md, 39). What speaks against a set by itself is
 `analysis.objection`'s. It simulates nothing.
 """
 

@@ -178,10 +178,25 @@ def test_every_page_can_be_reached_from_the_index():
 def test_the_architecture_lists_every_decision_by_its_title():
     page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
     listed = re.findall(r"^- \[(\d+\. .+)\]\(decisions/(.+\.md)\)$", page, re.MULTILINE)
-    records = sorted((ROOT / "docs" / "decisions").glob("*.md"))
+    records = sorted((ROOT / "docs" / "decisions").glob("[0-9]*.md"))
     assert [name for _, name in listed] == [file.name for file in records]
     for (title, _), file in zip(listed, records, strict=True):
         assert file.read_text(encoding="utf-8").startswith(f"# {title}\n")
+
+
+def test_a_decision_record_has_the_usual_parts_and_is_short():
+    parts = ["Status", "Context", "Decision", "Evidence", "Consequences"]
+    for file in sorted((ROOT / "docs" / "decisions").glob("[0-9]*.md")):
+        text = file.read_text(encoding="utf-8")
+        assert re.findall(r"^## (.+)$", text, re.MULTILINE) == parts, file.name
+        assert len(re.findall(r"\S*\w\S*", text)) < 300, file.name
+
+
+def test_every_number_is_a_record_or_a_line_of_the_archive():
+    folder = ROOT / "docs" / "decisions"
+    kept = [int(file.name[:4]) for file in folder.glob("[0-9]*.md")]
+    lines = re.findall(r"^\| (\d+) \|", (folder / "archive.md").read_text(), re.MULTILINE)
+    assert sorted([*kept, *map(int, lines)]) == list(range(1, 64))
 
 
 def test_the_citation_is_of_this_version():
