@@ -1,9 +1,9 @@
 """From candidates to a verdict: consistent, explained, ambiguous or unexplained.
 
-Owns how sets are held against one another: what each is worth, who leads, by what it must lead, and
-who is a rival. Its thresholds were fixed on simulated sets before any practice set was judged by
-them, but for how near a rare rival is (docs/decisions/archive.md, 39). What speaks against a set by itself is
-`analysis.objection`'s. It simulates nothing.
+Owns how sets are compared: the score of each, the best one, the lead that it needs, and its rivals.
+Thresholds were fixed on simulated sets before any practice set was judged, except how near a rare
+rival is (docs/decisions/archive.md, 39). `analysis.objection` owns what speaks against one set.
+It simulates nothing.
 """
 
 from __future__ import annotations
@@ -350,7 +350,7 @@ def _part_that_will_do(
 def put_behind(
     judged: Sequence[Judged], one: Judged, part: Judged, objection: str
 ) -> tuple[Judged, ...]:
-    """A set that has not earned its name is as far behind its part as what nobody would name."""
+    """Put a set that owes its lead to chance far behind the part that does as well."""
     score = min(one.score, part.score - FALSE_ALARM)
     behind = replace(one, score=score, objection=objection)
     return _ranked([behind if other is one else other for other in judged])

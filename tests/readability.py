@@ -58,7 +58,7 @@ def pages(root: Path) -> list[Path]:
 
 
 def texts(page: Path) -> Iterator[tuple[str, str]]:
-    """("prose" or "cell", text) of a page, where code is one word each and headings are left out."""
+    """("prose" or "cell", text) of a page; code is one word, and headings are left out."""
     within = ""
     for block in MarkdownIt().enable("table").parse(page.read_text(encoding="utf-8")):
         if block.type in ("heading_open", "td_open", "th_open"):

@@ -1,7 +1,7 @@
 """Profiles: how the text files of a program are laid out, under a name.
 
-Owns the TOML form of a profile, where profiles are found, and by which signs a file is told to be
-of one. A profile holds no data and reads no response.
+Owns the TOML form of a profile, where profiles are found, and by which signs the profile of a file
+is recognised. A profile holds no data and reads no response.
 """
 
 from __future__ import annotations
