@@ -30,6 +30,8 @@ class SessionControl:
     def __init__(self) -> None:
         self._paused = False
         self._reasons: dict[Cut, str] = {}
+        self.asked = 0
+        """How often an end was asked for; who waits for something else may take one more for it."""
 
     def pause(self) -> None:
         """Hold after the point in hand, with the source off, until `go_on` or a cut."""
@@ -41,15 +43,19 @@ class SessionControl:
 
     def stop(self, reason: str = "asked to stop") -> None:
         """End when the point in hand is finished."""
-        self._reasons.setdefault("stop", reason)
+        self._ask("stop", reason)
 
     def interrupt(self, reason: str = "interrupted") -> None:
         """End at once; the measurement can be resumed."""
-        self._reasons.setdefault("interrupt", reason)
+        self._ask("interrupt", reason)
 
     def abort(self, reason: str = "aborted by the operator") -> None:
         """End at once and for good."""
-        self._reasons.setdefault("abort", reason)
+        self._ask("abort", reason)
+
+    def _ask(self, cut: Cut, reason: str) -> None:
+        self.asked += 1
+        self._reasons.setdefault(cut, reason)
 
     @property
     def paused(self) -> bool:

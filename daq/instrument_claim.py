@@ -193,5 +193,8 @@ def _visa_name(resource: str) -> str:
     board = re.sub(r"\D", "", kind) or "0"
     if kind.upper().startswith("GPIB"):
         return " ".join(["gpib", str(int(board)), *(str(int(part)) for part in parts)])
+    if kind.upper().startswith("USB"):
+        vendor, product = (int(part, 16 if "x" in part.lower() else 10) for part in parts[:2])
+        return f"usb {vendor:04x} {product:04x} {parts[2]}"
     device = parts[1].lower() if len(parts) > 1 else "inst0"
     return f"vxi11 {_host(parts[0])} {device}"

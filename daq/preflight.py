@@ -23,6 +23,7 @@ __all__ = [
     "check_identity",
     "check_source",
     "check_trial",
+    "check_wire",
     "limits_line",
     "take_trial",
 ]
@@ -144,6 +145,19 @@ def take_trial(
             "do what it is told"
         )
     return points[0], gentle
+
+
+def check_wire(analyser: Analyser) -> Iterator[CheckLine]:
+    """Say what the way to the instrument turned out not to have, and what follows."""
+    lacks = tuple(getattr(analyser, "wire_lacks", ()))
+    if not lacks:
+        return
+    follows = {
+        "serial poll": "the end of a point is asked for with *ESR?",
+        "device clear": "a parser that hangs cannot be freed, nor the source be switched off then",
+    }
+    told = "; ".join(follows[lack] for lack in lacks if lack in follows)
+    yield CheckLine("wire", "note", f"no {' and no '.join(lacks)} on this way: {told}")
 
 
 def check_trial(

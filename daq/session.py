@@ -20,7 +20,14 @@ from daq.aside import Aside
 from daq.control import Cancelled, SessionControl
 from daq.errors import Interrupted, LashbenchError, MeasurementError
 from daq.frf import PointFlag
-from daq.preflight import check_identity, check_source, check_trial, limits_line, take_trial
+from daq.preflight import (
+    check_identity,
+    check_source,
+    check_trial,
+    check_wire,
+    limits_line,
+    take_trial,
+)
 from daq.repeat import compare
 from daq.session_agenda import Pace
 from daq.session_events import (
@@ -180,6 +187,7 @@ class Session:
             gain_im=point.gain.imag,
             flags=int(point.flags),
         )
+        yield from journal.told(check_wire(self._instrument.analyser))
         yield from journal.told(check_trial(point, trial, self._plan, self._request.plausible))
 
     # ------------------------------------------------------------ measuring

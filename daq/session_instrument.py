@@ -12,6 +12,7 @@ from contextlib import suppress
 
 from daq.analyser import Analyser, SourceState
 from daq.control import SessionControl
+from daq.errors import LinkError
 from daq.watch import Watch
 
 __all__ = ["HeldInstrument"]
@@ -24,6 +25,8 @@ _OPENING_S = 12.0
 """Announced for opening a connection anew."""
 _RECONNECT_S = 0.3
 """Pause before a dead connection is opened anew; a gateway must see first that it is gone."""
+_RECONNECTING_S = 6.0
+"""How long it is tried while nobody is there: an adapter that restarts comes back."""
 
 
 class HeldInstrument:
@@ -102,17 +105,23 @@ class HeldInstrument:
         return SourceState.UNKNOWN
 
     def _connect(self, reopen: Callable[[], Analyser]) -> bool:
-        try:
-            # Whatever a dead connection has to say at its end is no reason not to try another.
-            with suppress(Exception):
-                self.analyser.close()
-            self._watch.beat(_OPENING_S)
-            time.sleep(_RECONNECT_S)
-            self.analyser = reopen()
-            self.analyser.on_exchange = self._watch.beat
-        except Exception:
-            return False
-        except KeyboardInterrupt:
-            self._control.interrupt("interrupted from the keyboard")
-            return False
-        return True
+        # Whatever a dead connection has to say at its end is no reason not to try another.
+        with suppress(Exception):
+            self.analyser.close()
+        until_s = time.monotonic() + _RECONNECTING_S
+        while True:
+            try:
+                self._watch.beat(_OPENING_S)
+                time.sleep(_RECONNECT_S)
+                self.analyser = reopen()
+                self.analyser.on_exchange = self._watch.beat
+            except LinkError:
+                if time.monotonic() > until_s:
+                    return False
+            except Exception:
+                return False
+            except KeyboardInterrupt:
+                self._control.interrupt("interrupted from the keyboard")
+                return False
+            else:
+                return True

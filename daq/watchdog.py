@@ -33,6 +33,8 @@ _BEAT_S = 1.0
 """A beat is said anew after so long at the latest."""
 _TAKING_S = 40.0
 """How long a session that lost the bench leaves the instrument to the child."""
+_SEEING_S = 60.0
+"""How long a session that could not prove the source off waits for its child to."""
 _DISMISSAL_S = 5.0
 _PAUSE_S = 0.02
 
@@ -139,6 +141,36 @@ class Watchdog(Watch):
             child = self._present()
         self._child = None
         child.let_go()
+
+    def see_to_it(self, look: Callable[[], bool]) -> str:
+        """Leave the source to the child, as `leave` does, and wait for what it proves.
+
+        Parameters
+        ----------
+        look
+            Called while it is waited; False ends the wait, not the child.
+
+        Returns
+        -------
+        str
+            State of the source; empty where the child has not said.
+        """
+        child = self._child
+        if child is None:
+            return ""
+        child.hear()
+        if not child.is_alive and self._starts < _STARTS:
+            self._replace()
+            child = self._present()
+        self._child = None
+        child.hang_up()
+        until_s = time.monotonic() + _SEEING_S
+        # It writes into the history after it has said what it proved, and ends then.
+        while child.is_alive and look() and time.monotonic() < until_s:
+            time.sleep(_PAUSE_S)
+            child.hear()
+        child.let_go()
+        return child.settled
 
     def write_down(self, state: str, text: str) -> None:
         """Let it write into the history, which does not answer now, that the source is off."""
@@ -279,6 +311,11 @@ class _Child:
             code = self._process.wait(1.0)
             return f"signal {-code}" if code < 0 else f"exit code {code}"
         return "it closed its pipe"
+
+    def hang_up(self) -> None:
+        """Speak no more to it, and hear what it says."""
+        with suppress(OSError):
+            self._in.close()
 
     def let_go(self) -> None:
         """Speak no more to it; it goes on by itself."""

@@ -19,12 +19,13 @@ import time
 from pathlib import Path
 
 from daq.analyser import SourceState
-from daq.errors import LashbenchError, MeasurementError
+from daq.errors import LashbenchError, LinkError, MeasurementError
 
 __all__ = ["load", "main", "make_safe", "write_down"]
 
 _TRIES, _TRYING_S = 5, 25.0
-"""How often the instrument is opened anew, and until when: the next session waits for this one."""
+"""How often the instrument is asked, and until when it is opened anew while nobody is there: an
+adapter that restarts comes back. The next session waits for this one."""
 _BETWEEN_S = 1.0
 _SLICE_S = 0.25
 """How long one wait for a word is; a longer one shows that this process itself stood still."""
@@ -84,19 +85,21 @@ def make_safe(url: str, tries: int = _TRIES) -> tuple[SourceState, str]:
     from daq.drivers import open_analyser
 
     state, found, until_s = SourceState.UNKNOWN, "", time.monotonic() + _TRYING_S
-    for left in reversed(range(tries)):
+    left, waits = tries, tries > 1
+    while True:
         try:
             analyser = open_analyser(url)
         except LashbenchError as error:
             found = f", and {error}"
+            left -= 0 if waits and isinstance(error, LinkError) else 1
         else:
             state = analyser.make_safe()
             analyser.close()
             found = f"; source {state.value}"
-        if state is SourceState.CONFIRMED_OFF or not left or time.monotonic() > until_s:
-            break
+            left -= 1
+        if state is SourceState.CONFIRMED_OFF or left < 1 or time.monotonic() > until_s:
+            return state, found
         time.sleep(_BETWEEN_S)
-    return state, found
 
 
 def write_down(history: Path, measurement: int, text: str, state: SourceState) -> None:
@@ -196,6 +199,7 @@ class _Stand:
 
     def _session_is_gone(self) -> None:
         state, found = make_safe(self._url)
+        self.say(f"settled {state.value}")
         self._write(f"the session ended without proving the source off{found}", state)
 
     def _take_over(self) -> None:

@@ -13,6 +13,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Literal
 
+from sim.adapter_arduino import ARDUINO_COMMANDS, READ_FLAG, SEND_FLAG
 from sim.adapter_dialects import PROLOGIX_USB, Dialect
 from sim.instrument.bus import Instrument, TalkState
 
@@ -78,12 +79,14 @@ class FakeAdapter:
         restart_s: float | None = None,
         paced: bool = False,
     ) -> None:
-        self._instrument = instrument
+        self.instrument = instrument
         self.dialect = dialect
-        self._own_address = instrument.gpib_address if address is None else address
+        self.own_address = instrument.gpib_address if address is None else address
         self._restart_s = dialect.restart_s if restart_s is None else restart_s
         self._rate = dialect.bytes_per_s if paced else 0.0
         self.eeprom_writes = 0
+        self.identity = {"name": "", "serial": "0" * 9, "verstr": "", "fwver": dialect.version}
+        """What ``++id`` answers; kept in the memory of an AR488."""
         self._output = bytearray()
         self._sent_at_s = -math.inf
         self._deaf_until = -math.inf
@@ -103,9 +106,10 @@ class FakeAdapter:
             "read_tmo_ms": dialect.read_ms,
             "savecfg": 1,
             "idn": 0,
+            "flags": 0,
         }
         self._secondary: int | None = None
-        self._verbose = False
+        self.verbose = False
         self._line = bytearray()
         self._literal: list[bool] = []
         self._escaped = False
@@ -194,7 +198,7 @@ class FakeAdapter:
         """Go on with what is under way."""
         if now_s < self._deaf_until:
             return
-        if fault := self._instrument.damage.link_fault("adapter-reset"):
+        if fault := self.instrument.damage.link_fault("adapter-reset"):
             self.restart(now_s, fault.seconds)
             return
         while self._jobs or self._waiting_lines:
@@ -208,14 +212,14 @@ class FakeAdapter:
                 self._command(line[2:].decode("ascii", "replace"), now_s)
             else:
                 self._queue_send(line)
-        if self.settings["auto"] == 3 and self._addressed and self._instrument.reply_ready:
+        if self.settings["auto"] == 3 and self._addressed and self.instrument.reply_ready:
             self._jobs.append(_Read("eoi"))
             self.pump(now_s)
 
     @property
     def _addressed(self) -> bool:
         """Whether the address set is the instrument's; it has no secondary one."""
-        return self.settings["addr"] == self._own_address and self._secondary is None
+        return self.settings["addr"] == self.own_address and self._secondary is None
 
     def _queue_send(self, line: bytes) -> None:
         if not self.settings["mode"]:
@@ -233,19 +237,21 @@ class FakeAdapter:
                 return self._work_send(job, now_s)
             case _Read():
                 return self._work_read(job, now_s)
-        byte = self._instrument.serial_poll() if self._addressed else None
+        byte = self.instrument.serial_poll() if self._addressed else None
         if byte is not None:
-            self._say(str(byte))
+            self.say(str(byte))
             return True
         return now_s >= job.deadline_s
 
     def _work_send(self, job: _Send, now_s: float) -> bool:
-        taken = self._instrument.listen(job.data, job.eoi) if self._addressed else 0
+        eoi = job.eoi and not self.dialect.late_eoi
+        taken = self.instrument.listen(job.data, eoi) if self._addressed else 0
         job.data = job.data[taken:]
         if taken:
             job.deadline_s = now_s + self.settings["read_tmo_ms"] / 1000.0
         if job.data and now_s < job.deadline_s:
             return False
+        self._flag(SEND_FLAG, "Send^OK")
         auto = self.settings["auto"]
         if auto == 1 or (auto == 2 and job.question):
             self._jobs.append(_Read("eoi"))
@@ -254,7 +260,7 @@ class FakeAdapter:
     def _work_read(self, job: _Read, now_s: float) -> bool:
         """One talk at a time; a silent end by time-out, the reply staying where it is."""
         while self._addressed and not job.silent:
-            talk = self._instrument.talk(1 if isinstance(job.until, int) else None)
+            talk = self.instrument.talk(1 if isinstance(job.until, int) else None)
             if talk.state is TalkState.NOTHING:
                 # The instrument has complained once; the bus stays quiet until the time-out.
                 job.silent = True
@@ -265,11 +271,19 @@ class FakeAdapter:
             job.deadline_s = now_s + self.settings["read_tmo_ms"] / 1000.0
             if talk.end and self.settings["eot_enable"]:
                 self._output.append(self.settings["eot_char"])
-            if talk.end and (job.until == "eoi" or self._eoi_always_ends):
+            by_eoi = talk.end and (job.until == "eoi" or self._eoi_always_ends)
+            if by_eoi or (isinstance(job.until, int) and talk.data[-1:] == bytes([job.until])):
+                self._flag(READ_FLAG, "Read^OK")
                 return True
-            if isinstance(job.until, int) and talk.data[-1:] == bytes([job.until]):
-                return True
-        return now_s >= job.deadline_s
+        if now_s < job.deadline_s:
+            return False
+        self._flag(READ_FLAG, "Read^OK")
+        return True
+
+    def _flag(self, bit: int, text: str) -> None:
+        """Say that something is done, if it was asked for and nothing reads by itself."""
+        if self.settings["flags"] & bit and not self.settings["auto"]:
+            self.say(text)
 
     @property
     def _eoi_always_ends(self) -> bool:
@@ -277,22 +291,26 @@ class FakeAdapter:
 
     # The adapter's own commands
 
-    def _say(self, text: str) -> None:
+    def say(self, text: str) -> None:
+        """Answer one line."""
         self._output += text.encode("ascii") + b"\r\n"
 
     def _command(self, text: str, now_s: float) -> None:
         words = text.split()
         name, values = (words[0].lower(), words[1:]) if words else ("", [])
-        if self._verbose:
-            self._say("++" + text)
+        if self.verbose:
+            self.say("++" + text)
         handler = getattr(self, f"_do_{name}", None) if name.isidentifier() else None
+        is_arduino = self.dialect.name == "ar488"
         if handler is not None:
             handler(values, now_s)
-        elif name in self.settings and (name != "idn" or self.dialect.name == "ar488"):
+        elif is_arduino and name in ARDUINO_COMMANDS:
+            ARDUINO_COMMANDS[name](self, values)
+        elif name in self.settings and (name not in ("idn", "flags") or is_arduino):
             self._set_or_show(name, values)
         else:
-            self._say("Unrecognized command")
-        if self._verbose:
+            self.say("Unrecognized command")
+        if self.verbose:
             self._output += b"> "
 
     def _set_or_show(self, name: str, values: list[str]) -> None:
@@ -303,17 +321,18 @@ class FakeAdapter:
             "addr": 30,
             "read_tmo_ms": self.dialect.longest_read_ms,
             "idn": 2,
+            "flags": 7,
         }
         if not values:
             shown = str(self.settings[name])
             if name == "addr" and self._secondary is not None:
                 shown += f" {self._secondary}"
-            self._say(shown)
+            self.say(shown)
             return
         low = 1 if name == "read_tmo_ms" else 0
         high = limits.get(name, 1)
         if not values[0].isdigit() or not low <= int(values[0]) <= high:
-            self._say("Invalid parameter")
+            self.say("Invalid parameter")
             return
         self.settings[name] = int(values[0])
         if name == "addr":
@@ -338,44 +357,43 @@ class FakeAdapter:
         self._jobs.append(_Read(until))
 
     def _do_spoll(self, values: list[str], now_s: float) -> None:
-        if values and values[0] != str(self._own_address):
+        is_arduino = self.dialect.name == "ar488"
+        if is_arduino and values and values[0].lower() == "all":
+            ARDUINO_COMMANDS["allspoll"](self, values)
+            return
+        # An AR488 polls each of a list, a Prologix the first.
+        if values and str(self.own_address) not in (values if is_arduino else values[:1]):
             return
         self._jobs.append(_Poll())
 
     def _do_srq(self, values: list[str], now_s: float) -> None:
-        self._say("1" if self._instrument.service_request else "0")
+        self.say("1" if self.instrument.service_request else "0")
 
     def _do_clr(self, values: list[str], now_s: float) -> None:
         if self._addressed:
-            self._instrument.device_clear()
+            self.instrument.device_clear()
 
     def _do_trg(self, values: list[str], now_s: float) -> None:
         if self._addressed:
-            self._instrument.trigger()
+            self.instrument.trigger()
 
     def _do_ifc(self, values: list[str], now_s: float) -> None:
         """Interface clear: the bus is quiet; queues and settings stay."""
 
     def _do_loc(self, values: list[str], now_s: float) -> None:
-        self._instrument.remote = False
+        self.instrument.remote = False
 
     def _do_llo(self, values: list[str], now_s: float) -> None:
-        self._instrument.local_lockout = True
+        self.instrument.local_lockout = True
 
     def _do_rst(self, values: list[str], now_s: float) -> None:
         self.restart(now_s)
 
     def _do_ver(self, values: list[str], now_s: float) -> None:
-        self._say(self.dialect.version)
-
-    def _do_verbose(self, values: list[str], now_s: float) -> None:
-        if self.dialect.name != "ar488":
-            self._say("Unrecognized command")
-            return
-        self._verbose = not self._verbose
-        self._say(f"Verbose: {'ON' if self._verbose else 'OFF'}")
+        real = bool(values) and values[0].lower() == "real"
+        self.say((not real and self.identity["verstr"]) or self.dialect.version)
 
     def _do_help(self, values: list[str], now_s: float) -> None:
-        self._say("The following commands are available:")
+        self.say("The following commands are available:")
         for name in sorted((*self.settings, "clr", "ifc", "read", "rst", "spoll", "srq", "ver")):
-            self._say(f"++{name}")
+            self.say(f"++{name}")

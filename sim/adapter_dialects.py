@@ -5,10 +5,10 @@ Owns their texts, limits and presets, taken from manuals and firmware sources.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
-__all__ = ["AR488", "PROLOGIX_ETHERNET", "PROLOGIX_USB", "Dialect"]
+__all__ = ["AR488", "AR488_LATE_EOI", "PROLOGIX_ETHERNET", "PROLOGIX_USB", "Dialect"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +29,8 @@ class Dialect:
         Seconds of deafness after a start.
     bytes_per_s
         Speed of a real serial line, 0 for a USB chip or a network.
+    late_eoi
+        EOI is asserted after the last byte instead of with it, so that no instrument sees it.
     """
 
     name: Literal["prologix", "ar488"]
@@ -44,6 +46,7 @@ class Dialect:
     restart_s: float
     bytes_per_s: float
     greeting: bytes = b""
+    late_eoi: bool = False
 
 
 PROLOGIX_USB = Dialect(
@@ -59,3 +62,4 @@ AR488 = Dialect(
     "AR488 GPIB controller, ver. 0.53.04, 13/04/2025",
     32000, 1200, 1, 0, 0, 0, 128, False, 2.0, 11520.0, b"AR488 starting\r\n",
 )  # fmt: skip
+AR488_LATE_EOI = replace(AR488, late_eoi=True)

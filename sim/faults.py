@@ -45,6 +45,7 @@ class FaultKind:
 
 CATALOGUE: dict[str, FaultKind] = {
     "dropped-connection": FaultKind("the connection breaks", point=3),
+    "link-away": FaultKind("the adapter or gateway starts anew", point=3, seconds=3.0),
     "silence": FaultKind("the instrument falls silent", point=3, seconds=_FOREVER),
     "slow-reply": FaultKind("a reply comes late", phase="read-out", seconds=4.0),
     "garbage-bytes": FaultKind("noise bytes come before a reply", phase="read-out", size=5),

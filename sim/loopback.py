@@ -115,7 +115,8 @@ class Loopback:
         self._check_link()
 
     def _check_link(self) -> None:
-        if self.instrument.damage.link_fault("dropped-connection"):
+        damage = self.instrument.damage
+        if damage.link_fault("dropped-connection") or damage.link_fault("link-away"):
             self._closed = True
             raise LinkError(f"{self.address}: the connection was lost at {self._waiting!r}")
 

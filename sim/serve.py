@@ -15,7 +15,13 @@ from types import TracebackType
 
 from daq.errors import LinkError
 from sim.adapter import FakeAdapter
-from sim.adapter_dialects import AR488, PROLOGIX_ETHERNET, PROLOGIX_USB, Dialect
+from sim.adapter_dialects import (
+    AR488,
+    AR488_LATE_EOI,
+    PROLOGIX_ETHERNET,
+    PROLOGIX_USB,
+    Dialect,
+)
 from sim.instrument.bus import Instrument
 from sim.instrument.pace import ByTheClock, Fast, Pace
 from sim.instrument.serial_line import SerialInstrument, SerialLine
@@ -28,6 +34,7 @@ _TICK_S = 0.005
 _LIVELY_TICK_S = 0.0005
 _IDLE_S = 0.25
 _FAST_RESTART_S = 0.2
+_ARDUINOS = {"ar488": AR488, "ar488-late-eoi": AR488_LATE_EOI}
 
 
 class Server:
@@ -46,7 +53,8 @@ class Server:
     serial_pty
         The instrument again, where a pseudo-terminal is to be its RS-232 interface; else None.
     dialect
-        ``"prologix"`` or ``"ar488"``: what the pseudo-terminal and the TCP bridge pretend to be.
+        What the pseudo-terminal and the TCP bridge pretend to be: ``"prologix"``, ``"ar488"``, or
+        ``"ar488-late-eoi"``, the firmware whose EOI comes after the last byte.
 
     Raises
     ------
@@ -71,6 +79,7 @@ class Server:
         self._wake_read, self._wake_write = os.pipe()
         self._selector.register(self._wake_read, selectors.EVENT_READ)
         self._stopping = False
+        self._away_until: float | None = None
         self._cables: list[Cable] = []
         self._listeners: list[Listener] = []
         self._clients: list[RawClient | AdapterClient] = []
@@ -81,10 +90,10 @@ class Server:
             if tcp is not None:
                 self._listen("tcp", tcp, None)
             if prologix_tcp is not None:
-                bridge = AR488 if dialect == "ar488" else PROLOGIX_ETHERNET
+                bridge = _ARDUINOS.get(dialect, PROLOGIX_ETHERNET)
                 self._listen("prologix_tcp", prologix_tcp, self._adapter(bridge, realtime))
             if prologix_pty:
-                cable = AR488 if dialect == "ar488" else PROLOGIX_USB
+                cable = _ARDUINOS.get(dialect, PROLOGIX_USB)
                 self._open_terminal("prologix_pty", self._adapter(cable, realtime))
             if serial_pty is not None:
                 line = SerialLine(serial_pty) if realtime else SerialLine(serial_pty, baud=0)
@@ -163,6 +172,9 @@ class Server:
             terminal.flush(now_s)
         if self.instrument.damage.link_fault("dropped-connection"):
             self._drop_all(now_s)
+        if fault := self.instrument.damage.link_fault("link-away"):
+            self._drop_all(now_s, fault.seconds)
+        self._come_back(now_s)
 
     def _work_clients(self, now_s: float) -> None:
         for client in self._clients:
@@ -181,13 +193,34 @@ class Server:
         self._selector.unregister(client.wire)
         client.close()
 
-    def _drop_all(self, now_s: float) -> None:
+    def _drop_all(self, now_s: float, away_s: float | None = None) -> None:
+        """Break every connection; with `away_s` nobody is there to be connected to for so long."""
         for client in list(self._clients):
             client.reset()
             self._forget(client)
         for name, terminal in self._terminals.items():
-            terminal.unplug(now_s)
+            if away_s is None:
+                terminal.unplug(now_s)
+            else:
+                terminal.unplug(now_s, away_s)
             self.addresses[name] = terminal.path
+        if away_s is not None:
+            self._away_until = now_s + away_s
+            for cable in self._cables:
+                if isinstance(cable, FakeAdapter):
+                    cable.restart(now_s, away_s)
+            for listener in self._listeners:
+                self._selector.unregister(listener.wire)
+                listener.leave()
+
+    def _come_back(self, now_s: float) -> None:
+        """Listen again where the gateway was away."""
+        if self._away_until is None or now_s < self._away_until:
+            return
+        self._away_until = None
+        for listener in self._listeners:
+            listener.come_back()
+            self._selector.register(listener.wire, selectors.EVENT_READ, listener)
 
     def _wait_s(self) -> float:
         due = self._pace.wait_s
@@ -206,7 +239,8 @@ class Server:
         for client in list(self._clients):
             self._forget(client)
         for listener in self._listeners:
-            self._selector.unregister(listener.wire)
+            if self._away_until is None:
+                self._selector.unregister(listener.wire)
             listener.wire.close()
         self._listeners.clear()
         for terminal in self._terminals.values():

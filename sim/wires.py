@@ -37,6 +37,16 @@ class Listener:
         self.owner: RawClient | None = None
         """Who spoke last on a raw socket: the reply is his."""
         self._adapter = adapter
+        self._place = wire.getsockname()
+
+    def leave(self) -> None:
+        """Be nobody that could be connected to."""
+        self.wire.close()
+
+    def come_back(self) -> None:
+        """Listen again, at the same port."""
+        self.wire = socket.create_server(self._place)
+        self.wire.setblocking(False)
 
     def accept(self, instrument: Instrument) -> RawClient | AdapterClient | None:
         """A new client, None if it has gone already."""
@@ -286,13 +296,13 @@ class Terminal:
         except OSError:
             self._out.clear()
 
-    def unplug(self, now_s: float) -> None:
-        """Pull the cable; it is plugged in again a little later."""
+    def unplug(self, now_s: float, away_s: float = _REPLUG_S) -> None:
+        """Pull the cable; it is plugged in again a little later, and is another device then."""
         # The name goes first: who hears the hang-up must not find the old device by it,
         # which the system may give to somebody else.
         Path(self.path).unlink(missing_ok=True)
         self.close_terminal()
-        self._away_until = now_s + _REPLUG_S
+        self._away_until = now_s + away_s
 
     def close_terminal(self) -> None:
         """Hang up."""

@@ -62,7 +62,7 @@ def gimbal_analyser(ratio=0.3, seed=0, faults=(), unit="adss") -> Analyser35670A
 
 
 @contextmanager
-def served(instrument, wire: str = "tcp", driver: str = ""):
+def served(instrument, wire: str = "tcp", driver: str = "", **options):
     """Serve in a thread, as fast as can be; yields the instrument's address."""
     ports = {
         "tcp": {"tcp": 0},
@@ -70,7 +70,7 @@ def served(instrument, wire: str = "tcp", driver: str = ""):
         "serial_pty": {"serial_pty": instrument},
     }
     wires = ports.get(wire, {"prologix_pty": True})
-    with Server(instrument, realtime=False, **wires) as server:
+    with Server(instrument, realtime=False, **wires, **options) as server:
         thread = threading.Thread(target=server.run)
         thread.start()
         try:

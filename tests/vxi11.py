@@ -18,6 +18,8 @@ class Vxi11Instrument:
         self.messages: list[bytes] = []
         self.cleared = 0
         self.largest_read = 1 << 20
+        self.errors: dict[int, int] = {}
+        """Error number that a procedure is answered with instead of being done."""
         self._message = b""
         self._reply = b""
         self._bytes = bytearray()
@@ -47,6 +49,8 @@ class Vxi11Instrument:
         return accepted + self._procedure(procedure, body)
 
     def _procedure(self, procedure: int, body: bytes) -> bytes:
+        if error := self.errors.get(procedure):
+            return struct.pack(">2I", error, 0)[: 4 if procedure == CLEAR else 8]
         if procedure == CREATE_LINK:
             return struct.pack(">4I", 0, 7, 0, 1024)
         if procedure == WRITE:

@@ -6,8 +6,9 @@ taken apart again. It prints nothing and decides nothing about a measurement.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import ExitStack, closing, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Self, TypeVar
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from daq.control import SessionControl
     from daq.limits import Limits
     from daq.session import Session
-    from daq.session_events import SessionEvent
+    from daq.session_events import Finished, SessionEvent
     from daq.session_request import SessionRequest
     from daq.store import Store
     from daq.watchdog import Watchdog
@@ -103,7 +104,8 @@ def bench_session(
     """Run a session and yield what it tells; close the iterator to end it early.
 
     On hardware a watchdog stands by from before the first volt until the
-    source is proven off; where it never is, the watchdog goes on trying when this ends.
+    source is proven off. Where the session cannot prove that, it waits for the watchdog, which
+    goes on trying, and its last record says what that one proved.
 
     Raises
     ------
@@ -113,11 +115,12 @@ def bench_session(
         Before the first record: if history, lock or instrument cannot be had.
         After the last: the fault that ended the session.
     """
+    from daq.analyser import SourceState
     from daq.aside import Aside
     from daq.bench_lock import BenchLock
     from daq.control import Cancelled
     from daq.session import Session
-    from daq.session_events import CheckLine, Opened, Warned
+    from daq.session_events import CheckLine, Finished, Opened, SourceSafe, Warned
     from daq.session_history import ANSWER_S
     from daq.store import Store
 
@@ -152,6 +155,17 @@ def bench_session(
                     watched.may_drive = True
                 while faults:
                     yield Warned(faults.pop(0))
+                if isinstance(event, Finished) and watched.goes_on(event):
+                    yield Warned(
+                        f"the source is {event.source_state.value}; the watchdog opens the "
+                        "instrument anew and goes on trying; waiting for it, an interrupt ends that"
+                    )
+                    analyser.close()
+                    for text in watched.waited(control):
+                        yield Warned(text)
+                    event = replace(event, source_state=SourceState(watched.proven))
+                    session.finished = event
+                    yield SourceSafe(event.source_state)
                 yield event
 
 
@@ -200,6 +214,8 @@ class _Alone:
         self.store: Store | None = None
         self.measurement = 0
         self.may_drive = False
+        self.proven = "unknown"
+        """What was proven of the source when the session was over."""
 
     def __enter__(self) -> Self:
         return self
@@ -210,6 +226,14 @@ class _Alone:
     def measures(self, measurement: int) -> None:
         """The measurement has its number."""
         self.measurement = measurement
+
+    def goes_on(self, finished: Finished) -> bool:
+        """Whether somebody tries on where the session could not prove the source off."""
+        return False
+
+    def waited(self, control: SessionControl) -> Iterator[str]:
+        """Wait for what is proven then, and say it."""
+        yield from ()
 
 
 class _Watched(_Alone):
@@ -225,6 +249,19 @@ class _Watched(_Alone):
     def measures(self, measurement: int) -> None:
         super().measures(measurement)
         self._watchdog.measures(measurement)
+
+    def goes_on(self, finished: Finished) -> bool:
+        return self.may_drive and finished.source_state.value != "confirmed-off"
+
+    def waited(self, control: SessionControl) -> Iterator[str]:
+        asked = control.asked
+        said = self._watchdog.see_to_it(lambda: control.asked == asked)
+        self.proven = said or self.proven
+        yield (
+            f"the watchdog: source {said}"
+            if said
+            else ("the watchdog has not said yet what became of the source; the history will tell")
+        )
 
     def __exit__(self, *_: object) -> None:
         """Dismiss it where the source is proven off, as the history says; else leave it to work."""

@@ -104,6 +104,11 @@ class HP35670A:
     def on_exchange(self, told: Callable[[float], None] | None) -> None:
         self._dialogue.on_exchange = told
 
+    @property
+    def wire_lacks(self) -> tuple[str, ...]:
+        """What the way to the instrument turned out not to have, such as a serial poll."""
+        return tuple(getattr(self._transport, "lacks", ()))
+
     def identify(self) -> Identity:
         """Ask who is there, and refuse anything but a 35670A with swept sine."""
         with self._dialogue.lock:

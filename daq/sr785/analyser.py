@@ -77,6 +77,11 @@ class SR785:
     def on_exchange(self, told: Callable[[float], None] | None) -> None:
         self._dialogue.on_exchange = told
 
+    @property
+    def wire_lacks(self) -> tuple[str, ...]:
+        """What the way to the instrument turned out not to have, such as a serial poll."""
+        return tuple(getattr(self._transport, "lacks", ()))
+
     def identify(self) -> Identity:
         """Ask who is there, and refuse anything but an SR785 or SR780."""
         with self._dialogue.lock:

@@ -21,6 +21,7 @@ __all__ = [
     "ReplayFile",
     "SerialPort",
     "VisaAddress",
+    "is_hislip",
     "parse_address",
 ]
 
@@ -28,7 +29,9 @@ FORMS = (
     "sim:",
     "TCPIP::HOST::PORT::SOCKET",
     "TCPIP::HOST::inst0::INSTR",
+    "TCPIP::HOST::hislip0::INSTR",
     "GPIB0::11::INSTR",
+    "USB0::VENDOR::PRODUCT::SERIAL::INSTR",
     "prologix:DEVICE?addr=11",
     "prologix-tcp:HOST:PORT?addr=11",
     "serial:DEVICE?baud=9600&flow=none",
@@ -46,6 +49,8 @@ _VISA = re.compile(
     GPIB\d* :: (?P<pad>\d{1,2}) (:: (?P<sad>\d{1,3}))? (::INSTR)?
     | TCPIP\d* :: [^:\s]+ :: (?P<port>\d{1,5}) ::SOCKET
     | TCPIP\d* :: [^:\s]+ (:: [A-Za-z]\w*(,\d+)*)? ::INSTR
+    | USB\d* :: (?P<vendor>0x[0-9A-F]{1,4}|\d{1,5}) :: (?P<product>0x[0-9A-F]{1,4}|\d{1,5})
+      :: [^:\s]+ (:: \d{1,2})? ::INSTR
     """,
     re.IGNORECASE | re.VERBOSE | re.ASCII,
 )
@@ -147,13 +152,24 @@ def parse_address(
     raise _refusal(url, f"has the unknown scheme {scheme!r}")
 
 
+def is_hislip(resource: str) -> bool:
+    """Whether a VISA name is of an instrument on HiSLIP, as ``TCPIP::HOST::hislip0::INSTR``."""
+    kind, *parts = resource.split("::")
+    named = len(parts) > 1 and parts[1].lower().startswith("hislip")
+    return kind.upper().startswith("TCPIP") and named
+
+
 def _visa(url: str, text: str) -> VisaAddress:
     match = _VISA.fullmatch(text)
     if match is None:
         raise _refusal(url, "is no VISA name of a kind that is served here")
-    for name, low, high in (("pad", 0, 30), ("sad", 96, 126), ("port", 1, 65535)):
+    ranges = {
+        "pad": (0, 30), "sad": (96, 126), "port": (1, 65535),
+        "vendor": (0, 65535), "product": (0, 65535),
+    }  # fmt: skip
+    for name, (low, high) in ranges.items():
         value = match.group(name)
-        if value is not None and not low <= int(value) <= high:
+        if value is not None and not low <= int(value, 16 if "x" in value.lower() else 10) <= high:
             raise _refusal(url, f"has {value} where {low} to {high} is allowed")
     return VisaAddress(text)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from daq.errors import LashbenchError
 from daq.transports.address import (
@@ -18,9 +19,13 @@ from daq.transports.address import (
     ReplayFile,
     SerialPort,
     VisaAddress,
+    is_hislip,
     parse_address,
 )
 from daq.transports.base import Deadline, Transport
+
+if TYPE_CHECKING:
+    from daq.transports.links import SerialLink
 
 __all__ = ["TransportFactory", "load_transport", "open_transport"]
 
@@ -82,6 +87,10 @@ def open_transport(
             transport = StreamTransport(
                 TcpLink(host, int(port), Deadline.after(opening_s)), resource
             )
+        case VisaAddress(resource=resource) if is_hislip(resource):
+            from daq.transports.hislip import open_hislip
+
+            transport = open_hislip(resource, Deadline.after(opening_s))
         case VisaAddress(resource=resource):
             from daq.transports.visa import open_visa
 
@@ -89,11 +98,10 @@ def open_transport(
         case PrologixSerial() | PrologixTcp():
             transport = _open_prologix(address, url, opening_s)
         case SerialPort(device=device, baud=baud, flow=flow):
-            from daq.transports.links import SerialLink
             from daq.transports.stream import StreamTransport
 
             # RS-232 interfaces of instruments end a reply with CR, with or without LF behind it.
-            transport = StreamTransport(SerialLink(device, baud, flow), url, reply_end=b"\r")
+            transport = StreamTransport(_serial_link(device, baud, flow), url, reply_end=b"\r")
         case ReplayFile(path=path):
             from daq.transports.transcript import Replay
 
@@ -124,38 +132,60 @@ def load_transport(url: str) -> None:
         case VisaAddress(resource=resource) if resource.upper().endswith("::SOCKET"):
             import daq.transports.links
             import daq.transports.stream  # noqa: F401
+        case VisaAddress(resource=resource) if is_hislip(resource):
+            import daq.transports.hislip
+            import daq.transports.links  # noqa: F401
         case VisaAddress(resource=resource):
             from daq.transports.visa import load_backend
 
             load_backend(resource)
-        case PrologixSerial() | PrologixTcp():
-            import serial
-
+        case PrologixTcp():
             import daq.transports.links
             import daq.transports.prologix
             import daq.transports.prologix_adapter  # noqa: F401
+        case PrologixSerial(device=device):
+            import daq.transports.prologix
+            import daq.transports.prologix_adapter  # noqa: F401
 
-            serial.Serial()
-        case SerialPort():
-            import serial
-
-            import daq.transports.links
+            _load_serial(device)
+        case SerialPort(device=device):
             import daq.transports.stream  # noqa: F401
 
-            serial.Serial()
+            _load_serial(device)
         case _:
             pass
 
 
+def _load_serial(device: str) -> None:
+    import serial
+
+    import daq.transports.links  # noqa: F401
+    from daq.transports.ports import ports
+
+    serial.Serial()
+    # While it is there, so that it is found again should it come back under another name.
+    ports.note(device)
+
+
+def _serial_link(device: str, baud: int = 115200, flow: str = "none") -> SerialLink:
+    """Open a port where its adapter is now, and remember which adapter that is."""
+    from daq.transports.links import SerialLink
+    from daq.transports.ports import ports
+
+    link = SerialLink(ports.now(device), baud, flow)
+    ports.note(device)
+    return link
+
+
 def _open_prologix(address: PrologixSerial | PrologixTcp, url: str, opening_s: float) -> Transport:
-    from daq.transports.links import Link, SerialLink, TcpLink
+    from daq.transports.links import Link, TcpLink
     from daq.transports.prologix import PrologixTransport
     from daq.transports.prologix_adapter import Adapter
 
     deadline = Deadline.after(opening_s)
     link: Link
     if isinstance(address, PrologixSerial):
-        link = SerialLink(address.device)
+        link = _serial_link(address.device)
     else:
         link = TcpLink(address.host, address.port, deadline)
     try:

@@ -172,7 +172,9 @@ class Adapter:
             "++mode": "1",
             "++auto": "0",
             "++eoi": "1",
-            "++eos": "3",
+            # A line feed ends each message. EOI alone is not enough: some firmware of the AR488
+            # asserts it after the last byte, and the instrument would wait for the end.
+            "++eos": "2",
             "++eot_enable": "0",
             "++read_tmo_ms": str(READ_TIMEOUT_MS),
             "++addr": str(self.gpib_address),

@@ -74,6 +74,11 @@ class Recorder:
         self._acts, self._is_over = -1, False
         self._note({"transcript": _VERSION, "address": self.address, "started": _now()})
 
+    @property
+    def lacks(self) -> list[str]:
+        """What the wire turned out not to have, in words."""
+        return list(getattr(self._transport, "lacks", ()))
+
     def write(self, line: str, deadline: Deadline) -> None:
         """Send one message."""
         self._record("write", lambda: self._transport.write(line, deadline), line=line)

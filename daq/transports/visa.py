@@ -1,4 +1,4 @@
-"""An instrument named by a VISA resource: VXI-11, or GPIB where a back end exists.
+"""An instrument named by a VISA resource: VXI-11, or GPIB or USB where a back end exists.
 
 Owns messages that carry their own end, and the faults of the Python back end that
 would break the promise of bounded waits. A bare TCP stream is not for it: the back
@@ -8,8 +8,9 @@ end waits there as long as bytes come (`daq.transports.stream`). It speaks no SC
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from contextlib import suppress
-from typing import Any
+from typing import Any, TypeVar
 
 from daq.errors import BenchTimeout, LinkError, ProtocolError
 from daq.transports.base import KEPT_LIMIT_BYTES, Deadline, block_of, checked_line
@@ -20,13 +21,22 @@ _LEAST_MS = 1
 """VISA takes 0 for "do not wait at all"."""
 
 _CHUNK_BYTES = 20 * 1024
+_POLL, _CLEAR = "serial poll", "device clear"
+
+_NEEDS = {
+    "GPI": "; a GPIB card needs its maker's VISA, or linux-gpib with gpib-ctypes",
+    "USB": "; USB needs a maker's VISA, or pyusb with libusb, and the right to open the device",
+}
+"""What is needed beside pyvisa-py, by the beginning of a resource's name."""
+
+_Result = TypeVar("_Result")
 
 
 def open_visa(resource_name: str, deadline: Deadline) -> VisaTransport:
     """Open a VISA resource.
 
-    The Python back end serves TCPIP; for GPIB a maker's VISA is taken where
-    one is installed, else the Python back end, which needs linux-gpib.
+    The Python back end serves TCPIP; for GPIB and USB a maker's VISA is taken where
+    one is installed, else the Python back end, which needs linux-gpib or pyusb.
 
     Raises
     ------
@@ -43,8 +53,7 @@ def open_visa(resource_name: str, deadline: Deadline) -> VisaTransport:
         )
     except Exception as error:  # the Python back end raises bare Exception, ValueError, OSError
         advice = "check address, power and cable"
-        if not backend:
-            advice += "; a GPIB card needs its maker's VISA, or linux-gpib with gpib-ctypes"
+        advice += _NEEDS.get(resource_name.upper()[:3], "")
         reason = " ".join(str(error).split()) or type(error).__name__
         raise LinkError(f"{resource_name}: cannot be opened ({reason}); {advice}") from error
     try:
@@ -77,6 +86,14 @@ class VisaTransport:
         self._resource = resource
         self._waiting = "nothing"
         self._timed_out = constants.StatusCode.error_timeout
+        self._refused = (
+            constants.StatusCode.error_nonsupported_operation,
+            constants.StatusCode.error_nonimplemented_operation,
+        )
+        self._io_error = constants.StatusCode.error_io
+        self._locked = constants.StatusCode.error_resource_locked
+        self.lacks: list[str] = []
+        """What this way to the instrument turned out not to have, in words."""
         self._goes_on = constants.StatusCode.success_max_count_read
         self._harmless = (self._goes_on, constants.StatusCode.success_device_not_present)
         self._visa_error = errors.VisaIOError
@@ -123,24 +140,39 @@ class VisaTransport:
             )
         return message
 
-    def serial_poll(self, deadline: Deadline) -> int:
-        """The status byte."""
-        self._waiting = "serial poll"
-        try:
-            self._bound(deadline)
-            return int(self._resource.read_stb())
-        except self._faults as error:
-            raise self._fault(error, deadline) from error
+    def serial_poll(self, deadline: Deadline) -> int | None:
+        """The status byte; None where the gateway or adapter has no serial poll."""
+        return self._if_there_is(_POLL, lambda: int(self._resource.read_stb()), deadline)
 
     def device_clear(self, deadline: Deadline) -> bool:
-        """Clear the instrument."""
-        self._waiting = "device clear"
+        """Clear the instrument; False where the gateway or adapter cannot.
+
+        Nothing is read then: what the instrument still has to say is lost with the next message,
+        and a reply that the gateway keeps is told by its content.
+        """
+        return self._if_there_is(_CLEAR, self._cleared, deadline) is not None
+
+    def _cleared(self) -> bool:
+        self._resource.clear()
+        return True
+
+    def _if_there_is(
+        self, what: str, action: Callable[[], _Result], deadline: Deadline
+    ) -> _Result | None:
+        """Do what not every gateway can; None, from then on at once, where it cannot."""
+        if what in self.lacks:
+            return None
+        self._waiting = what
         try:
             self._bound(deadline)
-            self._resource.clear()
+            return action()
+        except NotImplementedError:
+            self.lacks.append(what)
         except self._faults as error:
-            raise self._fault(error, deadline) from error
-        return True
+            if getattr(error, "error_code", None) not in self._refused:
+                raise self._fault(error, deadline) from error
+            self.lacks.append(what)
+        return None
 
     def pause(self, seconds: float) -> None:
         """Sleep."""
@@ -181,10 +213,28 @@ class VisaTransport:
                 f"{self.address}: {self._waiting!r} got no answer within {deadline.span_s:g} s; "
                 "is the instrument switched on and at this address?"
             )
+        if self._is_locked(error):
+            return LinkError(
+                f"{self.address}: another client has locked the instrument, {self._waiting!r} was "
+                "refused; let that one go, or restart the gateway"
+            )
         return LinkError(
             f"{self.address}: the connection was lost at {self._waiting!r} "
             f"({' '.join(str(error).split()) or type(error).__name__})"
         )
+
+    def _is_locked(self, error: Exception) -> bool:
+        code = getattr(error, "error_code", None)
+        if code == self._io_error:
+            # The Python back end calls a write that is refused by a lock an I/O error; a poll
+            # is refused by its name.
+            try:
+                self._resource.read_stb()
+            except self._faults as again:
+                code = getattr(again, "error_code", None)
+            except NotImplementedError:
+                return False
+        return bool(code == self._locked)
 
 
 def _rpc_errors() -> tuple[type[Exception], ...]:

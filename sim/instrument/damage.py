@@ -13,7 +13,7 @@ from sim.faults import Fault, FaultBoard
 __all__ = ["Damage"]
 
 _NOISE = b"\x00\xff\x15\x7f\x80\x01\xaa"
-_LINK_FAULTS = ("dropped-connection", "adapter-reset")
+_LINK_FAULTS = ("dropped-connection", "adapter-reset", "link-away")
 
 
 class Damage:

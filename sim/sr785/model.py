@@ -16,7 +16,7 @@ __all__ = ["FAULTS", "MODEL"]
 _SHARED = (
     "dropped-connection", "silence", "slow-reply", "garbage-bytes", "truncated-block",
     "missing-eoi", "overload-burst", "stuck-measuring-bit", "stuck-parser", "lost-power",
-    "adapter-reset",
+    "adapter-reset", "link-away",
 )  # fmt: skip
 FAULTS = {name: CATALOGUE[name] for name in _SHARED} | {
     "outx-elsewhere": FaultKind("replies go to the other interface", point=3),

@@ -44,6 +44,7 @@ def test_other_instruments_are_others():
     urls = [
         "TCPIP::127.0.0.1::5025::SOCKET", "TCPIP::127.0.0.1::5026::SOCKET", "GPIB0::11::INSTR",
         "GPIB1::11::INSTR", "GPIB0::12::INSTR", "GPIB0::11::96::INSTR", "TCPIP::h::INSTR",
+        "USB0::0x03EB::0x2065::A::INSTR", "USB0::0x03EB::0x2065::B::INSTR",
         "TCPIP::h::gpib0,11::INSTR", "prologix:/dev/ttyUSB7", "prologix:/dev/ttyUSB8",
     ]  # fmt: skip
     assert len({wire_name(url) for url in urls}) == len(urls)

@@ -94,7 +94,7 @@ def test_dialects_are_told_by_their_version(version, dialect):
 def test_everything_is_set_and_nothing_left_to_a_default():
     adapter = TinyAdapter(lambda _: None)
     opened(adapter, address=14)
-    wanted = {"mode": "1", "auto": "0", "eoi": "1", "eos": "3", "eot_enable": "0", "addr": "14"}
+    wanted = {"mode": "1", "auto": "0", "eoi": "1", "eos": "2", "eot_enable": "0", "addr": "14"}
     assert {key: adapter.settings[key] for key in wanted} == wanted
     assert int(adapter.settings["read_tmo_ms"]) <= 3000
 
@@ -151,7 +151,7 @@ def test_something_else_on_the_port_is_quoted():
 def test_a_setting_that_does_not_read_back_is_refused():
     adapter = TinyAdapter(lambda _: None)
     del adapter.settings["eos"]
-    with pytest.raises(LinkError, match=r"'\+\+eos 3' and reads back 'Unrecognized command'"):
+    with pytest.raises(LinkError, match=r"'\+\+eos 2' and reads back 'Unrecognized command'"):
         opened(adapter)
 
 

@@ -4,17 +4,22 @@ import gc
 import struct
 import threading
 import time
+from contextlib import suppress
 
 import pytest
 from bench_server import simulated
 from fake_analyser import known_gain
-from vxi11 import CLEAR, READ_STB, Vxi11Instrument
+from vxi11 import CLEAR, READ_STB, WRITE, Vxi11Instrument
 from wire import ByteServer, lines_of
 
 from daq.analyser import PointSettings, SourceState
 from daq.drivers import DRIVERS, open_analyser
-from daq.errors import BenchTimeout, LinkError, ProtocolError
-from daq.plan import spaced_frequencies
+from daq.errors import BenchTimeout, LashbenchError, LinkError, ProtocolError
+from daq.limits import Limits
+from daq.plan import SweepPlan, spaced_frequencies
+from daq.session import Session
+from daq.session_request import SessionRequest
+from daq.store_records import MeasurementHeader
 from daq.transports.base import Deadline, ask, ask_block
 from daq.transports.open import open_transport
 from daq.transports.visa import open_visa
@@ -171,8 +176,9 @@ def test_bytes_without_a_header_are_counted(vxi11, raw):
 class Gateway(Vxi11Instrument):
     """A LAN gateway with a simulated instrument on its bus."""
 
-    def __init__(self, box):
+    def __init__(self, box, **lacking):
         super().__init__(self._exchange)
+        vars(self).update(lacking)
         self._box, self._pace = box, Fast(box)
 
     def _exchange(self, message):
@@ -189,9 +195,9 @@ class Gateway(Vxi11Instrument):
 
     def _procedure(self, procedure, body):
         self._rest()
-        if procedure == READ_STB:
+        if procedure == READ_STB and not self.errors.get(READ_STB):
             return struct.pack(">2I", 0, self._box.serial_poll())
-        if procedure == CLEAR:
+        if procedure == CLEAR and not self.errors.get(CLEAR):
             self._box.device_clear()
         return super()._procedure(procedure, body)
 
@@ -211,6 +217,50 @@ def test_every_driver_measures_through_a_gateway(driver):
     assert len(points) == 11
     for point in points:
         assert point.gain == pytest.approx(known_gain(point.frequency_hz), rel=1e-4)
+
+
+@pytest.mark.parametrize("driver", DRIVERS, ids=lambda driver: driver.scheme or "preset")
+@pytest.mark.parametrize("refused", [(READ_STB,), (CLEAR,), (READ_STB, CLEAR)], ids=str)
+def test_a_gateway_without_poll_or_clear_is_measured_through_and_told(store, driver, refused):
+    """Error 8, operation not supported."""
+    box = simulated(driver.scheme, LinearPlant(known_gain), ["truncated-block:point=9"])
+    lead = f"{driver.scheme}:" if driver.scheme else ""
+    plan = SweepPlan(
+        spaced_frequencies(120.0, 160.0, 11), (1.0,), settle_cycles=2, integrate_cycles=3
+    )
+    with ByteServer(Gateway(box, errors=dict.fromkeys(refused, 8)).feed) as server:
+        url = f"{lead}TCPIP::127.0.0.1,{server.port}::inst0::INSTR"
+        for resume in (None, 1):
+            header = MeasurementHeader("ADSS", "7", plan, url, "lashbench test")
+            request = SessionRequest(
+                header=header if resume is None else None, limits=(Limits("bench"),), resume=resume
+            )
+            analyser, told = open_analyser(url), []
+            with suppress(LashbenchError):
+                told += Session(analyser, store, request).run()
+            analyser.close()
+            assert box.driven_v == 0.0
+    found = store.measurement(1)
+    assert (found.state, found.source_state) == ("complete", SourceState.CONFIRMED_OFF)
+    for stored in store.points(1):
+        assert stored.point.gain == pytest.approx(known_gain(stored.requested_hz), rel=1e-4)
+    notes = [event.text for event in store.events(1) if event.text.startswith("wire: ")]
+    assert ("no serial poll" in notes[0]) == (READ_STB in refused)
+    assert ("no device clear" in notes[0]) == (CLEAR in refused)
+
+
+def test_an_instrument_that_another_client_locked_is_told(vxi11):
+    transport, device = vxi11
+    device.errors = {WRITE: 11, READ_STB: 11}
+    for act in (lambda: transport.write("A?", Deadline.after(1.0)),
+                lambda: transport.serial_poll(Deadline.after(1.0))):  # fmt: skip
+        with pytest.raises(LinkError, match="another client has locked the instrument"):
+            act()
+
+
+def test_usb_without_a_back_end_is_said_so():
+    with pytest.raises(LinkError, match="USB needs a maker's VISA, or pyusb"):
+        open_transport("USB0::0x03EB::0x2065::GPIB_11_3E1F::INSTR")
 
 
 def test_vxi11_polls_and_clears(vxi11):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sim.adapter import FakeAdapter
-from sim.adapter_dialects import AR488, PROLOGIX_ETHERNET, PROLOGIX_USB
+from sim.adapter_dialects import AR488, AR488_LATE_EOI, PROLOGIX_ETHERNET, PROLOGIX_USB
 
 READY = b"++savecfg 0\n++addr 11\n++auto 0\n++eoi 1\n++eos 3\n++read_tmo_ms 1000\n"
 IDENTITY = b"HEWLETT-PACKARD,35670A,LASHSIM001,A.01.11\n"
@@ -92,14 +92,14 @@ def test_every_byte_passes_when_it_is_escaped(host):
         bytes([27, byte]) if byte in (10, 13, 27, 43) else bytes([byte]) for byte in message
     )
     seen = []
-    host.adapter._instrument.listen = lambda data, end: seen.append((data, end)) or len(data)
+    host.adapter.instrument.listen = lambda data, end: seen.append((data, end)) or len(data)
     host.send(escaped + b"\n")
     assert seen == [(message, True)]
 
 
 def test_what_is_not_escaped_is_lost(host):
     seen = []
-    host.adapter._instrument.listen = lambda data, end: seen.append(data) or len(data)
+    host.adapter.instrument.listen = lambda data, end: seen.append(data) or len(data)
     host.send(b"FREQ:STEP +1E+2\n")
     host.send(b"\x1b+\x1b+ver\n")
     assert seen == [b"FREQ:STEP 1E2", b"++ver"]
@@ -113,7 +113,7 @@ def test_an_ar488_lets_a_single_plus_pass(arduino):
 @pytest.mark.parametrize(("eos", "ending"), [(0, b"\r\n"), (1, b"\r"), (2, b"\n"), (3, b"")])
 def test_terminators(host, eos, ending):
     seen = []
-    host.adapter._instrument.listen = lambda data, end: seen.append((data, end)) or len(data)
+    host.adapter.instrument.listen = lambda data, end: seen.append((data, end)) or len(data)
     host.send(b"++eos %d\n*CLS\n++eoi 0\n*CLS\r" % eos)
     assert seen == [(b"*CLS" + ending, True), (b"*CLS" + ending, False)]
 
@@ -178,8 +178,8 @@ def test_serial_poll_request_clear_and_trigger(host):
     host.send(b"++trg\n++ifc\n")
     assert host.send(b"SYST:ERR?\n++read eoi\n").startswith(b"-211,")
     host.send(b"++llo\n++loc\n")
-    assert host.adapter._instrument.local_lockout
-    assert not host.adapter._instrument.remote
+    assert host.adapter.instrument.local_lockout
+    assert not host.adapter.instrument.remote
 
 
 def test_nobody_at_the_address(host):
@@ -283,3 +283,49 @@ def test_a_held_bus_is_given_up(bench):
 def test_device_mode_sends_nothing(host):
     host.send(b"++mode 0\nJUNK\n++mode 1\n")
     assert host.send(b"SYST:ERR?\n++read eoi\n") == b'+0,"No error"\n'
+
+
+@pytest.mark.parametrize(("eos", "answered"), [(3, False), (2, True), (1, False), (0, True)])
+def test_eoi_after_the_last_byte_ends_no_message(bench, eos, answered):
+    """Firmware that is too late with EOI: only a line feed ends a message."""
+    host = Host(FakeAdapter(bench().instrument, AR488_LATE_EOI))
+    host.send(READY.replace(b"++savecfg 0\n", b"").replace(b"++eos 3", b"++eos %d" % eos))
+    heard = host.send(b"*IDN?\n++read eoi\n") + host.wait(2.0)
+    assert heard == (IDENTITY if answered else b"")
+
+
+@pytest.mark.parametrize(
+    ("line", "answer"),
+    [
+        (b"++allspoll\n", b"\r\n"),
+        (b"++spoll all\n", b"\r\n"),
+        (b"++spoll 3 11\n", b"0\r\n"),
+        (b"++fndl all\n", b"11\r\n"),
+        (b"++fndl 3-12\n", b"11\r\n"),
+        (b"++fndl 12-3\n", b"Invalid parameter\r\n"),
+        (b"++fndl 5 11\n", b"11\r\n"),
+        (b"++fndl 5 6\n", b"\r\n"),
+        (b"++fndl 99\n", b"Invalid parameter\r\n"),
+        (b"++fndl\n", b"Missing parameter\r\n"),
+        (b"++id fwver\n", AR488.version.encode() + b"\r\n"),
+        (b"++id name bench 3\n++id name\n", b"bench 3\r\n"),
+        (b"++id serial 42\n++id serial\n", b"000000042\r\n"),
+        (b"++id name a name of more than fifteen\n", b"Invalid parameter\r\n"),
+        (b"++id\n", b"Unrecognized command\r\n"),
+        (b"++id verstr my box\n++ver\n", b"my box\r\n"),
+        (b"++id verstr box\n++ver real\n", AR488.version.encode() + b"\r\n"),
+        (b"++flags\n++flags 8\n++flags 6\n++flags\n", b"0\r\nInvalid parameter\r\n6\r\n"),
+        (b"++flags 6\n*IDN?\n++read eoi\n", b"Send^OK\r\n" + IDENTITY + b"Read^OK\r\n"),
+    ],
+)  # fmt: skip
+def test_what_only_an_ar488_answers(arduino, line, answer):
+    assert arduino.send(line) == answer
+    prologix = Host(FakeAdapter(arduino.adapter.instrument, PROLOGIX_USB))
+    if line.split()[0] != b"++spoll":
+        assert prologix.send(line.split(b"\n")[0] + b"\n") == b"Unrecognized command\r\n"
+
+
+def test_a_poll_of_all_names_who_wants_service(arduino):
+    arduino.send(b"*SRE 32\n*ESE 32\nNONSENSE 1\n")
+    assert arduino.send(b"++allspoll\n") == b"SRQ:11,96\r\n\r\n"
+    assert arduino.send(b"++allspoll\n") == b"\r\n"

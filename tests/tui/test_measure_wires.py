@@ -1,5 +1,6 @@
 """The same measurement over every wire, and what becomes of it when its program is killed."""
 
+import json
 import random
 import socket
 import time
@@ -75,6 +76,15 @@ def test_every_wire_of_every_driver_gives_the_same_points(tmp_path):
             np.testing.assert_allclose(response.gain, found[0].gain, rtol=1e-6)
 
 
+@pytest.mark.parametrize("driver", [driver.scheme for driver in DRIVERS])
+def test_an_adapter_whose_eoi_comes_late_measures(tmp_path, driver):
+    """Its instrument sees no EOI: a line feed must end each message."""
+    box = simulated(driver, LinearPlant(known_gain))
+    with served(box, "prologix_pty", driver, dialect="ar488-late-eoi") as url:
+        assert measure(tmp_path / "bench.db", url) == 0
+    assert box.driven_v == 0.0
+
+
 @pytest.mark.parametrize("flow", ["hardware", "software"])
 def test_flow_control_is_that_of_the_address(tmp_path, flow):
     with served(simulated("sr785", LinearPlant(known_gain)), "serial_pty", "sr785") as url:
@@ -147,14 +157,46 @@ def test_a_watchdog_goes_on_where_the_source_could_not_be_proven_off(tmp_path, m
     with served(linear_analyser(known_gain, [silent])) as url:
         words = ["measure", "--unit", "adss", "--instrument", url, "--db", str(db), "--yes"]
         assert cli.main([*words, *short]) != 0
-        assert "SOURCE OFF UNKNOWN: switch it off by hand" in capsys.readouterr().err
-        with Store(db) as store:
-            assert store.measurement(1).source_state is SourceState.UNKNOWN
+        told = capsys.readouterr().err
+        assert "warning: the source is unknown; the watchdog opens the instrument anew" in told
+        assert "warning: the watchdog: source confirmed-off" in told
+        assert "1 point kept, source confirmed off" in told.splitlines()[-1]
         assert "without proving the source off; source confirmed" in wait_for_watchdog(db, 1, 60.0)
         with Store(db) as store:
             assert store.measurement(1).source_state is SourceState.CONFIRMED_OFF
         with BenchLock(db):
             assert source_state(url) is SourceState.CONFIRMED_OFF
+
+
+@pytest.mark.parametrize("wire", ["prologix_pty", "tcp"])
+def test_an_adapter_that_comes_back_is_found_again(tmp_path, capsys, wire):
+    """It breaks off, is away for a while, has lost its settings, and is another device then."""
+    db, away = tmp_path / "bench.db", "link-away:point=3,seconds=3"
+    box = linear_analyser(known_gain, [away])
+    with served(box, wire) as url:
+        assert measure(db, url) == 3
+        told = capsys.readouterr().err
+        assert "source confirmed off" in told.splitlines()[-1]
+        assert box.driven_v == 0.0
+        with Store(db) as store:
+            assert "reconnected" in [event.kind for event in store.events(1)]
+        assert measure(db, url, "--resume", "1") == 0
+
+
+def test_what_the_watchdog_proves_later_is_told(tmp_path, capsys):
+    """The gateway is away for longer than the session waits."""
+    db, away = tmp_path / "bench.db", "link-away:point=3,seconds=11"
+    box = linear_analyser(known_gain, [away])
+    with served(box) as url:
+        assert measure(db, url, "--json") == 3
+        said = capsys.readouterr()
+    assert "warning: the source is unknown; the watchdog opens the instrument" in said.err
+    assert "warning: the watchdog: source confirmed-off" in said.err
+    assert "source confirmed off" in said.err.splitlines()[-1]
+    assert json.loads(said.out)["source_state"] == "confirmed-off"
+    assert box.driven_v == 0.0
+    with Store(db) as store:
+        assert store.measurement(1).source_state is SourceState.CONFIRMED_OFF
 
 
 def test_no_watchdog_is_left_with_what_is_no_analyser(tmp_path, monkeypatch, capsys):

@@ -35,7 +35,7 @@ def serve(
     seed: Whole = 0,
     noise: Real = 0.5e-3,
     options: str | None = None,
-    dialect: Literal["prologix", "ar488"] = "prologix",
+    dialect: Literal["prologix", "ar488", "ar488-late-eoi"] = "prologix",
     console: Injected,
 ) -> None:
     """Serve a simulated analyser with a gimbal behind it until SIGTERM or SIGINT.
@@ -70,7 +70,7 @@ def serve(
     options
         What the instrument says is installed.
     dialect
-        Which make of adapter.
+        Which make of adapter; ar488-late-eoi asserts EOI after the last byte.
     """
     if tcp is None and prologix_tcp is None and not prologix_pty and not serial_pty:
         raise InputError(
