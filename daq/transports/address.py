@@ -31,7 +31,7 @@ FORMS = (
     "TCPIP::HOST::inst0::INSTR",
     "TCPIP::HOST::hislip0::INSTR",
     "GPIB0::11::INSTR",
-    "USB0::VENDOR::PRODUCT::SERIAL::INSTR",
+    "USB0::0x03EB::0x2065::SERIAL::INSTR",
     "prologix:DEVICE?addr=11",
     "prologix-tcp:HOST:PORT?addr=11",
     "serial:DEVICE?baud=9600&flow=none",
