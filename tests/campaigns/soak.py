@@ -160,10 +160,9 @@ def table(samples: list[Sample]) -> list[str]:
     longest_s = max(sample.session_s for sample in samples)
     lines = [
         f"{end.elapsed_s / 60:.0f} minutes, {sessions} sessions, "
-        f"{sessions * len(LEVELS_VPK)} sweeps, {end.points} points into one history, a sample "
-        f"after every session, at the latest after {longest_s:.0f} s; the first "
-        f"tenth of the sessions is left out, then the median of a tenth at the beginning and "
-        "of one at the end:",
+        f"{sessions * len(LEVELS_VPK)} sweeps, {end.points} points into one history. A sample "
+        f"is taken after every session, at the latest after {longest_s:.0f} s. The first tenth of "
+        "the sessions is left out; the medians are of the next tenth and of the last:",
         "",
         "| | at the beginning | at the end |",
         "| --- | --- | --- |",
