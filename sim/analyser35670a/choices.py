@@ -49,6 +49,11 @@ class Choices:
     filler."""
     most_cycles: float = 234.0
     """Upper limit of ``SWE:DWEL`` in cycles, as printed."""
+    unit_quoted: bool = False
+    """Whether ``? UNIT`` is answered between quotes, as strings are."""
+    long_fft_axis: bool = True
+    """Whether the X axis of FFT mode goes on beyond the displayed lines, to half the block size:
+    clients that were used with real ones cut it to the length of the data."""
     condition_reads_clear: bool = False
     """Whether reading a condition register clears it, as one chapter says of three of them."""
 

@@ -5,6 +5,7 @@ A table; the data come from `traces`, their coordinates from `coordinates`.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -13,9 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.analyser35670a.commands import Answer, Arguments, Command, Numbers, no_arguments
-from sim.analyser35670a.coordinates import encode, transform, unit_of
+from sim.analyser35670a.coordinates import (
+    VOLT_FEEDS,
+    Picture,
+    encode,
+    in_volts,
+    transform,
+    unit_of,
+)
 from sim.analyser35670a.errors import ScpiError
-from sim.analyser35670a.kinds import Number, Pick, Switch, Text, show_integer, show_real
+from sim.analyser35670a.kinds import Number, Pick, Quoted, Switch, Text, show_integer, show_real
 from sim.analyser35670a.settings import Mode, Scope, Setting
 from sim.analyser35670a.tokens import Argument
 from sim.analyser35670a.traces import check_feed, initial_feed, initial_sine_feed
@@ -31,6 +39,7 @@ _FORMS = (
     "POLar",
 )  # fmt: skip
 _PAIRED = ("NYQ", "POL")
+_VOLTS = Quoted(("V", "V2", "V/RTHZ", "V2/HZ", "V2S/HZ"))
 
 
 def _number_format(instrument: Analyser35670A) -> tuple[str, int]:
@@ -75,18 +84,66 @@ def _form(instrument: Analyser35670A, trace: int) -> tuple[str, bool]:
 
 def _shown(instrument: Analyser35670A, trace: int) -> NDArray[np.float64]:
     picture = instrument.traces.picture(trace)
+    if (volts := _volts(instrument, trace)) and instrument.settings.mode is not Mode.SINE:
+        spectrum = instrument.spectrum
+        picture = in_volts(picture, volts, spectrum.bandwidth_hz, spectrum.record_s)
+    elif volts:
+        picture = in_volts(picture, volts, 1.0, 1.0)
     values = transform(picture, *_form(instrument, trace))
     amplitude = instrument.traces.effective(trace, "CALC#:UNIT:AMPL")
     factor = {"PEAK": np.sqrt(2.0), "PP": 2.0 * np.sqrt(2.0)}.get(amplitude, 1.0)
     form = _form(instrument, trace)[0]
-    if factor == 1.0 or not picture.feed.startswith("XFR:POW:LIN"):
+    if factor == 1.0 or picture.feed.partition(" ")[0] not in VOLT_FEEDS:
         return values
+    if picture.power and form != "MLOG":
+        factor *= factor
     if form == "MLOG":
         return np.where(values > -1e30, values + 20.0 * np.log10(factor), values)
     if form == "POL":
         values[0::2] *= factor
         return values
     return values if form in ("PHAS", "UPH", "GDEL") else values * factor
+
+
+def _head(instrument: Analyser35670A, numbers: Numbers) -> str:
+    feed = str(instrument.settings.get("CALC#:FEED", numbers[0]))
+    if re.fullmatch(r"D\d", feed):
+        register = instrument.traces.registers.get(int(feed[1]))
+        feed = "" if register is None else register.feed
+    return feed.partition(" ")[0]
+
+
+def _volts(instrument: Analyser35670A, trace: int) -> str:
+    """The unit of a spectrum in a trace; empty for other data."""
+    head = _head(instrument, (trace,))
+    if head not in VOLT_FEEDS:
+        return ""
+    return instrument.traces.effective(trace, "CALC#:UNIT:VOLT") or VOLT_FEEDS[head]
+
+
+def _keep_volts(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+    if not _volts(instrument, numbers[0]):
+        raise ScpiError(-221, "Measurement data has no such unit.")
+    chosen = _VOLTS.read(arguments, "")
+    if instrument.settings.mode is Mode.SINE and chosen not in ("V", "V2"):
+        raise ScpiError(-221, "Measurement data has no such unit.")
+    old = _volts(instrument, numbers[0])
+    instrument.settings.put("CALC#:UNIT:VOLT", chosen, *numbers)
+    instrument.traces.change_over(numbers[0], "CALC#:UNIT:VOLT", old)
+    return None
+
+
+def _show_volts(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+    no_arguments(arguments)
+    head = _head(instrument, numbers)
+    kept = str(instrument.settings.get("CALC#:UNIT:VOLT", *numbers))
+    return f'"{kept or VOLT_FEEDS[head]}"' if head in VOLT_FEEDS else '""'
+
+
+def _has_amplitude(instrument: Analyser35670A, numbers: Numbers) -> bool:
+    head = _head(instrument, numbers)
+    none = ("XFR:POW:COH", "XFR:POW:RAT", "XTIM:VOLT:CDF", "XTIM:VOLT:HIST", "XTIM:VOLT:PDF")
+    return head not in (*none, "XFR:POW:VAR", "XRPM:PROF")
 
 
 def _data(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
@@ -103,16 +160,22 @@ def _points(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) 
 def _x_data(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
     no_arguments(arguments)
     instrument.begin_read_out()
-    return encode(instrument.traces.picture(numbers[0]).x, _number_format(instrument))
+    picture = instrument.traces.picture(numbers[0])
+    return encode(_axis(instrument, picture), _number_format(instrument))
+
+
+def _axis(instrument: Analyser35670A, picture: Picture) -> NDArray[np.float64]:
+    return instrument.spectrum.shown_axis(picture.x) if picture.x_unit == "HZ" else picture.x
 
 
 def _bottom(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
     """``DISP:TRAC:Y:BOTT?``, mostly asked for its unit."""
     trace = numbers[0]
-    if arguments and arguments[0].text == "UNIT":
+    if arguments and arguments[0].text.upper() == "UNIT":
         form, radians = _form(instrument, trace)
         amplitude = instrument.traces.effective(trace, "CALC#:UNIT:AMPL")
-        return unit_of(instrument.traces.picture(trace).feed, form, radians, amplitude) or '""'
+        feed, volts = instrument.traces.picture(trace).feed, _volts(instrument, trace)
+        return instrument.shown_unit(unit_of(feed, form, radians, amplitude, volts))
     no_arguments(arguments)
     return show_real(float(_shown(instrument, trace).min()))
 
@@ -195,7 +258,7 @@ def _only_name(arguments: Arguments) -> tuple[str, int]:
 def _register_x(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
     picture = _picture_named(instrument, arguments)
     instrument.begin_read_out()
-    return encode(picture.x, _number_format(instrument))
+    return encode(_axis(instrument, picture), _number_format(instrument))
 
 
 def _register_x_unit(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
@@ -264,8 +327,13 @@ def _marker_point(instrument: Analyser35670A, numbers: Numbers, arguments: Argum
     return show_integer(_marker_index(instrument, numbers[0]))
 
 
-def _no_result(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
-    raise ScpiError(-221, "Marker function result not available.")
+def _result(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+    """[S] No function is calculated, which 9.91E37 says; and no weighting was applied."""
+    if arguments and arguments[0].text.upper() == "UNIT":
+        return instrument.shown_unit("")
+    no_arguments(arguments)
+    weighted = instrument.settings.get("CALC#:MARK:FUNC", *numbers) == "WEIG"
+    return show_real(0.0 if weighted else math.nan)
 
 
 COMMANDS = (
@@ -281,7 +349,8 @@ COMMANDS = (
     Command("CALCulate#:MARKer:MAXimum:LEFT", _marker_to(_left_peak)),
     Command("CALCulate#:MARKer:MAXimum:RIGHt", _marker_to(_right_peak)),
     Command("CALCulate#:MARKer:POSition:POINt", None, _marker_point),
-    Command("CALCulate#:MARKer:FUNCtion:RESult", None, _no_result),
+    Command("CALCulate#:MARKer:FUNCtion:RESult", None, _result),
+    Command("CALCulate#:UNIT:VOLTage", _keep_volts, _show_volts),
     Command("CALCulate#:LIMit:FAIL", None, lambda *_: "+0"),
 )
 
@@ -296,10 +365,11 @@ SETTINGS = (
             check=check_feed, overlapped=True),
     Setting("CALCulate#:FORMat", Pick(_FORMS), _initial_form, overlapped=True),
     Setting("CALCulate#:UNIT:ANGLe", Pick(("DEGRee", "RADian")), "DEGR", overlapped=True),
-    Setting("CALCulate#:UNIT:AMPLitude", Pick(("PEAK", "PP", "RMS")), "RMS", overlapped=True),
-    Setting("CALCulate#:UNIT:VOLTage", Pick(("V", "V2", "V/RTHZ", "V2/HZ", "V2S/HZ")), "V",
-            overlapped=True),
-    Setting("CALCulate#:UNIT:X", Pick(("HZ", "CPM", "ORD", "USER")), "HZ", overlapped=True),
+    Setting("CALCulate#:UNIT:AMPLitude", Pick(("PEAK", "PP", "RMS")), "RMS", overlapped=True,
+            applies=_has_amplitude),
+    # Empty stands for the unit that the data come with; the command is above.
+    Setting("CALCulate#:UNIT:VOLTage", _VOLTS, "", overlapped=True),
+    Setting("CALCulate#:UNIT:X", Quoted(("HZ", "CPM", "ORD", "USER")), "HZ", overlapped=True),
     Setting("CALCulate#:ACTive", Pick(("A", "B", "C", "D", "AB", "CD", "ABCD")), "A"),
     Setting("CALCulate#:GDAPerture:APERture", Number(0.0, 20.0, PERCENT), Quantity(0.5, "PCT"),
             reset=Quantity(0.25, "PCT")),

@@ -15,9 +15,11 @@ from typing import TYPE_CHECKING, Any
 from sim.analyser35670a.commands import Act, Answer, Arguments, Command, Numbers, no_arguments
 from sim.analyser35670a.errors import ScpiError
 from sim.analyser35670a.kinds import (
+    Expression,
     Kind,
     Number,
     Pick,
+    Quoted,
     Switch,
     Text,
     Whole,
@@ -125,12 +127,12 @@ _ROWS: tuple[tuple[str, Kind, Any], ...] = (
     ("CALCulate#:MARKer:X:RELative", Number(-102400.0, 102400.0), _ZERO),
     ("CALCulate#:MARKer:Y:RELative", Number(-150.0, 150.0), _ZERO),
     ("CALCulate#:MATH:CONStant#5", Series(1, 2), show_real(0.0) + "," + show_real(0.0)),
-    ("CALCulate#:MATH:[EXPRession#5]", Text(), ""),
+    ("CALCulate#:MATH:[EXPRession#5]", Expression(), ""),
     ("CALCulate#:MATH:SELect", Pick(("F1", "F2", "F3", "F4", "F5")), "F1"),
     ("CALCulate#:MATH:STATe", Switch(), False),
     (
         "CALCulate#:UNIT:DBReference",
-        Pick(("DBV", "DBM", "DBSPL", "DBUSER", "USER")),
+        Quoted(("DBV", "DBM", "DBSPL", "DBUSER", "USER")),
         "DBV",
     ),
     ("CALCulate#:UNIT:DBReference:IMPedance", _FACTOR, Quantity(50.0)),
@@ -138,7 +140,7 @@ _ROWS: tuple[tuple[str, Kind, Any], ...] = (
     ("CALCulate#:UNIT:DBReference:USER:REFerence", _FACTOR, _ONE),
     (
         "CALCulate#:UNIT:MECHanical",
-        Pick(("G", "M/S2", "M/S", "M", "INCH/S2", "INCH/S", "INCH", "MILS")),
+        Quoted(("G", "M/S2", "M/S", "M", "INCH/S2", "INCH/S", "INCH", "MILS")),
         "G",
     ),
     ("CALCulate#:UNIT:X:ORDer:FACTor", _FACTOR, _ONE),

@@ -14,7 +14,16 @@ from numpy.typing import NDArray
 
 from sim.analyser35670a.kinds import show_real
 
-__all__ = ["LOG_OF_ZERO", "NO_UNIT", "Picture", "encode", "transform", "unit_of"]
+__all__ = [
+    "LOG_OF_ZERO",
+    "NO_UNIT",
+    "Picture",
+    "VOLT_FEEDS",
+    "encode",
+    "in_volts",
+    "transform",
+    "unit_of",
+]
 
 LOG_OF_ZERO = -float(np.finfo(np.float32).max)
 """What a logarithmic trace holds where nothing was measured."""
@@ -22,6 +31,9 @@ LOG_OF_ZERO = -float(np.finfo(np.float32).max)
 NO_UNIT = ""
 
 _PAIRS = ("NYQ", "POL")
+
+VOLT_FEEDS = {"XFR:POW": "V2", "XFR:POW:LIN": "V"}
+"""Measurement data whose unit can be chosen, and the unit that they have unless it was."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,8 +112,24 @@ def _group_delay(x: NDArray[np.float64], phase: NDArray[np.float64]) -> NDArray[
     return delay
 
 
-def unit_of(feed: str, form: str, radians: bool, amplitude: str) -> str:
-    """Unit of a trace's Y axis; empty where there is none."""
+def in_volts(picture: Picture, unit: str, bandwidth_hz: float, record_s: float) -> Picture:
+    """A spectrum in the unit of ``CALC:UNIT:VOLT``; other data, and their own unit, as they are."""
+    head = picture.feed.partition(" ")[0]
+    if head not in VOLT_FEEDS or unit == VOLT_FEEDS[head]:
+        return picture
+    power = np.abs(picture.values) if picture.power else np.abs(picture.values) ** 2
+    if unit in ("V2/HZ", "V/RTHZ", "V2S/HZ"):
+        power = power / bandwidth_hz
+    if unit == "V2S/HZ":
+        power = power * record_s
+    is_root = unit in ("V", "V/RTHZ")
+    return Picture(
+        picture.feed, picture.x, np.sqrt(power) if is_root else power, not is_root, picture.x_unit
+    )
+
+
+def unit_of(feed: str, form: str, radians: bool, amplitude: str, volts: str = "") -> str:
+    """Unit of a trace's Y axis; empty where there is none. `volts` is that of a spectrum."""
     if form in ("PHAS", "UPH"):
         return "RAD" if radians else "DEG"
     if form == "GDEL":
@@ -111,7 +139,9 @@ def unit_of(feed: str, form: str, radians: bool, amplitude: str) -> str:
         suffix = {"PEAK": "PK", "PP": "PP"}.get(amplitude, "RMS")
         squared = feed.startswith("XFR:POW:CROS") or feed.split(" ")[0] == "XFR:POW"
         base = "VPK" if feed.startswith("XTIM") else f"V{suffix}"
-        base += "2" if squared and form != "MLOG" else ""
+        per = volts[volts.index("/") :] if "/" in volts else ""
+        squared = volts.startswith("V2") if volts else squared
+        base += ("2" if squared and form != "MLOG" else "") + per
     return f"DB{base}" if form == "MLOG" else base
 
 

@@ -163,6 +163,8 @@ class Dispatcher:
 
     def _keep(self, setting: Setting, numbers: Numbers, arguments: Arguments) -> None:
         instrument, key = self._instrument, key_of(setting.pattern)
+        if setting.applies is not None and not setting.applies(instrument, numbers):
+            raise ScpiError(-221, "Measurement data has no such unit.")
         kept = instrument.settings.get(key, *numbers)
         value = self._kind(setting).read(arguments, kept)
         if setting.check is not None:
@@ -176,17 +178,20 @@ class Dispatcher:
             setting.changed(instrument, numbers)
 
     def _show(self, setting: Setting, numbers: Numbers, arguments: Arguments) -> Answer:
-        value = self._instrument.settings.get(key_of(setting.pattern), *numbers)
+        instrument = self._instrument
+        if setting.applies is not None and not setting.applies(instrument, numbers):
+            return '""'
+        value = instrument.settings.get(key_of(setting.pattern), *numbers)
         kind = self._kind(setting)
         if not arguments:
             return str(kind.show(value))
         if len(arguments) > 1:
             raise ScpiError(-104)
         word = arguments[0].text
-        if arguments[0].kind != "word" or not isinstance(value, Quantity):
+        if arguments[0].kind not in ("word", "string") or not isinstance(value, Quantity):
             raise ScpiError(-104)
-        if word == "UNIT":
-            return value.unit or '""'
+        if word.upper() == "UNIT":
+            return instrument.shown_unit(value.unit)
         if word in ("MIN", "MAX", "MINIMUM", "MAXIMUM"):
             return str(kind.show(kind.read(arguments, value)))
         raise ScpiError(-141)

@@ -279,6 +279,10 @@ class Analyser35670A:
         if self.settings.get("INIT:CONT"):
             self.measurement.start()
 
+    def shown_unit(self, unit: str) -> str:
+        """The answer to ``? UNIT``."""
+        return unit if unit and not self.choices.unit_quoted else f'"{unit}"'
+
     # Resets and power
 
     def reset(self, after_reset: bool) -> None:

@@ -8,6 +8,7 @@ command by name.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -17,9 +18,11 @@ from sim.analyser35670a.tokens import Argument
 from sim.analyser35670a.units import NONE, Quantity, UnitTable
 
 __all__ = [
+    "Expression",
     "Kind",
     "Number",
     "Pick",
+    "Quoted",
     "Switch",
     "Text",
     "Whole",
@@ -114,6 +117,54 @@ class Pick:
     def show(self, value: Any) -> str:
         """The short form."""
         return str(value)
+
+
+@dataclass(frozen=True, slots=True)
+class Quoted:
+    """One of a few words, sent and shown between quotes."""
+
+    words: tuple[str, ...]
+
+    def read(self, arguments: Sequence[Argument], kept: Any) -> str:
+        """The word, in any case."""
+        argument = one_argument(arguments)
+        word = argument.text.strip().upper()
+        if argument.kind != "string" or word not in self.words:
+            raise ScpiError(-151)
+        return word
+
+    def show(self, value: Any) -> str:
+        """In double quotes."""
+        return f'"{value}"'
+
+
+_TERMS = re.compile(
+    r"(?:AWEIGHT|BWEIGHT|CWEIGHT|CONJ|DIFF|DJOM|EXP|FFT|IFFT|INTEG|IMAG|LN|MAG|PSD|REAL|SQRT|XJOM"
+    r"|ACORR[1-4]?|CDF[1-4]?|COH(?:21|31|41|43)?|CPOW[1-4]?|CSPEC(?:21|31|41|43)?"
+    r"|FRES(?:21|31|41|43)?|HIST[1-4]?|LSPEC[1-4]?|NVAR[1-4]?|PDF[1-4]?|PSPEC[1-4]?|RPM"
+    r"|TIME[1-4]?|TRACK[1-5][1-4]|WTIME[1-4]?|XCORR(?:21|31|41|43)?|D[1-8]|F[1-5]|K[1-5]"
+    r"|[-+*/()\s])*"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Expression:
+    """A function of trace data between parentheses; kept as it was sent."""
+
+    longest: int = 270
+
+    def read(self, arguments: Sequence[Argument], kept: Any) -> str:
+        """What was sent, if it consists of operations and operands."""
+        argument = one_argument(arguments)
+        if argument.kind != "expression" or len(argument.text) > self.longest:
+            raise ScpiError(-120)
+        if not _TERMS.fullmatch(argument.text):
+            raise ScpiError(-120)
+        return argument.text
+
+    def show(self, value: Any) -> str:
+        """In double quotes."""
+        return f'"{value}"'
 
 
 @dataclass(frozen=True, slots=True)

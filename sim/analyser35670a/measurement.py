@@ -70,6 +70,7 @@ class Measurement:
         self.spoilt = False
         self._operation = instrument.operations.begin()
         if instrument.settings.mode is not Mode.SINE:
+            instrument.spectrum.begin()
             self._run(self._other_mode())
             return
         self.sweep = plan_sweep(instrument)
@@ -118,6 +119,10 @@ class Measurement:
         if self.state is not State.IDLE and self.spoilt:
             raise ScpiError(-200, _CANNOT_CONTINUE)
         process = self._process
+        if self.state is State.DONE and self._may_add:
+            self._operation = self._instrument.operations.begin()
+            self._run(self._other_mode())
+            return
         if self.state is not State.PAUSED or process is None:
             self.start()
             return
@@ -126,6 +131,12 @@ class Measurement:
         self.check_level()
         if self.running:
             process.resume()
+
+    @property
+    def _may_add(self) -> bool:
+        """Whether more averages are wanted now than were taken."""
+        spectrum = self._instrument.spectrum
+        return spectrum.averages and 0 < spectrum.averaged < spectrum.wanted
 
     def stop(self) -> None:
         """``ABOR``: nothing is pending afterwards."""
@@ -159,7 +170,8 @@ class Measurement:
         self.state = State.DONE
         instrument.status.operation.put(_BUSY, False)
         self._end_operation()
-        if instrument.settings.get("INIT:CONT"):
+        frozen = instrument.settings.mode is not Mode.SINE and instrument.spectrum.freezes
+        if instrument.settings.get("INIT:CONT") and not frozen:
             # [S] A continuous sweep starts over at once.
             self.start()
         elif instrument.settings.mode is Mode.SINE and not instrument.choices.source_stays_on:
@@ -169,11 +181,17 @@ class Measurement:
     # Processes
 
     def _other_mode(self) -> Steps:
-        """A measurement of the other modes: one record; in continuous mode ever newer ones."""
-        yield self._instrument.spectrum.record_s
-        self._instrument.spectrum.take()
-        self._instrument.status.device.pulse(Device.DISPLAY_READY)
+        """A measurement of the other modes: so many records; in continuous mode ever newer ones."""
+        spectrum = self._instrument.spectrum
+        while not spectrum.complete:
+            while self.state is State.PAUSED:
+                yield HOLD
+            yield spectrum.record_s
+            spectrum.take()
+            self._instrument.status.device.pulse(Device.DISPLAY_READY)
         self._end_operation()
+        if spectrum.freezes:
+            return
         while self._instrument.settings.get("INIT:CONT") or self.state is State.PAUSED:
             # Newer records are taken when somebody looks.
             yield HOLD

@@ -97,6 +97,8 @@ class Setting:
         Gives what MIN and MAX mean where that depends on other settings.
     overlapped
         Whether the trace shows the old value for a moment.
+    applies
+        Whether there is anything to be set now; else a query gives a null string.
     """
 
     pattern: str
@@ -113,6 +115,7 @@ class Setting:
     step_from: str = ""
     bounds: Callable[[Analyser35670A], tuple[float, float]] | None = None
     overlapped: bool = False
+    applies: Callable[[Analyser35670A, Numbers], bool] | None = None
 
     def original(self, mode: Mode, numbers: Numbers, after_reset: bool) -> Any:
         """The value that a reset gives."""

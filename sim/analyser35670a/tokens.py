@@ -36,9 +36,9 @@ class Unit:
 
 @dataclass(frozen=True, slots=True)
 class Argument:
-    """One parameter: a number with its suffix, a word, a string or a block."""
+    """One parameter: a number with its suffix, a word, a string, a block or ``(an expression)``."""
 
-    kind: Literal["number", "word", "string", "block"]
+    kind: Literal["number", "word", "string", "block", "expression"]
     text: str = ""
     number: float = 0.0
     suffix: str = ""
@@ -177,6 +177,8 @@ def _read_one(text: bytes) -> tuple[Argument, bytes]:
         return _read_string(text)
     if text.startswith(b"#"):
         return _read_block(text)
+    if text.startswith(b"("):
+        return _read_expression(text)
     if match := _NUMBER.match(text):
         digits, suffix = match.group(1), match.group(2) or b""
         number = float(bytes(digits).translate(None, b" \t"))
@@ -186,6 +188,17 @@ def _read_one(text: bytes) -> tuple[Argument, bytes]:
         )
     if match := _WORD.match(text):
         return Argument("word", match.group().decode().upper()), text[match.end() :]
+    raise ScpiError(-120)
+
+
+def _read_expression(text: bytes) -> tuple[Argument, bytes]:
+    """Up to the parenthesis that closes the first one."""
+    depth = 0
+    for at, byte in enumerate(text):
+        depth += {40: 1, 41: -1}.get(byte, 0)
+        if not depth:
+            inner = bytes(text[: at + 1])
+            return Argument("expression", inner.decode("latin-1").upper()), text[at + 1 :]
     raise ScpiError(-120)
 
 
