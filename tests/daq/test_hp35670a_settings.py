@@ -10,13 +10,14 @@ import re
 
 import pytest
 
-from daq.analyser import PointSettings
+from daq.analyser import PointSettings, SourceState
 from daq.dialogue import Dialogue
 from daq.errors import InstrumentError, LimitError
+from daq.hp35670a import HP35670A
 from daq.hp35670a.settings import LEVEL, SETTINGS, check_drive, standing_settings
 from daq.hp35670a.setup import enter_swept_sine, planned_settings
 from daq.scpi_settings import Choice, Number, Switch
-from sim.analyser35670a import Analyser35670A, LinearPlant
+from sim.analyser35670a import Analyser35670A, Choices, LinearPlant
 from sim.loopback import Loopback
 
 IDS = [setting.name for setting in SETTINGS]
@@ -168,3 +169,17 @@ def test_bands_are_refused_before_anything_is_sent(band):
 
 def test_level_and_offset_at_the_bound_are_taken():
     check_drive(PointSettings(5.0, 5, 30, dc_offset_v=-5.0))
+
+
+def test_units_between_quotes_are_the_same_units():
+    """Nobody says whether ``? UNIT`` is answered with quotes."""
+    taken = []
+    for quoted in (False, True):
+        box = Analyser35670A(LinearPlant(lambda hz: 0.5 + 0j), Choices(unit_quoted=quoted))
+        analyser = HP35670A(Loopback(box))
+        analyser.identify()
+        read_back = analyser.prepare(100.0, 200.0, PointSettings(1.5, 2, 3))
+        taken.append((dict(read_back), list(analyser.sweep((120.0, 150.0)))))
+        assert analyser.make_safe() is SourceState.CONFIRMED_OFF
+        assert box.driven_v == 0.0
+    assert taken[0] == taken[1]

@@ -152,8 +152,10 @@ def test_coherence_is_that_of_the_averages(fft):
 # Lines
 
 
-@pytest.mark.parametrize(("asked", "lines", "read"), [(100, 100, 129), (400, 400, 513),
-                                                      (800, 800, 1025), (801, 1600, 2049)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("asked", "lines", "read"),
+    [(100, 100, 129), (400, 400, 513), (800, 800, 1025), (801, 1600, 2049)],
+)
 def test_the_axis_goes_on_beyond_the_lines(fft, asked, lines, read):
     fft.write(f"FREQ:RES {asked}")
     measured(fft)
