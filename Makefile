@@ -9,13 +9,14 @@ READY := .venv/.ready
 
 LOWEST := .venv/lowest
 
-.PHONY: help demo test tests check lowest train training bench blind faults fuzz soak docs audit lock clean
+.PHONY: help demo test tests check lowest clients train training bench blind faults fuzz soak docs audit lock clean
 
 help:
 	@echo "make demo    the whole job without hardware; results in demo/"
 	@echo "make test    all checks and tests"
 	@echo "make check   style, types, floors and links; under a minute"
 	@echo "make lowest  some tests with the lowest versions that are allowed; two minutes"
+	@echo "make clients programs of others against the simulated analysers; a minute"
 	@echo "make train   train the posteriors further, MACHINES=200000 each; some hours"
 	@echo "make bench   benchmarks"
 	@echo "make blind   hide effects and have the diagnosis find them; some hours"
@@ -52,6 +53,16 @@ lowest: $(LOWEST)/.ready
 	  tests/daq/test_formats_lossless.py tests/daq/test_formats_sdf.py tests/daq/test_formats_uff.py \
 	  tests/daq/test_store.py tests/daq/test_transports_visa.py tests/tui/test_cli.py \
 	  tests/tui/test_app_way.py tests/analysis/test_response_figure.py tests/sim/test_compiling.py
+
+# Programs of others, as they are packaged, in a folder of their own: what is installed for the
+# tests stays as it is locked. Without the network those that need them are left out.
+CLIENTS := pymeasure==0.16.0 pint==0.25.3 flexcache==0.3 flexparser==0.4 fft-dev==0.4.7 iopy==0.2.4
+
+clients: $(READY)
+	@test -d .venv/clients/pymeasure || $(BIN)/python -m pip install -qq --no-deps \
+	  --disable-pip-version-check --target .venv/clients $(CLIENTS) \
+	  || echo "packaged clients were not installed; going on without" >&2
+	@$(BIN)/python -m pytest -m clients -W default --disable-warnings -rs tests/clients
 
 MACHINES ?= 200000
 

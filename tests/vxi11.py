@@ -5,6 +5,8 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 
+from sim.instrument.pace import Fast
+
 IO_TIMEOUT = 15
 CREATE_LINK, WRITE, READ, READ_STB, CLEAR, DESTROY_LINK = 10, 11, 12, 13, 15, 23
 
@@ -78,3 +80,32 @@ class Vxi11Instrument:
             return struct.pack(">I", 0)
         assert procedure == DESTROY_LINK
         return struct.pack(">I", 0)
+
+
+class Gateway(Vxi11Instrument):
+    """A LAN gateway with a simulated instrument on its bus."""
+
+    def __init__(self, box, **lacking):
+        super().__init__(self._exchange)
+        vars(self).update(lacking)
+        self._box, self._pace = box, Fast(box)
+
+    def _exchange(self, message):
+        self._box.listen(message, end=True)
+        self._rest()
+        found = bytearray()
+        while self._box.reply_ready:
+            found += self._box.talk().data
+        return bytes(found)
+
+    def _rest(self):
+        for _ in range(3):
+            self._pace.advance()
+
+    def _procedure(self, procedure, body):
+        self._rest()
+        if procedure == READ_STB and not self.errors.get(READ_STB):
+            return struct.pack(">2I", 0, self._box.serial_poll())
+        if procedure == CLEAR and not self.errors.get(CLEAR):
+            self._box.device_clear()
+        return super()._procedure(procedure, body)

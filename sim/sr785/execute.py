@@ -60,7 +60,7 @@ class Executor:
             "DISP": self._live, "STRT": self._start, "PAUS": self._pause, "CONT": self._go_on,
             "TMAN": self._nothing, "DSPN": self._length, "DBIN": self._bin, "DSPY": self._text,
             "DSPB": self._binary, "UNIT": self._unit, "SSFR": self._progress,
-            "INPC": self._input_now,
+            "INPC": self._input_now, "NAVG": self._averages,
         }  # fmt: skip
 
     def run(self, text: str) -> Outcome:
@@ -228,6 +228,13 @@ class Executor:
         return Outcome(shown)
 
     # ------------------------------------------------------------ data
+
+    def _averages(self, command: Command) -> Outcome:
+        """``NAVG? d``: records in the average so far."""
+        self._asks(command)
+        self._count(command, 1)
+        self._display(command)
+        return Outcome(str(self._instrument.sweep.averaged))
 
     def _length(self, command: Command) -> Outcome:
         self._asks(command)

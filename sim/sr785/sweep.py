@@ -54,6 +54,8 @@ class Sweep:
         self.state = State.IDLE
         self.started = 0
         self.points_begun = 0
+        self.averaged = 0
+        """Records in the average of a group that does not sweep."""
         self.axis_hz: NDArray[np.float64] = np.zeros(0)
         self.bins: dict[int, tuple[int, Point]] = {}
         """By bin: running number of the point, and the point."""
@@ -132,11 +134,18 @@ class Sweep:
     # ------------------------------------------------------------ processes
 
     def _records(self) -> Steps:
+        """Records of a group that does not sweep; a linear average ends with its last."""
+        get, status = self._instrument.settings.get, self._instrument.status
+        self.averaged = 0
         while True:
             yield _RECORD_S
-            self._instrument.status.put("DSPS", Display.NEW | Display.NEW << 8)
-            if self._instrument.settings.get("FAVT") == 0:
-                return
+            status.put("DSPS", Display.NEW | Display.NEW << 8)
+            self.averaged += 1
+            wanted = int(get("FAVN")) if get("FAVG") else 1
+            if self.averaged >= wanted:
+                status.put("DSPS", Display.AVERAGED | Display.AVERAGED << 8)
+                if get("FAVT") == 0:
+                    return
 
     def _points(self) -> Steps:
         instrument, skip, passed = self._instrument, 0, 0

@@ -9,7 +9,7 @@ from contextlib import suppress
 import pytest
 from bench_server import simulated
 from fake_analyser import known_gain
-from vxi11 import CLEAR, READ_STB, WRITE, Vxi11Instrument
+from vxi11 import CLEAR, READ_STB, WRITE, Gateway, Vxi11Instrument
 from wire import ByteServer, lines_of
 
 from daq.analyser import PointSettings, SourceState
@@ -23,7 +23,6 @@ from daq.store_records import MeasurementHeader
 from daq.transports.base import Deadline, ask, ask_block
 from daq.transports.open import open_transport
 from daq.transports.visa import open_visa
-from sim.instrument.pace import Fast
 from sim.instrument.plant import LinearPlant
 
 PAYLOAD = struct.pack(">6d", 1.0, -2.0, 10.0, 43.0, 9.9e37, 0.0) + b"\n\r\x1b+\0#\n"
@@ -171,35 +170,6 @@ def test_bytes_without_a_header_are_counted(vxi11, raw):
         transport.write("N?", Deadline.after(2.0))
         with pytest.raises(BenchTimeout):
             transport.read_bytes(8, Deadline.after(0.1))
-
-
-class Gateway(Vxi11Instrument):
-    """A LAN gateway with a simulated instrument on its bus."""
-
-    def __init__(self, box, **lacking):
-        super().__init__(self._exchange)
-        vars(self).update(lacking)
-        self._box, self._pace = box, Fast(box)
-
-    def _exchange(self, message):
-        self._box.listen(message, end=True)
-        self._rest()
-        found = bytearray()
-        while self._box.reply_ready:
-            found += self._box.talk().data
-        return bytes(found)
-
-    def _rest(self):
-        for _ in range(3):
-            self._pace.advance()
-
-    def _procedure(self, procedure, body):
-        self._rest()
-        if procedure == READ_STB and not self.errors.get(READ_STB):
-            return struct.pack(">2I", 0, self._box.serial_poll())
-        if procedure == CLEAR and not self.errors.get(CLEAR):
-            self._box.device_clear()
-        return super()._procedure(procedure, body)
 
 
 @pytest.mark.parametrize("driver", DRIVERS, ids=lambda driver: driver.scheme or "preset")
