@@ -14,7 +14,7 @@ LOWEST := .venv/lowest
 help:
 	@echo "make demo    the whole job without hardware; results in demo/"
 	@echo "make test    all checks and tests"
-	@echo "make check   style, types, floors and links; under a minute"
+	@echo "make check   style, types, floors, links and readability; under a minute"
 	@echo "make lowest  some tests with the lowest versions that are allowed; two minutes"
 	@echo "make clients programs of others against the simulated analysers; a minute"
 	@echo "make train   train the posteriors further, MACHINES=200000 each; some hours"
@@ -44,6 +44,7 @@ check: $(READY)
 	@$(BIN)/mypy --no-error-summary
 	@$(BIN)/lint-imports --no-logo > .venv/lint-imports.log || { cat .venv/lint-imports.log; exit 1; }
 	@$(BIN)/python tests/links.py
+	@$(BIN)/python tests/readability.py
 	@$(BIN)/python tests/locked.py
 
 # Numba's cache beside the sources is that of the usual versions.
