@@ -60,7 +60,8 @@ class Recipe:
 
     `seed`: of the batches, whose numbers begin at `first`. `epochs`: how often training sees each
     machine; `rate`: the highest learning rate, which falls to nothing along a cosine; `examples` in
-    a step; `dropout` of the summary's units. `shape`: see `analysis.inference.network`.
+    a step; `dropout` of the summary's units; `decay` of weights. `shape`: see
+    `analysis.inference.network`.
     """
 
     seed: int = 1
@@ -68,7 +69,8 @@ class Recipe:
     epochs: float = 8.0
     examples: int = 192
     rate: float = 1e-3
-    dropout: float = 0.1
+    dropout: float = 0.2
+    decay: float = 0.05
     shape: Mapping[str, Any] | None = None
 
 
@@ -169,7 +171,7 @@ def train_unit(
         seen += [(others, load_batch(one)) for one in sorted(folder.glob("[0-9]*.npz"))]
     count = sum(len(one) for _, one in seen)
     steps = max(int(recipe.epochs * count / recipe.examples), 1)
-    schedule = Schedule(steps, recipe.examples, recipe.rate, recipe.dropout)
+    schedule = Schedule(steps, recipe.examples, recipe.rate, recipe.dropout, recipe.decay)
     if state is None or state.machines != count:
         shape = known.shape if known else scales.architecture(**recipe.shape or {})
         weights = known.weights if known else first_weights(shape, np.random.default_rng(0))

@@ -29,6 +29,9 @@ __all__ = ["ROWS", "Examples", "Scales", "conditions", "estimated_noise", "read_
 ROWS = (3, 5)
 """Levels that examples are padded to in training; answers may have more."""
 
+_BAND = 0.25
+"""Largest share of the band that may be missing from an example."""
+
 _NOISE_V = (1e-4, 3e-3)
 _QUIET_SHARE = 0.02
 
@@ -165,6 +168,11 @@ def read_batch(
     drawn = np.exp(rng.uniform(low, high, count))
     noise_v = np.where(usual, USUAL_NOISE_V, drawn)
     noise = (noise_v[:, None, None] / levels_vpk[:, None]).astype(np.float32)
+    if degrade:
+        # Another realisation of the cycles that were averaged, so that no run is learned by heart.
+        share = np.sqrt(0.5 * variance) * rng.random((count, 1, 1), dtype=np.float32)
+        again = rng.standard_normal((2, *mean.shape), dtype=np.float32) * share
+        mean = mean * (1.0 + again[0] + 1j * again[1])
     added = rng.standard_normal((2, *mean.shape), dtype=np.float32) * noise
     gain = mean + added[0] + 1j * added[1]
     size = np.maximum(np.abs(gain), 1e-9)
@@ -172,8 +180,10 @@ def read_batch(
     scatter_known = rng.random(count) < (0.85 if degrade else 1.0)
     phase_known = rng.random(count) < (0.92 if degrade else 1.0)
     scatter = np.where(scatter_known[:, None, None], scatter, np.nan).astype(np.float32)
-    if degrade and rng.random() < 0.15:
-        lost = rng.random(gain.shape) < 0.1
+    if degrade:
+        lost = _unread_band(count, len(columns), rng)
+        if rng.random() < 0.15:
+            lost = lost | (rng.random(gain.shape) < 0.1)
         gain, scatter = np.where(lost, np.nan, gain), np.where(lost, np.nan, scatter)
     plan = batch.plan
     swept = SweptLevels(
@@ -221,11 +231,20 @@ def _all_of(batch: Batch) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 def _kept(batch: Batch, rng: np.random.Generator) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Levels and points that the bench read: sometimes some of them alone."""
     levels, columns = _all_of(batch)
-    if len(levels) > 1 and rng.random() < 0.2:
+    if len(levels) > 1 and rng.random() < 0.3:
         levels = np.sort(rng.choice(levels, rng.integers(1, len(levels)), replace=False))
     if len(columns) >= 30 and rng.random() < 0.15:
         columns = columns[rng.integers(2) :: 2]
     return levels, columns
+
+
+def _unread_band(count: int, columns: int, rng: np.random.Generator) -> NDArray[np.bool_]:
+    """Points (n, 1, F) of a band that half of the examples lack at every level."""
+    width = rng.uniform(0.0, _BAND, count) * columns * (rng.random(count) < 0.5)
+    start = rng.random(count) * (columns - width)
+    place = np.arange(columns)
+    found = (place >= start[:, None]) & (place < (start + width)[:, None])
+    return np.asarray(found[:, None, :])
 
 
 def _padded(

@@ -44,8 +44,8 @@ class Schedule:
     steps: int
     examples: int = 192
     rate: float = 1.2e-3
-    dropout: float = 0.1
-    decay: float = 0.02
+    dropout: float = 0.2
+    decay: float = 0.05
 
     def rate_at(self, step: int) -> float:
         """Learning rate of a step."""
