@@ -9,7 +9,7 @@ READY := .venv/.ready
 
 LOWEST := .venv/lowest
 
-.PHONY: help demo test tests check lowest clients train training bench blind faults fuzz soak docs audit lock clean
+.PHONY: help demo test tests check lowest clients first-day train training bench blind faults fuzz soak docs audit lock clean
 
 help:
 	@echo "make demo    the whole job without hardware; results in demo/"
@@ -17,6 +17,7 @@ help:
 	@echo "make check   style, types, floors, links and readability; under a minute"
 	@echo "make lowest  some tests with the lowest versions that are allowed; two minutes"
 	@echo "make clients programs of others against the simulated analysers; a minute"
+	@echo "make first-day INSTRUMENT=URL  guided checks of a real analyser, with a report; half an hour"
 	@echo "make train   train the posteriors further, MACHINES=200000 each; some hours"
 	@echo "make bench   benchmarks"
 	@echo "make blind   hide effects and have the diagnosis find them; some hours"
@@ -64,6 +65,12 @@ clients: $(READY)
 	  --disable-pip-version-check --target .venv/clients $(CLIENTS) \
 	  || echo "packaged clients were not installed; going on without" >&2
 	@$(BIN)/python -m pytest -m clients -W default --disable-warnings -rs tests/clients
+
+INSTRUMENT ?= sim:
+FIRST_DAY ?= first-day
+
+first-day: $(READY)
+	@$(BIN)/lashbench first-day --instrument '$(INSTRUMENT)' --out '$(FIRST_DAY)'
 
 MACHINES ?= 200000
 

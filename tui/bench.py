@@ -19,15 +19,17 @@ if TYPE_CHECKING:
     from daq.aside import Aside
     from daq.bench_lock import BenchLock
     from daq.control import SessionControl
+    from daq.driving.entry import Driver
     from daq.limits import Limits
     from daq.session import Session
     from daq.session_events import Finished, SessionEvent
     from daq.session_request import SessionRequest
     from daq.store import Store
+    from daq.transports.base import Transport
     from daq.watchdog import Watchdog
     from sim.unit import Unit
 
-__all__ = ["bench_session", "connect", "drives_hardware", "unit_limits"]
+__all__ = ["bench_session", "connect", "connect_wire", "drives_hardware", "unit_limits"]
 
 _LOCK_S = 60.0
 """Bound of having the bench's lock, which waits for the watchdog of a session that was killed."""
@@ -91,6 +93,23 @@ def connect(
 
         factories["sim"] = open_loopback(unit, scheme=driver_at(url)[0].scheme)
     return open_analyser(url, factories, record=transcript, fault=fault)
+
+
+def connect_wire(url: str, unit: Unit, transcript: Path | None = None) -> tuple[Driver, Transport]:
+    """The driver of an address and an open wire; parameters and errors are those of `connect`."""
+    from daq.drivers import driver_at, is_simulated, parse_instrument
+    from daq.transports.open import TransportFactory, open_transport
+
+    driver, address = driver_at(url)
+    factories: dict[str, TransportFactory] = {}
+    if is_simulated(url):
+        from sim.loopback import open_loopback
+
+        factories["sim"] = open_loopback(unit, scheme=driver.scheme)
+    parse_instrument(url, tuple(factories))
+    return driver, open_transport(
+        address, factories, record=transcript, gpib_address=driver.gpib_address
+    )
 
 
 def bench_session(

@@ -51,6 +51,7 @@ VERBS = {
     "bench": ("tui.commands.bench:bench", "Open the bench screen; so does no verb at all."),
     "replay": ("tui.commands.replay:replay", "Show a recorded session as it ran."),
     "doctor": ("tui.commands.doctor:doctor", "Check this installation; say what to mend."),
+    "first-day": ("tui.commands.first_day:first_day", "Check a real instrument on its first day."),
     "completion": ("tui.commands.completion:completion", "Print completions for a shell."),
 }
 """Every verb: the function that does it, and its line in the help."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from daq.analyser import Analyser
+    from daq.driving.first_day import Check
     from daq.transports.base import Transport
 
 __all__ = ["Driver"]
@@ -32,6 +33,8 @@ class Driver:
     """What the second field of ``*IDN?`` ends with, in capitals."""
     gpib_address: int
     """The address that the instrument comes with."""
+    first_day: Callable[[], tuple[Check, ...]] | None = None
+    """Checks of what the driver assumes, for whoever has a real instrument; imports them."""
 
     def answers(self, identity: str) -> bool:
         """Whether an answer to ``*IDN?`` is that of an instrument of this driver."""

@@ -8,6 +8,7 @@ from daq.driving.entry import Driver
 
 if TYPE_CHECKING:
     from daq.analyser import Analyser
+    from daq.driving.first_day import Check
     from daq.plan import SweepPlan
     from daq.transports.base import Transport
 
@@ -32,4 +33,10 @@ def _check(
     check_sweep(plan, slew_vpk_per_s, input_range_vpk, may_repeat=may_repeat)
 
 
-DRIVER = Driver("HP/Agilent 35670A", "", _drive, _check, ("35670A",), 11)
+def _first_day() -> tuple[Check, ...]:
+    from daq.hp35670a.first_day import CHECKS
+
+    return CHECKS
+
+
+DRIVER = Driver("HP/Agilent 35670A", "", _drive, _check, ("35670A",), 11, _first_day)

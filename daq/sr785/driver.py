@@ -8,6 +8,7 @@ from daq.driving.entry import Driver
 
 if TYPE_CHECKING:
     from daq.analyser import Analyser
+    from daq.driving.first_day import Check
     from daq.plan import SweepPlan
     from daq.transports.base import Transport
 
@@ -32,4 +33,12 @@ def _check(
     check_sweep(plan, slew_vpk_per_s, input_range_vpk)
 
 
-DRIVER = Driver("Stanford Research SR785/SR780", "sr785", _drive, _check, ("SR785", "SR780"), 10)
+def _first_day() -> tuple[Check, ...]:
+    from daq.sr785.first_day import CHECKS
+
+    return CHECKS
+
+
+DRIVER = Driver(
+    "Stanford Research SR785/SR780", "sr785", _drive, _check, ("SR785", "SR780"), 10, _first_day
+)
