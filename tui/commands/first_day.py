@@ -18,6 +18,7 @@ from tui.options import Json, Real, UnitName
 from tui.output import Console, Injected
 
 if TYPE_CHECKING:
+    from daq.analyser import Identity
     from daq.driving.first_day import Finding, FirstDay
 
 __all__ = ["first_day"]
@@ -176,8 +177,8 @@ def _looked_at(
     }
 
 
-def _identity(day: FirstDay):  # type: ignore[no-untyped-def]
-    from daq.analyser import Identity
+def _identity(day: FirstDay) -> Identity | None:
+    from daq.analyser import Identity as Known
 
     found = day.kept.get("identity")
-    return found if isinstance(found, Identity) else None
+    return found if isinstance(found, Known) else None
