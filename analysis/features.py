@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-__all__ = ["Feature", "LevelFeatures", "Method", "summary", "to_json"]
+__all__ = ["Feature", "FeaturePair", "LevelFeatures", "Method", "summary", "to_json"]
 
 Method = Literal["rational", "parabola", "grid"]
 
@@ -44,6 +44,14 @@ class Feature:
 
 
 @dataclass(frozen=True, slots=True)
+class FeaturePair:
+    """An anti-resonance and the resonance next above it; None for the one that lacks."""
+
+    arf: Feature | None
+    rf: Feature | None
+
+
+@dataclass(frozen=True, slots=True)
 class LevelFeatures:
     """What one source level shows.
 
@@ -59,6 +67,8 @@ class LevelFeatures:
         unless both are there.
     flags
         What a reader should know; each starts with ``arf:``, ``rf:`` or ``level:``.
+    pairs
+        All that are in the band, ascending; `arf` and `rf` are of one of them.
     """
 
     source_vpk: float
@@ -67,13 +77,15 @@ class LevelFeatures:
     difference_hz: float | None
     difference_std_hz: float | None
     flags: tuple[str, ...]
+    pairs: tuple[FeaturePair, ...] = ()
 
 
 def to_json(features: Sequence[LevelFeatures]) -> dict[str, Any]:
     """The levels as one JSON document of plain dictionaries, lists, numbers and None.
 
     ``damping_ratio`` holds for ``arf`` and ``rf`` each ``{"value", "std"}`` or
-    None. Whatever is not known is None, never NaN.
+    None; ``pairs`` lists all pairs, each feature with its damping ratio.
+    Whatever is not known is None, never NaN.
     """
     return {"levels": [_level_json(level) for level in features]}
 
@@ -90,7 +102,17 @@ def _level_json(level: LevelFeatures) -> dict[str, Any]:
             for name, f in (("arf", level.arf), ("rf", level.rf))
         },
         "flags": list(level.flags),
+        "pairs": [
+            {"arf": _paired_json(pair.arf), "rf": _paired_json(pair.rf)} for pair in level.pairs
+        ],
     }
+
+
+def _paired_json(feature: Feature | None) -> dict[str, Any] | None:
+    found = _feature_json(feature)
+    if feature is not None and found is not None:
+        found["damping_ratio"] = _pair(feature.damping_ratio, feature.damping_std)
+    return found
 
 
 def _feature_json(feature: Feature | None) -> dict[str, Any] | None:
@@ -135,6 +157,11 @@ def _rows(level: LevelFeatures) -> Iterator[tuple[str, ...]]:
     apart = with_error(level.difference_hz, level.difference_std_hz)
     yield _level_name(level), "ARF", *_cells(level.arf), ""
     yield "", "RF", *_cells(level.rf), apart
+    for number, pair in enumerate(level.pairs, start=1):
+        if pair.arf is not None and pair.arf is not level.arf:
+            yield "", f"ARF {number}", *_cells(pair.arf), ""
+        if pair.rf is not None and pair.rf is not level.rf:
+            yield "", f"RF {number}", *_cells(pair.rf), ""
 
 
 def _cells(feature: Feature | None) -> tuple[str, str, str]:

@@ -1,7 +1,7 @@
 """Anti-resonance (ARF), resonance (RF) and damping of a response, per source level.
 
-Owns the order in which the ways of reading a feature are tried: the linear
-model, then a parabola, then the grid; docs/resonance.md says why. The same
+Owns the order in which the ways of reading a feature are tried: one linear model of the
+whole band, then one of each feature, a parabola, the grid; docs/resonance.md says why. The same
 reader serves measured and simulated responses, so that its bias cancels. It
 draws nothing and never alters a response.
 """
@@ -15,7 +15,10 @@ import numpy as np
 
 from analysis.candidates import Candidate, find_candidates
 from analysis.damping import measure_half_power
-from analysis.features import Feature, LevelFeatures, Method, summary, to_json
+from analysis.extraction.extrema import MOST_ZETA
+from analysis.extraction.pairs import model_features
+from analysis.extraction.reader import ModelReading, read_model
+from analysis.features import Feature, FeaturePair, LevelFeatures, Method, summary, to_json
 from analysis.linear import LinearReading, Start, read_both, read_one
 from analysis.peak import read_peak, shape_error
 from analysis.progress import Progress
@@ -99,22 +102,35 @@ def _read_level(source_vpk: float, level: FrequencyResponse, most: int) -> Level
         samples = level_samples(level, most)
     except AnalysisError as error:
         return LevelFeatures(source_vpk, None, None, None, None, (f"level: {error}",))
-    return _Reader(samples, *find_candidates(samples)).read(source_vpk)
+    candidates = find_candidates(samples)
+    flags = _level_flags(samples)
+    reading = read_model(samples)
+    if isinstance(reading, ModelReading):
+        return model_features(source_vpk, reading, samples, candidates, flags)
+    return _Reader(samples, candidates, flags).read(source_vpk)
+
+
+def _level_flags(samples: Samples) -> list[str]:
+    """What is special about the readings of a level."""
+    flags = []
+    if samples.grouped > 1:
+        flags.append(f"level: read from means of {samples.grouped} neighbouring points")
+    if not samples.noise_known:
+        flags.append("level: no standard errors given; estimated from the scatter")
+    if not np.isfinite(samples.phase_std).any():
+        flags.append("level: no phase; read from the gain alone")
+    return flags
 
 
 class _Reader:
     """One level while it is being read: its candidates, and the flags gathered so far."""
 
-    def __init__(self, samples: Samples, valley: Candidate, hill: Candidate) -> None:
+    def __init__(
+        self, samples: Samples, candidates: tuple[Candidate, Candidate], flags: list[str]
+    ) -> None:
         self.samples = samples
-        self.candidates = [c for c in (valley, hill) if c.index is not None]
-        self.flags = [f"{NAMES[c.sign]}: {c.reason}" for c in (valley, hill) if c.index is None]
-        if samples.grouped > 1:
-            self.flags.append(f"level: read from means of {samples.grouped} neighbouring points")
-        if not samples.noise_known:
-            self.flags.append("level: no standard errors given; estimated from the scatter")
-        if not np.isfinite(samples.phase_std).any():
-            self.flags.append("level: no phase; read from the gain alone")
+        self.candidates = [c for c in candidates if c.index is not None]
+        self.flags = [f"{NAMES[c.sign]}: {c.reason}" for c in candidates if c.index is None] + flags
 
     def read(self, source_vpk: float) -> LevelFeatures:
         """Both features by one linear model if it fits, else each on its own."""
@@ -142,11 +158,20 @@ class _Reader:
                 del features[sign]
                 self.flags.append(f"{NAMES[sign]}: the readings span more than can be computed")
         arf, rf = features.get(-1), features.get(1)
+        for sign, name in NAMES.items():
+            read = features.get(sign)
+            if read is not None and (read.damping_ratio or 0.0) > MOST_ZETA:
+                kind = "minimum" if sign < 0 else "maximum"
+                self.flags.append(
+                    f"{name}: a {kind} of the gain with a damping ratio above 0.71 is "
+                    f"no {'anti-' if sign < 0 else ''}resonance"
+                )
         difference = std = None
         if arf is not None and rf is not None:
             difference = rf.frequency_hz - arf.frequency_hz
             std = math.sqrt(max(0.0, rf.std_hz**2 + arf.std_hz**2 - 2.0 * covariance))
-        return LevelFeatures(source_vpk, arf, rf, difference, std, tuple(self.flags))
+        pairs = () if arf is None and rf is None else (FeaturePair(arf, rf),)
+        return LevelFeatures(source_vpk, arf, rf, difference, std, tuple(self.flags), pairs)
 
     def _start(self, candidate: Candidate) -> Start:
         """Start values from the half-power points of the smoothed curve."""
@@ -207,7 +232,11 @@ class _Reader:
             curve.frequency_hz, curve.smooth_db, candidate.at, candidate.sign, curve.std_db
         )
         zeta = points.damping_ratio
-        return (zeta, points.damping_std) if math.isfinite(zeta) else (None, None)
+        if not math.isfinite(zeta):
+            return None, None
+        # The extremum and both crossings lie anywhere between two readings.
+        step = shape_error(curve.frequency_hz, candidate.at) / curve.frequency_hz[candidate.at]
+        return zeta, math.hypot(points.damping_std, step)
 
     def _note_scatter(self, name: str, linear: LinearReading) -> None:
         if self.samples.noise_known and linear.inflation > NOTABLE_SCATTER:

@@ -1,0 +1,1 @@
+"""A linear model of a whole level: how it is chosen, fitted, believed and read."""
