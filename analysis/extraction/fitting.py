@@ -209,7 +209,10 @@ def fit_sections(
     problem = _Problem(readings, sections)
     if readings.count - problem.free.size < 4:
         return None
-    theta = problem.surround(pack(sections))
+    try:
+        theta = problem.surround(pack(sections))
+    except np.linalg.LinAlgError:
+        return None
     rounds = 1 if readings.absolute or not readings.with_phase.any() else _WEIGHINGS
     reference = np.abs(readings.gain)
     solved = None

@@ -38,6 +38,10 @@ WHITE_DB = 0.5
 """White residuals below this are accepted, too: the stated errors are too small."""
 CLEAR = 3.5
 """An extremum must stand out from its neighbours by this many standard errors."""
+WIDEST_BAND = 1e5
+"""A wider band is no sweep."""
+WIDEST_GAIN = 40.0
+"""Greatest span of ln |G|; 350 dB."""
 _GREATEST_CORRELATION = 0.95
 _SAME = 0.1
 """Extrema of two fits are the same within this in ln f, or within three standard errors."""
@@ -78,6 +82,9 @@ def read_model(samples: Samples) -> ModelReading | str:
     """Read a level by the model that predicts it best, or say why none is believed."""
     if len(samples) < 6:
         return "too few points for a linear fit"
+    f, g = samples.frequency_hz, samples.log_gain
+    if not (f[-1] < WIDEST_BAND * f[0] and np.ptp(g) < WIDEST_GAIN):
+        return "the readings span more than a linear fit can"
     choice = _choice(samples)
     if choice is None:
         return "too few points for a linear fit"
@@ -86,7 +93,6 @@ def read_model(samples: Samples) -> ModelReading | str:
     inflation = _inflation(fit, samples, used)
     if isinstance(inflation, str):
         return inflation
-    f = samples.frequency_hz
     extrema = _clear(fit, find_extrema(fit, float(f[1]), float(f[-2])), inflation)
     for one in extrema:
         if not _fits_near(fit, one, inflation):
