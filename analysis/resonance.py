@@ -26,7 +26,15 @@ from analysis.samples import MOST_POINTS, Samples, level_samples, refuse_levels
 from daq.errors import AnalysisError
 from daq.frf import FrequencyResponse
 
-__all__ = ["Feature", "LevelFeatures", "Method", "extract", "summary", "to_json"]
+__all__ = [
+    "Feature",
+    "FeaturePair",
+    "LevelFeatures",
+    "Method",
+    "extract",
+    "summary",
+    "to_json",
+]
 
 NOTABLE_SCATTER = 1.25
 """Residuals beyond this many stated errors are worth a flag."""
