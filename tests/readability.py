@@ -1,7 +1,7 @@
 """Check that the documentation reads plainly: short sentences, and none of the old words.
 
-Owns the limits and the list of banned words. Sentences are those of the pages under docs/ (all but
-the generated api.md) and of README; words are looked for in docstrings, too. It judges no content.
+Owns the limits and the list of banned words. Sentences are those of README, CONTRIBUTING and docs/
+(all but the generated api.md); words are looked for in docstrings, too. It judges no content.
 """
 
 from __future__ import annotations
@@ -52,9 +52,9 @@ BANNED_IN_PAGES = (
 
 
 def pages(root: Path) -> list[Path]:
-    """README and every page under docs/ that somebody writes."""
+    """README, CONTRIBUTING and every page under docs/ that somebody writes."""
     written = [page for page in (root / "docs").rglob("*.md") if page.name != "api.md"]
-    return sorted([root / "README.md", *written])
+    return sorted([root / "CONTRIBUTING.md", root / "README.md", *written])
 
 
 def texts(page: Path) -> Iterator[tuple[str, str]]:

@@ -11,6 +11,7 @@ GOOD = "# A title\n\nAll is off. `The hunt purse` is code.\n\n| a | b |\n| - | -
 
 def project(folder, page=GOOD, docstring="Owns one thing."):
     (folder / "docs").mkdir()
+    (folder / "CONTRIBUTING.md").write_text("# Work\n\nIt is tested.\n")
     (folder / "README.md").write_text("# A name\n\nIt measures. It reads. It stops. It ends.\n")
     (folder / "docs" / "page.md").write_text(page)
     (folder / "analysis").mkdir()
