@@ -11,11 +11,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.calibration import Calibrated
 from analysis.candidate import Effects
 from analysis.causes import Hypothesis
 from analysis.verdict import FALSE_ALARM, Judged, Verdict, Word, put_behind
+from sim.catalogue import CATALOGUE
+
+Vector = NDArray[np.float64]
 
 __all__ = ["AS_THE_DATASHEET", "hold_against_datasheet"]
 
@@ -96,10 +100,27 @@ def _among(judged: Sequence[Judged], effects: Effects) -> Judged:
 
 
 def _unsure(hypothesis: Hypothesis, found: Calibrated) -> set[str]:
-    """Effects of which every size is a datasheet value, and is not surely off it."""
+    """Effects of which every size is a datasheet value, and is not surely off it.
+
+    Of several, those too that are there in proportion to their first size, where that reaches the
+    lower end of its range.
+    """
     # Off by more than the datasheet may be, too.
     std = np.hypot(np.sqrt(np.diag(found.covariance))[1:], hypothesis.spread)
     # What the datasheet says nothing of is no number, and not near to it.
     near = np.abs(found.mean[1:] - hypothesis.datasheet) <= _SURELY * std
     sure = {effect for (effect, _), one in zip(hypothesis.parameters, near, strict=True) if not one}
-    return set(hypothesis.effects) - sure
+    return set(hypothesis.effects) - (sure - _may_be_none(hypothesis, found.mean[1:], std) or sure)
+
+
+def _may_be_none(hypothesis: Hypothesis, sizes: Vector, std: Vector) -> set[str]:
+    """Effects whose first size, in proportion to which they are there, may be the lowest."""
+    first = {effect: CATALOGUE[effect].parameters[0] for effect in hypothesis.effects}
+    return {
+        effect
+        for (effect, one), size, error in zip(hypothesis.parameters, sizes, std, strict=True)
+        if one is first[effect]
+        and one.allowed[0] == 0.0
+        and one.nominal(hypothesis.unit) is None
+        and size <= _SURELY * error
+    }

@@ -31,8 +31,9 @@ __all__ = ["Refined", "refine"]
 _SHARE, _MOST = 0.99, 24
 """Sets that are refined first hold this share of the probability; at most so many."""
 
-_BESIDE = 6
-"""Sets that hold what leads and one more cause that are refined next."""
+_BESIDE, _STEPS = 6, 2
+"""Likeliest sets that hold the best one and one cause more, which follow together with every part
+of the best one; and how often."""
 
 _FREQUENCIES = 20
 """Frequencies of each level that the first look takes, or more."""
@@ -106,7 +107,10 @@ def refine(
     sets = posterior.scales.sets
     look_at([*first, *_parts(sets, int(first[0]))])
     coarse.hear()
-    look_at(_supersets(posterior, coarse.best.hypothesis.effects, probability))
+    for _ in range(_STEPS):
+        leader = coarse.best.hypothesis.effects
+        number = sets.index[tuple(sorted(sets.effects.index(effect) for effect in leader))]
+        look_at([*_supersets(posterior, leader, probability), *_parts(sets, number)])
     coarse.settle(_kept(coarse), _FIRST_GROUPS)
     report = part_of(progress, 0.4, 1.0, "comparing the likeliest causes")
     fine = Hunt(unit, observation, rng, executor, report)

@@ -13,6 +13,7 @@ from analysis.surely_off import AS_THE_DATASHEET, hold_against_datasheet
 from analysis.verdict import Judged, Verdict
 
 SHAFT, BRAKE, LOAD = "shaft-stiffness", "load-viscous-damping", "load-inertia"
+DAMPED = "shaft-damping"
 
 
 def standing(effects, score, objection=""):
@@ -138,6 +139,21 @@ def test_a_rival_of_the_whole_stays_one_of_the_rest(rivals):
     held = hold_against_datasheet(verdict, found)
     assert (held.word, held.best.effects) == ("ambiguous", (LOAD,))
     assert [one.effects for one in held.rivals] == [(BRAKE,)]
+
+
+@pytest.mark.parametrize(("place", "left"), [(0.03, (LOAD,)), (0.05, None)])
+def test_a_further_cause_that_may_be_as_good_as_none_is_not_named(place, left):
+    """A brake whose size reaches the lower end of its range; one standard deviation is 0.02."""
+    verdict, found = told((LOAD, BRAKE), [5.0, 0.0])
+    found.mean[1 + verdict.best.effects.index(BRAKE)] = place
+    held = hold_against_datasheet(verdict, found)
+    assert held.best.effects == (left or (LOAD, BRAKE))
+
+
+def test_one_of_several_that_may_be_none_each_is_there():
+    verdict, found = told((BRAKE, DAMPED), [0.0, 0.0])
+    found.mean[1:] = 0.01
+    assert hold_against_datasheet(verdict, found) is verdict
 
 
 def test_of_three_causes_two_may_be_the_datasheets():

@@ -45,6 +45,12 @@ def test_every_part_of_what_is_proposed_first_is_looked_at(runs):
     assert {(), (LAG, LOAD, MESH)} <= keys <= looked_at
 
 
+def test_every_part_of_what_leads_is_looked_at(runs):
+    """Three causes are proposed and two are there: the two are compared with the three."""
+    found = refine(Untrained((LAG, LOAD, MESH)), observed((LAG, MESH), [0.8, 0.7]))
+    assert (LAG, MESH) in {one.hypothesis.effects for one in found.candidates}
+
+
 def test_what_is_left_out_of_the_catalogue_is_not_simulated(runs):
     found = refine(Untrained((LAG, LOAD)), observed((LOAD,), [0.8]), without=(LOAD,))
     assert runs
