@@ -9,7 +9,7 @@ READY := .venv/.ready
 
 LOWEST := .venv/lowest
 
-.PHONY: help demo test tests check lowest clients first-day train training bench blind faults fuzz soak docs audit lock clean
+.PHONY: help demo test tests check lowest clients first-day pictures train training bench blind faults fuzz soak docs audit lock clean
 
 help:
 	@echo "make demo    the whole job without hardware; results in demo/"
@@ -71,6 +71,10 @@ FIRST_DAY ?= first-day
 
 first-day: $(READY)
 	@$(BIN)/lashbench first-day --instrument '$(INSTRUMENT)' --out '$(FIRST_DAY)'
+
+# The pictures of the screen that the documentation shows, made by today's code: some minutes.
+pictures: $(READY)
+	@$(BIN)/python tests/screen_pictures.py docs/pictures
 
 MACHINES ?= 200000
 

@@ -14,7 +14,7 @@ from sim.unit import Unit
 __all__ = ["HINT", "believed_document", "believed_lines", "is_usually_off", "trusts_much"]
 
 HINT = (
-    "datasheet values that are off by more than is believed here would look like this, too; "
+    "a larger tolerance of the datasheet could explain this as well; "
     f"try --tolerance {100.0 * USUAL:g}%"
 )
 

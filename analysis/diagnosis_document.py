@@ -270,7 +270,7 @@ class Diagnosis:
         if best is not baseline:
             name = "the extended model"
             if not self.causes:
-                name = f"{' + '.join(best.effects)}, which stands first and explains nothing"
+                name = f"{' + '.join(best.effects)}, the best model, which was rejected"
             lines.append(f"  against {name}: {self.left_shape}")
         if self.verdict.word == "unexplained":
             lines.append(f"  harmonics: {describe_harmonics(self.harmonics)}")
@@ -284,7 +284,7 @@ class Diagnosis:
         believed = sorted(self.site_probability.items(), key=lambda item: -item[1])
         shares = ", ".join(f"{_SIDES[side]} {p:.2f}" for side, p in believed if p >= _LEAST_TOLD)
         if word == "unexplained":
-            shares = f"open; of the sets that come nearest: {shares}"
+            shares = f"open; probabilities of the models that fit best: {shares}"
         return [f"  chain or mechanics: {shares}"]
 
 

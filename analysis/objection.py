@@ -16,7 +16,7 @@ from analysis.plausibility import is_out_of_sight, is_pressed
 
 __all__ = ["FEW", "OUT_OF_SIGHT", "UNLIKE", "find_objection"]
 
-OUT_OF_SIGHT = "resonates where nothing was measured"
+OUT_OF_SIGHT = "resonates outside the measured band"
 
 UNLIKE, _THREE_UNLIKE = 4.0, 2.0
 """A fit worse than own runs' by more standard deviations than this is no explanation, nor is that
@@ -60,11 +60,11 @@ def find_objection(
     causes, missed = len(candidate.hypothesis.effects), held_out.missed
     several = causes > 1
     if fitted.sigma > (UNLIKE if causes <= FEW else _THREE_UNLIKE):
-        return "does not look like its own runs"
+        return "fits worse than replicates of this model"
     if fitted.structure > _STRUCTURED:
-        return "leaves structure that its own runs do not"
+        return "leaves a residual pattern that replicates do not"
     if is_pressed(candidate):
-        return "wants a size that no bench has"
+        return "needs a size outside its plausible range"
     if is_out_of_sight(candidate):
         return OUT_OF_SIGHT
     predicted = missed <= (_WELL_PREDICTED if several else _UNPREDICTED)
@@ -73,5 +73,5 @@ def find_objection(
         or causes > FEW
         or not misses_alike(candidate, held_out, 0.0 if several else _SELDOM, rng)
     ):
-        return "does not predict the other levels"
+        return "does not predict held-out levels"
     return ""

@@ -24,7 +24,7 @@ from analysis.verdict import Verdict
 
 __all__ = ["UNDOING", "how_much_is_left", "think_again"]
 
-UNDOING = "its causes undo one another"
+UNDOING = "its causes cancel each other"
 
 _LEFT = 0.65
 """Share of what the least of several causes does alone that is left where they undo one another. Of

@@ -1,6 +1,6 @@
 """Whether what is named is off its datasheet for sure, as far as its error bar tells.
 
-Owns the last question before a cause is named. A size that may as well be what the datasheet says
+Owns the last question before a cause is named. A size that not significantly different from the datasheet
 explains nothing, however well runs of the cause fit: they were given where the measurement is, and
 the plain model's were not. It simulates nothing; how well the size is known is told to it.
 """
@@ -23,7 +23,7 @@ Vector = NDArray[np.float64]
 
 __all__ = ["AS_THE_DATASHEET", "hold_against_datasheet"]
 
-AS_THE_DATASHEET = "may as well be what the datasheet says"
+AS_THE_DATASHEET = "not significantly different from the datasheet"
 
 _SURELY = 2.0
 """Standard deviations by which a value must be off its datasheet. Of 45 that were rightly named

@@ -43,8 +43,8 @@ class Unseen:
 
 def head_unseen(verdict: str) -> str:
     """What stands above the entries of ``unseen`` of a diagnosis with that verdict."""
-    beside = "" if verdict == "consistent" else " beside what is named"
-    return f"what may be there unseen{beside}, each by itself"
+    further = "" if verdict == "consistent" else "further "
+    return f"sizes of {further}causes that this sweep cannot exclude, one cause at a time"
 
 
 def list_unseen(entries: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -52,7 +52,7 @@ def list_unseen(entries: Sequence[Mapping[str, Any]]) -> list[str]:
     silent = [one["effect"] for one in entries if one["low"] is None is one["high"]]
     told = [one for one in entries if one["effect"] not in silent]
     lines = [f"{one['effect']}: {describe_unseen(one)}" for one in told]
-    return [*lines, f"of any size: {', '.join(silent)}"] if silent else lines
+    return [*lines, f"no limit: {', '.join(silent)}"] if silent else lines
 
 
 def describe_unseen(unseen: Mapping[str, Any]) -> str:

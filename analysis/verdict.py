@@ -97,8 +97,8 @@ are believed in its place, are rivals: of 142 sets drawn and named so two had le
 _JUDGED = 6
 
 WITHIN_TOLERANCE = "within the tolerance of the datasheet"
-_NOT_ASKED = "too far behind to be asked"
-UNEARNED = "a part of it does as well, or would by chance"
+_NOT_ASKED = "too improbable to be checked"
+UNEARNED = "a model with fewer causes fits as well"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,7 +155,7 @@ class Verdict:
 
         Among them that nothing is hidden, which has a wider margin, and is one though refused where
         the best leads it by less than it takes to be named. A set that would be no
-        explanation if it led is none as a rival, nor is one that says the same with more sizes:
+        explanation if it led is none as a rival, nor is one that equivalent, with more parameters:
         what is believed of that counts for the best. One that is refused though it leads is: the
         best is then likeliest only among what is left. So is any near the best where more is
         believed of others than of that.
@@ -185,7 +185,7 @@ class Verdict:
     def remark(self, one: Judged) -> str:
         """What speaks against a set, or makes it no rival; empty where nothing does."""
         if self.says_the_same(one):
-            return "says the same with more sizes"
+            return "equivalent, with more parameters"
         if one.effects and is_nothing_hidden(one.candidate):
             return WITHIN_TOLERANCE
         return one.objection if one.refused else ""
@@ -317,7 +317,7 @@ def _ask(judged: Sequence[Judged], rng: np.random.Generator) -> tuple[Judged, ..
 def _leader(judged: Sequence[Judged]) -> Judged:
     """The best set of those that have not been shown to owe their lead to chance.
 
-    Where it does not look like its own runs and another that ties with it does, it
+    Where it fits worse than replicates of this model and another that ties with it does, it
     is the other that is believed; and so is one that says the same with fewer sizes.
     """
     left = [one for one in judged if one.objection != UNEARNED]

@@ -43,7 +43,7 @@ DIAGNOSIS = {
         }
     ],
     "rivals": [{"causes": ["shaft-stiffness"], "probability": 0.41,
-                "remark": "wants a size that no bench has"}],
+                "remark": "needs a size outside its plausible range"}],
     "baseline": {"held_out_rms_sigma": 4.2, "held_out_rms_db": 1.9},
     "extended": {"held_out_rms_sigma": 1.1, "held_out_rms_db": 0.4},
     "gain": {"held_out_rms_ratio": 0.26},

@@ -49,7 +49,7 @@ def rivals(verdict):
 
 
 @pytest.mark.parametrize(("believed", "word"), [(0.951, "explained"), (0.949, "ambiguous")])
-@pytest.mark.parametrize("objection", ["", "leaves structure", "too far behind to be asked"])
+@pytest.mark.parametrize("objection", ["", "leaves structure", "too improbable to be checked"])
 def test_what_shares_more_than_a_twentieth_is_a_rival_refused_or_not(believed, word, objection):
     verdict = told(standing((LOAD,), believed), standing((SHAFT,), 1.0 - believed, objection))
     held = hold_against_doubt(verdict)

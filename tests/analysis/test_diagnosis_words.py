@@ -65,7 +65,7 @@ def test_it_is_open_where_nothing_explains_and_no_question_where_nothing_is_miss
     explained, unexplained
 ):
     assert line(unexplained, "chain or mechanics").startswith(
-        "open; of the sets that come nearest:"
+        "open; probabilities of the models that fit best:"
     )
     consistent = believed(explained, "consistent", nothing=1.0)
     assert not any("chain or mechanics" in text for text in consistent.summary())
@@ -124,7 +124,7 @@ def test_where_nothing_explains_what_comes_nearest_is_told_with_what_it_leaves(u
     first = document["first"]
     assert first["causes"] == [*STIFF]
     assert first["objection"]
-    told = line(unexplained, "against shaft-stiffness, which stands first and explains nothing")
+    told = line(unexplained, "against shaft-stiffness, the best model, which was rejected")
     assert told == unexplained.left_shape
 
 
@@ -281,7 +281,7 @@ def test_where_nothing_was_found_it_is_told_what_may_be_there_all_the_same(
     assert plain.verdict.word == "consistent"
     told, document = plain.summary(), plain.to_json()["unseen"]
     assert [one["effect"] for one in document] == list(CATALOGUE)
-    at = told.index("  what may be there unseen, each by itself:")
+    at = told.index("  sizes of causes that this sweep cannot exclude, one cause at a time:")
     lines = [f"    {text}" for text in list_unseen(document)]
     assert lines
     assert told[at + 1 : at + 1 + len(lines)] == lines
@@ -293,7 +293,7 @@ def test_beside_what_is_named_it_is_told_what_else_may_be_there(monkeypatch):
     assert named.verdict.best.effects == LOAD
     told, document = named.summary(), named.to_json()["unseen"]
     assert [one["effect"] for one in document] == [e for e in CATALOGUE if e not in LOAD]
-    at = told.index("  what may be there unseen beside what is named, each by itself:")
+    at = told.index("  sizes of further causes that this sweep cannot exclude, one cause at a time:")
     assert told[at + 1] == f"    {list_unseen(document)[0]}"
 
 

@@ -76,9 +76,9 @@ def test_what_says_the_same_with_more_sizes_is_no_rival_and_marked_so(monkeypatc
     payload = verdict.judged[1]
     monkeypatch.setattr(rules, "is_felt_alike", lambda one, _: alike and one is payload.candidate)
     assert [one.effects for one in verdict.rivals] == rivals
-    said = ["", "says the same with more sizes" if alike else "", ""]
+    said = ["", "equivalent, with more parameters" if alike else "", ""]
     assert [verdict.remark(one) for one in verdict.judged] == said
-    refused = replace(payload, objection="wants a size that no bench has")
+    refused = replace(payload, objection="needs a size outside its plausible range")
     assert verdict.remark(refused) == refused.objection
 
 

@@ -33,10 +33,10 @@ def test_a_size_that_wants_to_be_beyond_its_range_is_no_explanation(
     )
     assert is_pressed(one) is pressed
     held_out = SimpleNamespace(missed=1.0)
-    for hidden, otherwise in ((False, ""), (True, "resonates where nothing was measured")):
+    for hidden, otherwise in ((False, ""), (True, "resonates outside the measured band")):
         monkeypatch.setattr(objection, "is_out_of_sight", lambda _, hidden=hidden: hidden)
         against = objection.find_objection(one, held_out, FITS, np.random.default_rng(0))
-        assert against == ("wants a size that no bench has" if pressed else otherwise)
+        assert against == ("needs a size outside its plausible range" if pressed else otherwise)
 
 
 @pytest.mark.parametrize(
@@ -59,12 +59,12 @@ def test_what_misses_other_levels_or_fits_worse_must_have_own_runs_that_do(
     candidate = SimpleNamespace(hypothesis=hypothesis, best=best, surface=SimpleNamespace(fit=None))
     rng = np.random.default_rng(0)
     held_out = SimpleNamespace(missed=missed)
-    against = "" if adequate else "does not predict the other levels"
+    against = "" if adequate else "does not predict held-out levels"
     assert objection.find_objection(candidate, held_out, FITS, rng) == against
     limit = 2.0 if effects == THREE else 4.0
     alike = objection.find_objection(candidate, held_out, replace(FITS, sigma=limit - 0.1), rng)
     assert alike == against
     unlike = objection.find_objection(candidate, held_out, replace(FITS, sigma=limit + 0.1), rng)
-    assert unlike == "does not look like its own runs"
+    assert unlike == "fits worse than replicates of this model"
     shaped = objection.find_objection(candidate, held_out, replace(FITS, structure=2.6), rng)
-    assert shaped == "leaves structure that its own runs do not"
+    assert shaped == "leaves a residual pattern that replicates do not"

@@ -18,7 +18,7 @@ RARE, TEN_TIMES = ("motor-inertia",), 34.5
 )
 def test_that_nothing_is_hidden_is_a_rival_while_it_has_a_twentieth(lead, adequate, rivals):
     found = judge(seen(TRUE, 1), ((), TRUE), 1)
-    against = "" if adequate else "does not look like its own runs"
+    against = "" if adequate else "fits worse than replicates of this model"
     plain = replace(found.baseline, score=found.best.score - lead, objection=against)
     verdict = replace(found, judged=(found.best, plain), baseline=plain)
     assert [one.effects for one in verdict.rivals] == rivals
@@ -31,7 +31,7 @@ def test_that_nothing_is_hidden_is_a_rival_while_it_has_a_twentieth(lead, adequa
 def test_another_set_is_a_rival_while_it_has_a_seventh_and_explains(behind, adequate, rivals):
     found = judge(seen(TRUE, 1), ((), TRUE, WRONG), 1)
     (wrong,) = (one for one in found.judged if one.effects == WRONG)
-    against = "" if adequate else "wants a size that no bench has"
+    against = "" if adequate else "needs a size outside its plausible range"
     near = replace(wrong, score=found.best.score - behind, objection=against)
     verdict = replace(found, judged=(found.best, near, found.baseline))
     assert [one.effects for one in verdict.rivals] == rivals
@@ -63,11 +63,11 @@ def test_a_rare_set_is_a_rival_where_it_does_about_as_well(best, other, behind, 
 @pytest.mark.parametrize(
     ("lead", "objection", "alike", "word"),
     [
-        (10.0, "wants a size that no bench has", False, "ambiguous"),
-        (10.0, "wants a size that no bench has", True, "explained"),
-        (-1.0, "wants a size that no bench has", False, "explained"),
+        (10.0, "needs a size outside its plausible range", False, "ambiguous"),
+        (10.0, "needs a size outside its plausible range", True, "explained"),
+        (-1.0, "needs a size outside its plausible range", False, "explained"),
         # Further ahead it is the best itself, and nothing is named.
-        (21.0, "wants a size that no bench has", False, "unexplained"),
+        (21.0, "needs a size outside its plausible range", False, "unexplained"),
         (-40.0, rules._NOT_ASKED, False, "explained"),
     ],
 )
@@ -95,9 +95,9 @@ def test_what_stands_in_for_a_refused_leader_is_not_named_alone(
     ("best", "holding", "objection", "rivals"),
     [
         # Withheld play was told to be soft teeth with 0.48, what was likelier was all refused.
-        (0.48, 0.0, "leaves structure that its own runs do not", [WRONG]),
-        (0.52, 0.0, "leaves structure that its own runs do not", []),
-        (0.40, 0.12, "leaves structure that its own runs do not", []),
+        (0.48, 0.0, "leaves a residual pattern that replicates do not", [WRONG]),
+        (0.52, 0.0, "leaves a residual pattern that replicates do not", []),
+        (0.40, 0.12, "leaves a residual pattern that replicates do not", []),
         (0.48, 0.0, rules._NOT_ASKED, []),
     ],
 )
@@ -136,8 +136,8 @@ def test_what_is_refused_near_three_causes_is_a_rival_however_likely_they_are(
         (True, "", []),
         # A payload that swings out of sight was half as likely as the heavier load that it stands
         # for, and a motor's constant 32 behind the load counted as its rival.
-        (True, "resonates where nothing was measured", []),
-        (True, "leaves structure that its own runs do not", ["other"]),
+        (True, "resonates outside the measured band", []),
+        (True, "leaves a residual pattern that replicates do not", ["other"]),
         (False, "", ["same", "other"]),
     ],
 )
@@ -163,4 +163,4 @@ def test_what_says_the_same_counts_for_the_best(alike, against, rivals, monkeypa
     counts = alike and not against.startswith("leaves")
     counted = same.probability if counts else 0.0
     assert verdict.probability == pytest.approx(found.best.probability + counted)
-    assert verdict.remark(same) == ("says the same with more sizes" if counts else against)
+    assert verdict.remark(same) == ("equivalent, with more parameters" if counts else against)

@@ -29,7 +29,7 @@ def test_sets_far_behind_are_not_held_against_runs_of_their_own_but_the_baseline
         assert (one in asked) == (one is verdict.baseline or one not in far)
         if one not in asked:
             assert not one.adequate
-            assert not one.refused, "nobody asked whether it looks like its own runs"
+            assert not one.refused, "nobody asked whether it fits like its replicates"
 
 
 def test_parts_of_the_leader_are_held_against_their_own_runs_however_far_behind(monkeypatch):
@@ -84,7 +84,7 @@ def test_a_cause_that_leaves_a_shape_behind_is_not_blamed():
         verdict = judge(observation(values), ((), TRUE), 10 * seed)
         (cause,) = (one for one in verdict.judged if one.effects == TRUE)
         assert verdict.word == ("unexplained" if cause.refused else "explained")
-        refused.append(cause.objection == "leaves structure that its own runs do not")
+        refused.append(cause.objection == "leaves a residual pattern that replicates do not")
     assert sum(refused) >= 3
 
 
@@ -251,7 +251,7 @@ def test_every_set_that_comes_to_lead_is_asked_what_it_owes_to_chance(
     for part, whole in unearned:
         (behind,) = (one for one in verdict.judged if one.effects == whole)
         if part and behind.effects != named:
-            assert verdict.remark(behind) == "a part of it does as well, or would by chance"
+            assert verdict.remark(behind) == "a model with fewer causes fits as well"
             assert behind not in verdict.rivals
 
 

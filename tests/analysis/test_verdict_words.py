@@ -49,7 +49,7 @@ def test_what_remains_open_is_said_where_nothing_is_missing():
 
 
 def test_what_a_set_is_refused_for_does_not_leave_it_open():
-    rivals = [other("load-inertia", 0.3, "does not look like its own runs")]
+    rivals = [other("load-inertia", 0.3, "fits worse than replicates of this model")]
     assert "Still open" not in " ".join(verdict_words(document(nothing=0.7, rivals=rivals)))
 
 

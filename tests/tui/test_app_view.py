@@ -173,7 +173,7 @@ def test_a_diagnosis_is_told_with_causes_rivals_and_what_next():
     for words in (
         "VERDICT: AMBIGUOUS", "before  4.2 standard errors, 1.9 dB", "load-inertia",
         "J_L = 0.0031 +- 0.0001 kg.m^2",
-        "shaft-stiffness  probability 0.41 (wants a size that no bench has)",
+        "shaft-stiffness  probability 0.41 (needs a size outside its plausible range)",
         "MEASURE THIS NEXT",
         "To make sure: compare what is mounted with the drawing",
     ):  # fmt: skip
@@ -190,11 +190,11 @@ def test_a_diagnosis_is_told_with_causes_rivals_and_what_next():
     load = Unseen("load-inertia", "J_L", "kg.m^2", 0.0026, 0.0029, 0.00275)
     size = "\n - load-inertia: J_L 0.0026 to 0.0029 kg.m^2"
     plain = nothing | {"verdict": "consistent", "unseen": [load.to_json()]}
-    assert f"\n\nWhat may be there unseen, each by itself{size}" in "\n".join(
+    assert f"\n\nSizes of causes that this sweep cannot exclude, one cause at a time{size}" in "\n".join(
         diagnosis_lines(plain)
     )
     named = "\n".join(diagnosis_lines(DIAGNOSIS | {"unseen": [load.to_json()]}))
-    assert f"\n\nWhat may be there unseen beside what is named, each by itself{size}" in named
+    assert f"\n\nSizes of further causes that this sweep cannot exclude, one cause at a time{size}" in named
 
 
 def test_without_colour_everything_is_still_said(tmp_path, monkeypatch):
