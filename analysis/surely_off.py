@@ -1,7 +1,7 @@
 """Whether what is named is off its datasheet for sure, as far as its error bar tells.
 
-Owns the last question before a cause is named. A size that not significantly different from the datasheet
-explains nothing, however well runs of the cause fit: they were given where the measurement is, and
+Owns the last question before a cause is named. A size that is not significantly different from the
+datasheet explains nothing, however well runs of the cause fit: they were given where the measurement is, and
 the plain model's were not. It simulates nothing; how well the size is known is told to it.
 """
 

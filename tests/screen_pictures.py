@@ -36,7 +36,9 @@ async def take(folder: Path, db: Path) -> None:
             (folder / f"screen-{name}.svg").write_text(svg, encoding="utf-8")
 
         await op.connects("sim:?ratio=0.3&seed=1&effect=load-viscous-damping:B_L=0.02")
-        await op.plans(levels="1.5 2.2 3", start="108", stop="172", points="33", cycles=("20", "30"))
+        await op.plans(
+            levels="1.5 2.2 3", start="108", stop="172", points="33", cycles=("20", "30")
+        )
         await op.checks()
         await op.press("ctrl+n")
         holding = asyncio.create_task(hold_at(op.app, 52))

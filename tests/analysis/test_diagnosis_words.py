@@ -293,7 +293,9 @@ def test_beside_what_is_named_it_is_told_what_else_may_be_there(monkeypatch):
     assert named.verdict.best.effects == LOAD
     told, document = named.summary(), named.to_json()["unseen"]
     assert [one["effect"] for one in document] == [e for e in CATALOGUE if e not in LOAD]
-    at = told.index("  sizes of further causes that this sweep cannot exclude, one cause at a time:")
+    at = told.index(
+        "  sizes of further causes that this sweep cannot exclude, one cause at a time:"
+    )
     assert told[at + 1] == f"    {list_unseen(document)[0]}"
 
 

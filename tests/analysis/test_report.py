@@ -230,7 +230,9 @@ def test_every_verdict_has_its_words(report, monkeypatch, hidden, judged, verdic
     assert said in page.text
     assert page.text.count("Departures left") == (verdict == "explained")
     unseen = page.text.count("this sweep cannot exclude")
-    beside = page.text.count("Sizes of further causes that this sweep cannot exclude, one cause at a time")
+    beside = page.text.count(
+        "Sizes of further causes that this sweep cannot exclude, one cause at a time"
+    )
     assert (unseen, beside) == (verdict != "unexplained", verdict == "explained")
     told = found.summary()
     for one in found.verdict.judged:
@@ -253,7 +255,10 @@ def test_a_tie_is_told_with_the_sweep_that_would_break_it(report):
     assert "Undecided, adjust no stage yet: 23 to 70 %" in page.text
     for name in ("load-inertia (probability 0.55)", "shaft-stiffness (probability 0.41)"):
         assert name in page.text
-    assert "Other sets judged: shaft-stiffness (0.41, needs a size outside its plausible range)" in page.text
+    assert (
+        "Other sets judged: shaft-stiffness (0.41, needs a size outside its plausible range)"
+        in page.text
+    )
     assert "To tell load-inertia from shaft-stiffness (5.0 sigma expected)" in page.text
     assert "lashbench measure --x" in page.text
 

@@ -190,11 +190,15 @@ def test_a_diagnosis_is_told_with_causes_rivals_and_what_next():
     load = Unseen("load-inertia", "J_L", "kg.m^2", 0.0026, 0.0029, 0.00275)
     size = "\n - load-inertia: J_L 0.0026 to 0.0029 kg.m^2"
     plain = nothing | {"verdict": "consistent", "unseen": [load.to_json()]}
-    assert f"\n\nSizes of causes that this sweep cannot exclude, one cause at a time{size}" in "\n".join(
-        diagnosis_lines(plain)
+    assert (
+        f"\n\nSizes of causes that this sweep cannot exclude, one cause at a time{size}"
+        in "\n".join(diagnosis_lines(plain))
     )
     named = "\n".join(diagnosis_lines(DIAGNOSIS | {"unseen": [load.to_json()]}))
-    assert f"\n\nSizes of further causes that this sweep cannot exclude, one cause at a time{size}" in named
+    assert (
+        f"\n\nSizes of further causes that this sweep cannot exclude, one cause at a time{size}"
+        in named
+    )
 
 
 def test_without_colour_everything_is_still_said(tmp_path, monkeypatch):
