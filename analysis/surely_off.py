@@ -1,8 +1,9 @@
 """Whether what is named is off its datasheet for sure, as far as its error bar tells.
 
 Owns the last question before a cause is named. A size that is not significantly different from the
-datasheet explains nothing, however well runs of the cause fit: they were given where the measurement is, and
-the plain model's were not. It simulates nothing; how well the size is known is told to it.
+datasheet explains nothing, however well runs of the cause fit: they were given where the
+measurement is, and the plain model's were not. It simulates nothing; how well the size is known is
+told to it.
 """
 
 from __future__ import annotations

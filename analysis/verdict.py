@@ -154,11 +154,11 @@ class Verdict:
         """Sets near the best one that say something else, and might be the explanation.
 
         Among them that nothing is hidden, which has a wider margin, and is one though refused where
-        the best leads it by less than it takes to be named. A set that would be no
-        explanation if it led is none as a rival, nor is one that equivalent, with more parameters:
-        what is believed of that counts for the best. One that is refused though it leads is: the
-        best is then likeliest only among what is left. So is any near the best where more is
-        believed of others than of that.
+        the best leads it by less than it takes to be named. A set that would be no explanation if
+        it led is none as a rival, nor is one that is equivalent, with more parameters: what is
+        believed of that counts for the best. One that is refused though it leads is: the best is
+        then likeliest only among what is left. So is any near the best where more is believed of
+        others than of that.
         """
         said = [self.best.score, *(one.score for one in self.judged if self.says_the_same(one))]
         believed = HEAT * float(np.logaddexp.reduce(np.array(said) / HEAT))
