@@ -44,6 +44,7 @@ VERBS = {
     "correct": ("tui.commands.correct:correct", "Correct what was said of a measurement."),
     "export": ("tui.commands.export:export", "Write a stored measurement to a file."),
     "convert": ("tui.commands.convert:convert", "Write a response in another file format."),
+    "frf": ("tui.commands.frf:frf", "Estimate a response from a record over time."),
     "report": ("tui.commands.report:report", "Write a report that prints, as one HTML file."),
     "new-unit": ("tui.commands.new_unit:new_unit", "Write a unit file to fill in."),
     "serve": ("tui.commands.serve:serve", "Serve a simulated 35670A on a wire."),

@@ -31,6 +31,8 @@ _LONELY = 0.75
 """A reading that has this share in its own fit may be the only one behind a section."""
 _MOST_LONELY = 3
 """Readings that may be left out."""
+_FOUND = 2.0
+"""A fit that misses by more is none yet after which higher orders are left."""
 _HOPELESS = 30.0
 _SMALL_DB = 0.5
 """Residuals below this may be believed whatever the stated errors are."""
@@ -107,7 +109,8 @@ def _fits(readings: Readings) -> list[Fit]:
         fits.append(fit)
         scale = max(1.0, min(one.scale for one in fits))
         best = int(np.argmin([one.criterion(scale) for one in fits]))
-        if len(fits) - 1 - best >= _PATIENCE and fits[best].scale < 2.0 * scale:
+        found = fits[best].scale < _FOUND or fits[best].off_db < _SMALL_DB
+        if found and len(fits) - 1 - best >= _PATIENCE:
             break
     if len(fits) <= _PATIENCE + 2:
         fits += [fit for order in _PLAIN if (fit := _fit(readings, order)) is not None]

@@ -18,6 +18,7 @@ from threading import Timer
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from daq.child import child_command, child_environment
 from daq.errors import FileFormatError, InputError, LashbenchError
@@ -25,7 +26,7 @@ from daq.formats.reading import NOTHING_TOLD, Reading
 from daq.formats.record import ARRAYS, response_from, taken_apart
 from daq.frf import FrequencyResponse
 
-__all__ = ["main", "read_apart"]
+__all__ = ["main", "read_apart", "read_arrays_apart"]
 
 _MEMORY_BYTES = 2 << 30
 _PROCESSOR_S = 60
@@ -63,6 +64,27 @@ def read_apart(
         size = head["rows"] * np.dtype(dtype[0]).itemsize
         arrays[name], rest = np.frombuffer(rest[:size], dtype[0]).copy(), rest[size:]
     return response_from(arrays, head["document"], path)
+
+
+def read_arrays_apart(
+    module: str, path: Path, *, clock_s: float = 180.0
+) -> dict[str, NDArray[np.float64]]:
+    """Named vectors that `read` of a module finds in a file, read in a child process.
+
+    Raises
+    ------
+    FileFormatError
+        If the module refuses the file, or the child crashed or ran into a limit.
+    InputError
+        If no child can be started.
+    """
+    head, rest = _answer_of(module, path, NOTHING_TOLD, clock_s)
+    if "refused" in head:
+        raise FileFormatError(head["refused"])
+    arrays = {}
+    for name, size in head["vectors"]:
+        arrays[name], rest = np.frombuffer(rest[: 8 * size]).copy(), rest[8 * size :]
+    return arrays
 
 
 def _answer_of(
@@ -128,6 +150,8 @@ def main(words: list[str]) -> int:
     try:
         reading = Reading.from_json(told[0]) if told else NOTHING_TOLD
         response = import_module(module).read(Path(path), reading)
+        if not isinstance(response, FrequencyResponse):
+            return _say_vectors(response)
         arrays, document = taken_apart(response, Path(path))
     except LashbenchError as error:
         return _say(refused=str(error))
@@ -147,6 +171,13 @@ def main(words: list[str]) -> int:
 
 def _say(**head: Any) -> int:
     sys.stdout.buffer.write(json.dumps(head).encode("ascii") + b"\n")
+    return 0
+
+
+def _say_vectors(vectors: dict[str, NDArray[np.float64]]) -> int:
+    _say(vectors=[(name, values.size) for name, values in vectors.items()])
+    for values in vectors.values():
+        sys.stdout.buffer.write(np.ascontiguousarray(values, dtype=float).tobytes())
     return 0
 
 

@@ -29,7 +29,7 @@ from daq.frf import FrequencyResponse
 if TYPE_CHECKING:
     import h5py
 
-__all__ = ["response_in_h5", "response_in_mat"]
+__all__ = ["response_in_h5", "response_in_mat", "vectors_in_mat"]
 
 _MOST_BYTES = 256 << 20
 _MOST_PARTS = 400
@@ -53,6 +53,13 @@ def response_in_mat(content: bytes, reading: Reading, path: Path) -> FrequencyRe
                 return response_in_h5(file, reading, path)
         except OSError as error:
             raise FileFormatError(f"{path}: is a damaged MATLAB file ({error})") from error
+    arrays = _loaded(content, path)
+    if not reading.columns and not reading.profile and not reading.as_guessed:
+        _refuse_unnamed({name: values.shape for name, values in arrays.items()}, path)
+    return _response(arrays, reading, path)
+
+
+def _loaded(content: bytes, path: Path) -> dict[str, NDArray[Any]]:
     from scipy.io import loadmat
 
     try:
@@ -61,10 +68,30 @@ def response_in_mat(content: bytes, reading: Reading, path: Path) -> FrequencyRe
         # The reader has no error of its own: what it dislikes ends in any built-in one.
         reason = " ".join(str(error).split()) or type(error).__name__
         raise FileFormatError(f"{path}: cannot be read as a MATLAB file ({reason})") from error
-    arrays = dict(_in_structs(found, "", 0))
-    if not reading.columns and not reading.profile and not reading.as_guessed:
-        _refuse_unnamed({name: values.shape for name, values in arrays.items()}, path)
-    return _response(arrays, reading, path)
+    return dict(_in_structs(found, "", 0))
+
+
+def vectors_in_mat(content: bytes, path: Path) -> dict[str, NDArray[Any]]:
+    """Numeric arrays of a MATLAB file of any version, by name.
+
+    Raises
+    ------
+    FileFormatError
+        If it cannot be read.
+    """
+    if content[:10] != b"MATLAB 7.3":
+        return _loaded(content, path)
+    import h5py
+
+    try:
+        with h5py.File(BytesIO(content), "r") as file:
+            return {
+                name: np.asarray(held[()])
+                for name, held in _in_groups(file, "", 0)
+                if held.dtype.kind in "fiu" and held.size * held.dtype.itemsize <= _MOST_BYTES
+            }
+    except OSError as error:
+        raise FileFormatError(f"{path}: is a damaged MATLAB file ({error})") from error
 
 
 def response_in_h5(file: h5py.File, reading: Reading, path: Path) -> FrequencyResponse:

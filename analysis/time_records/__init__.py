@@ -1,0 +1,1 @@
+"""Frequency responses from records over time: stepped sine, sweep, periodic signals, noise."""

@@ -1,0 +1,1 @@
+"""Records of input and output over time, as data loggers write them."""
