@@ -17,11 +17,14 @@ import sqlite3
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from foreign_files import NAMED, arrays, dtt_xml, files, universal_58, universal_58b
 from responses import measured
+from scipy.io import savemat, wavfile
 from sdf_files import File
 from wire import MemoryLink, TinyAdapter
 
@@ -33,6 +36,8 @@ from daq.limits import load_bench
 from daq.recipe import load_recipe
 from daq.scpi import decode_reals, parse_error, parse_integer, parse_number, parse_string
 from daq.store import Store
+from daq.time_records.columns import read_record
+from daq.time_records.record import TimeRecord
 from daq.transports.address import parse_address
 from daq.transports.base import Deadline, ask, ask_block, take_block
 from daq.transports.prologix import PrologixTransport
@@ -78,6 +83,9 @@ def _targets(folder: Path) -> dict[str, Target]:
         "dtt": file("x.xml", dtt.read),
         "foreign-mat": file("y.mat", lambda path: read_response(path, NAMED)),
         "foreign-h5": file("y.h5", lambda path: read_response(path, NAMED)),
+        "record": file("r.csv", read_sampled),
+        "record-mat": file("r.mat", read_sampled),
+        "record-wav": file("r.wav", lambda path: read_record(path, "1", "2")),
         "mat": lambda data: read_file(folder / "x.mat", with_its_digest(data), read_response),
         "sdf": file("x.sdf", sdf.read),
         "unit": file("unit.toml", lambda path: load_unit(str(path))),
@@ -108,6 +116,8 @@ def seeds(name: str) -> list[bytes]:
         return [dtt_xml(listed) for listed in (True, False)]
     if name.startswith("foreign-") and name != "foreign-uff":
         return [arrays(name.removeprefix("foreign-"))]
+    if name.startswith("record"):
+        return [_recorded(name)]
     if name == "foreign-uff":
         return [universal_58(), universal_58b()]
     if name in ("unit", "bench", "recipe"):
@@ -155,6 +165,24 @@ def read_file(path: Path, data: bytes, read: Callable[[Path], Any]) -> None:
         told = str(error)
         if "\n" in told or str(path) not in told:
             raise AssertionError(f"a refusal that is no line naming the file: {told!r}") from error
+
+
+def read_sampled(path: Path) -> TimeRecord:
+    """A record whose file does not say its rate."""
+    return read_record(path, "1", "2", rate_hz=1000.0)
+
+
+def _recorded(name: str) -> bytes:
+    """A record of two columns of 70 samples."""
+    rows = np.random.default_rng(1).normal(size=(70, 2)).round(3)
+    held = BytesIO()
+    if name == "record":
+        np.savetxt(held, rows, delimiter=",", header="V_i,V_o", comments="", fmt="%g")
+    elif name == "record-mat":
+        savemat(held, {"data": rows})
+    else:
+        wavfile.write(held, 1000, (rows * 8000).astype(np.int16))
+    return held.getvalue()
 
 
 def _head(content: bytes) -> bytes:

@@ -7,6 +7,7 @@ library can crash. It estimates nothing.
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -118,11 +119,17 @@ def _wav(path: Path) -> tuple[dict[str, NDArray[Any]], float]:
     from scipy.io import wavfile
 
     try:
-        rate, data = wavfile.read(path)
+        with warnings.catch_warnings():
+            # Chunks with remarks are passed over; a file that is cut short is refused.
+            warnings.simplefilter("ignore", wavfile.WavFileWarning)
+            warnings.filterwarnings("error", message="Reached EOF")
+            rate, data = wavfile.read(path)
     except Exception as error:
         # The reader has no error of its own.
         reason = " ".join(str(error).split()) or type(error).__name__
         raise FileFormatError(f"{path}: cannot be read as a WAV file ({reason})") from error
+    if not data.size:
+        raise FileFormatError(f"{path}: holds no samples; give another recording")
     data = data.reshape(len(data), -1)
     if data.dtype.kind == "u":
         values = (data.astype(float) - 128.0) / 128.0

@@ -20,12 +20,13 @@ from daq.transports.transcript import Replay
 from sim.unit import load_unit
 
 SLOW = ("hdf5", "history", "analyser", "adapter", "prologix")
-APART = ("mat", "foreign-mat", "foreign-h5")
+APART = ("mat", "foreign-mat", "foreign-h5", "record-mat")
 """Each example takes a child process."""
 NAMES = (
     "csv", "hdf5", "uff", "mat", "sdf", "unit", "bench", "recipe", "transcript", "history",
     "block", "replies", "address", "prologix", "analyser", "adapter",
     "text", "guess", "dtt", "foreign-uff", "foreign-mat", "foreign-h5",
+    "record", "record-mat", "record-wav",
 )  # fmt: skip
 DEEP, BIG = b"[" * 100_000, b"9" * 5000
 TOML = (

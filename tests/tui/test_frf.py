@@ -201,6 +201,17 @@ def test_a_spoilt_record_is_refused(spoil, said, tmp_path):
         read_record(path, "1", "2", rate_hz=1000.0)
 
 
+def test_a_wav_file_that_is_cut_short_or_empty_is_refused(tmp_path):
+    path, _ = written(tmp_path, "wav", record("a periodic signal"))
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(LashbenchError, match="cannot be read as a WAV file"):
+        read_record(path, "1", "2")
+    wavfile.write(path, 1000, np.empty((0, 2), np.int16))
+    with pytest.raises(LashbenchError, match="holds no samples"):
+        read_record(path, "1", "2")
+
+
 def test_uneven_times_are_refused_and_rounded_ones_are_not(tmp_path):
     t = np.arange(2000) / 1024.0
     x = np.sin(2 * np.pi * 40 * t)
