@@ -84,7 +84,7 @@ def parse_instrument(url: str, hosted: tuple[str, ...] = ("sim",)) -> Address:
     """
     driver, address = driver_at(url)
     try:
-        return parse_address(address, hosted, driver.gpib_address)
+        return parse_address(address, (*hosted, *driver.wires), driver.gpib_address)
     except ConfigurationError as error:
         told = str(error).replace(f"instrument {address!r}", f"instrument {url!r}", 1)
         others = ", ".join(f"'{one.scheme}:' for {one.name}" for one in DRIVERS if one.scheme)
@@ -120,8 +120,13 @@ def open_analyser(
 
     driver, address = driver_at(url)
     parse_instrument(url, tuple(factories or {}))
+    ways = {scheme: wire.open for scheme, wire in driver.wires.items()}
     transport = open_transport(
-        address, factories, record=record, fault=fault, gpib_address=driver.gpib_address
+        address,
+        ways | dict(factories or {}),
+        record=record,
+        fault=fault,
+        gpib_address=driver.gpib_address,
     )
     return driver.drive(transport)
 
@@ -157,7 +162,11 @@ def load_all_of(url: str) -> None:
     from daq.transports.open import load_transport
 
     driver, address = driver_at(url)
-    load_transport(address)
+    own = driver.wires.get(address.partition(":")[0])
+    if own is not None:
+        own.load()
+    else:
+        load_transport(address)
 
     class Nobody:
         """A wire that is never used: a driver imports its own modules when it is made."""

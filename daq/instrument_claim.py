@@ -15,7 +15,13 @@ from pathlib import Path
 
 from daq.drivers import parse_instrument
 from daq.errors import InputError, MeasurementError
-from daq.transports.address import PrologixSerial, PrologixTcp, SerialPort, VisaAddress
+from daq.transports.address import (
+    HostedAddress,
+    PrologixSerial,
+    PrologixTcp,
+    SerialPort,
+    VisaAddress,
+)
 from daq.trust import distrust, open_own
 
 __all__ = ["claim", "wire_name"]
@@ -43,6 +49,8 @@ def wire_name(url: str) -> str | None:
             return f"tcp {_host(host)} {port}"
         case VisaAddress(resource=resource):
             return _visa_name(resource)
+        case HostedAddress(scheme=scheme, rest=rest) if scheme != "sim":
+            return f"{scheme} {rest.partition('?')[0]}"
     return None
 
 

@@ -47,7 +47,12 @@ def drives_hardware(url: str) -> bool:
     from daq.drivers import parse_instrument
     from daq.transports.address import HostedAddress, ReplayFile
 
-    return not isinstance(parse_instrument(url), HostedAddress | ReplayFile)
+    match parse_instrument(url):
+        case HostedAddress(scheme=scheme):
+            return scheme != "sim"
+        case ReplayFile():
+            return False
+    return True
 
 
 def unit_limits(unit: Unit) -> Limits:
@@ -101,7 +106,9 @@ def connect_wire(url: str, unit: Unit, transcript: Path | None = None) -> tuple[
     from daq.transports.open import TransportFactory, open_transport
 
     driver, address = driver_at(url)
-    factories: dict[str, TransportFactory] = {}
+    factories: dict[str, TransportFactory] = {
+        scheme: wire.open for scheme, wire in driver.wires.items()
+    }
     if is_simulated(url):
         from sim.loopback import open_loopback
 

@@ -5,8 +5,8 @@ Owns nothing but its fields. It imports no driver.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -14,7 +14,17 @@ if TYPE_CHECKING:
     from daq.driving.first_day import Check
     from daq.transports.base import Transport
 
-__all__ = ["Driver"]
+__all__ = ["Driver", "Wire"]
+
+
+@dataclass(frozen=True, slots=True)
+class Wire:
+    """A way to an instrument that only its own driver knows, under a scheme of its own."""
+
+    open: Callable[[str], Transport]
+    """Opens what follows the scheme's colon."""
+    load: Callable[[], None]
+    """Imports whatever opening needs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +45,8 @@ class Driver:
     """The address that the instrument comes with."""
     first_day: Callable[[], tuple[Check, ...]] | None = None
     """Checks of what the driver assumes, for whoever has a real instrument; imports them."""
+    wires: Mapping[str, Wire] = field(default_factory=dict)
+    """Ways that no other driver has, by scheme."""
 
     def answers(self, identity: str) -> bool:
         """Whether an answer to ``*IDN?`` is that of an instrument of this driver."""

@@ -100,7 +100,7 @@ def test_an_unknown_scheme_is_refused_with_those_there_are():
 
 @pytest.mark.parametrize("url", ["sr785:", "sr785:foo", "SR785:sim:", "sr785:sr785:sim:"])
 def test_what_is_no_address_is_shown_whole_with_what_may_stand_before_it(url):
-    with pytest.raises(ConfigurationError, match="before any of them may stand 'sr785:'") as told:
+    with pytest.raises(ConfigurationError, match="before any of them may stand .*'sr785:'") as told:
         open_analyser(url)
     assert repr(url) in str(told.value)
 

@@ -1,0 +1,1 @@
+"""The simulated sampled bench: a converter with a servo behind it, on the usual wires."""
