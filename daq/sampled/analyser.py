@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from daq.analyser import Identity, PointSettings, SourceState, SweepPoint
 from daq.dialogue import Dialogue
-from daq.driving.safe_off import Attempt, SafeOff
+from daq.driving.safe_off import SafeOff
 from daq.driving.variance import gain_standard_error, normalised_variance
 from daq.errors import (
     BenchTimeout,
@@ -28,74 +28,24 @@ from daq.errors import (
     ProtocolError,
 )
 from daq.frf import PointFlag
-from daq.plan import SweepPlan
-from daq.sampled.converter import MOST_FRAMES
+from daq.sampled.limits import BLIND_S, FASTEST_HZ, LEAST_SAMPLES, check_settings
 from daq.sampled.lockin import amplitudes, delay_of
+from daq.sampled.safe import make_safe
 from daq.scpi import parse_number
 from daq.transports.base import Deadline, Transport
 
-__all__ = ["SampledBench", "check_sweep"]
+__all__ = ["SampledBench"]
 
-_LEAST_SAMPLES = 4.0
-"""Samples in a period of the highest frequency: anti-alias filters end below half the rate."""
-_LOWEST_HZ = 0.01
-_HIGHEST_V = 10.0
-_MOST_CYCLES = 100_000
 _AT_ONCE = 16_384
-_FASTEST_HZ = 192_000.0
 _DELAY_STEP_HZ = 5.0
 """Difference of the two frequencies of the delay's measurement: up to 0.2 s is told."""
 _DELAY_CYCLES = 8
-_BLIND_S = 0.1
-"""Dropped before the delay is known."""
 _LEVEL_SHARE = 0.05
 """How far the loop-back may be from the level that was set."""
 _MARGIN_S = 10.0
 _RAMP_S = 30.0
 _POWER_ON, _ERRORS = 128, 32 | 16
 _LOCK_PATIENCE_S = 6.0
-
-
-def check_sweep(
-    plan: SweepPlan,
-    slew_vpk_per_s: float,
-    input_range_vpk: tuple[float | None, float | None],
-) -> None:
-    """Refuse a sweep that no converter takes; raises `LimitError`, nothing is sent."""
-    for level in plan.levels_vpk:
-        settings = PointSettings(
-            level, plan.settle_cycles, plan.integrate_cycles, plan.dc_offset_v,
-            slew_vpk_per_s, input_range_vpk,
-        )  # fmt: skip
-        _check(min(plan.frequencies_hz), max(plan.frequencies_hz), settings, _FASTEST_HZ)
-
-
-def _check(low_hz: float, high_hz: float, settings: PointSettings, rate_hz: float) -> None:
-    ranges = {
-        "frequency (Hz)": (low_hz, _LOWEST_HZ, rate_hz / _LEAST_SAMPLES),
-        "highest frequency (Hz)": (high_hz, _LOWEST_HZ, rate_hz / _LEAST_SAMPLES),
-        "source level (V peak)": (settings.source_vpk, 1e-6, _HIGHEST_V),
-        "source offset (V)": (settings.dc_offset_v, -_HIGHEST_V, _HIGHEST_V),
-        "level and offset (V)": (
-            settings.source_vpk + abs(settings.dc_offset_v), 0.0, _HIGHEST_V,
-        ),
-        "slew (V peak/s)": (settings.slew_vpk_per_s, 0.0, 1e6),
-        "settle cycles": (settings.settle_cycles, 0, _MOST_CYCLES),
-        "integrate cycles": (settings.integrate_cycles, 1, _MOST_CYCLES),
-    }  # fmt: skip
-    for channel, wanted in enumerate(settings.input_range_vpk, start=1):
-        if wanted is not None:
-            ranges[f"range of input {channel} (V peak)"] = wanted, 1e-3, _HIGHEST_V
-    for name, (value, low, high) in ranges.items():
-        if not low <= value <= high:
-            raise LimitError(
-                f"{name} {value:g} is not within {low:g} to {high:g}; nothing was sent"
-            )
-    cycles = settings.settle_cycles + settings.integrate_cycles
-    if (cycles / low_hz + 2 * _BLIND_S) * min(rate_hz, 48_000.0) > MOST_FRAMES:
-        raise LimitError(
-            f"{cycles} cycles at {low_hz:g} Hz are more than a recording holds; nothing was sent"
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +124,7 @@ class SampledBench:
         InstrumentError
             If it reads back something else.
         """
-        _check(start_hz, stop_hz, settings, self._rate_hz or _FASTEST_HZ)
+        check_settings(start_hz, stop_hz, settings, self._rate_hz or FASTEST_HZ)
         self._setup = None
         dialogue = self._dialogue
         with dialogue.lock:
@@ -184,7 +134,7 @@ class SampledBench:
                 self._delay_s = None
             dialogue.send("*CLS")
             self._rate_hz, full_v = self._pair("CONF?")
-            _check(start_hz, stop_hz, settings, self._rate_hz)
+            check_settings(start_hz, stop_hz, settings, self._rate_hz)
             if settings.source_vpk + abs(settings.dc_offset_v) > full_v:
                 raise LimitError(
                     f"{settings.source_vpk:g} V peak and {settings.dc_offset_v:g} V exceed the "
@@ -247,7 +197,7 @@ class SampledBench:
         held = self._dialogue.lock.acquire(timeout=_LOCK_PATIENCE_S)
         try:
             self._dialogue.trusted = False
-            self.safe_off = _safe_off(self._transport, self.on_exchange)
+            self.safe_off = make_safe(self._transport, self.on_exchange)
         finally:
             if held:
                 self._dialogue.lock.release()
@@ -315,11 +265,11 @@ class SampledBench:
     def _measured_delay(self, setup: _SetUp, first_hz: float, guard: Callable[[], None]) -> float:
         """From the loop-back at two neighbouring frequencies; what comes back is the level, too."""
         step = min(_DELAY_STEP_HZ, 0.1 * first_hz)
-        up = first_hz + step <= self._rate_hz / _LEAST_SAMPLES
+        up = first_hz + step <= self._rate_hz / LEAST_SAMPLES
         pair = (first_hz, first_hz + step) if up else (first_hz - step, first_hz)
         found = []
         for frequency_hz in pair:
-            blind = math.ceil(_BLIND_S * self._rate_hz)
+            blind = math.ceil(BLIND_S * self._rate_hz)
             count = blind + math.ceil(_DELAY_CYCLES * self._rate_hz / frequency_hz) + 1
             frames = self._record(frequency_hz, count, guard)
             cycles = amplitudes(frames, blind, frequency_hz, self._rate_hz, _DELAY_CYCLES)
@@ -426,41 +376,3 @@ class SampledBench:
             return parse_number(parts[0]), parse_number(parts[1])
 
         return self._dialogue.parsed(line, read)
-
-
-def _safe_off(transport: Transport, told: Callable[[float], None] | None) -> SafeOff:
-    """Give up recordings, ramp to nothing, and prove that the output is at rest."""
-    attempt = Attempt(Dialogue(transport), told, 12.0)
-
-    def cleared() -> str:
-        attempt.dialogue.clear()
-        return "done"
-
-    def at_rest() -> str:
-        for _ in range(100):
-            reply = attempt.dialogue.ask("SOUR:NOW?")
-            if all(parse_number(part) == 0 for part in reply.split(",")):
-                return reply
-            attempt.pause(0.1)
-        return reply
-
-    attempt.act("device clear", cleared)
-    for line in ("ACQ:HALT", "SOUR:VOLT 0", "SOUR:OFFS 0"):
-        attempt.send(line)
-    attempt.act("wait for the ramp", at_rest)
-    proven = _is_at_rest(attempt)
-    if not proven:
-        attempt.send("*RST")
-        proven = _is_at_rest(attempt)
-    return attempt.result(proven)
-
-
-def _is_at_rest(attempt: Attempt[Dialogue]) -> bool:
-    replies = [attempt.ask(line) for line in ("SOUR:NOW?", "SOUR:VOLT?", "SOUR:OFFS?")]
-    try:
-        return all(
-            reply is not None and all(parse_number(part) == 0 for part in reply.split(","))
-            for reply in replies
-        )
-    except LashbenchError:
-        return False

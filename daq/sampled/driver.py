@@ -27,7 +27,7 @@ def _check(
     *,
     may_repeat: bool,
 ) -> None:
-    from daq.sampled.analyser import check_sweep
+    from daq.sampled.limits import check_sweep
 
     check_sweep(plan, slew_vpk_per_s, input_range_vpk)
 
