@@ -92,6 +92,11 @@ class SampledBench:
     def on_exchange(self, told: Callable[[float], None] | None) -> None:
         self._dialogue.on_exchange = told
 
+    @property
+    def wire_lacks(self) -> tuple[str, ...]:
+        """What the way to the converter turned out not to have, such as a device clear."""
+        return tuple(getattr(self._transport, "lacks", ()))
+
     def identify(self) -> Identity:
         """Ask who is there, and refuse anything but a converter."""
         from daq.drivers import stranger

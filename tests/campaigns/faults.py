@@ -38,7 +38,7 @@ SEED = 20007
 def main() -> int:
     """Run, print, and perhaps write."""
     words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    words.add_argument("--runs", type=int, default=520)
+    words.add_argument("--runs", type=int, default=800)
     words.add_argument("--seed", type=int, default=SEED)
     words.add_argument("--lanes", type=int, default=4, help="runs at the same time")
     words.add_argument("--minutes", type=float, default=1e6, help="begin no run after that")
