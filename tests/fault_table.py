@@ -65,7 +65,7 @@ class Outcome:
 
     def __str__(self) -> str:
         flagged = f", {self.flagged} flagged" if self.flagged else ""
-        return f"{self.code}, {self.points} of {POINTS} points{flagged}, {self.source}"
+        return f"{self.code}, {self.points}/{POINTS}{flagged}, {self.source}"
 
 
 def provoke(fault: str, wire: str, folder: Path) -> Outcome:

@@ -103,7 +103,7 @@ def recorded(kept: Path) -> list[Outcome]:
 
 
 def table(outcomes: Sequence[Outcome], seed: int, repeated: int) -> list[str]:
-    """What came of it, one row for each fault and each disturbance."""
+    """What came of it, with a row for each fault and disturbance that broke a promise."""
     benches = Counter((outcome.case.driver, outcome.case.wire) for outcome in outcomes)
     shown = [f"{driver or '35670a'} {wire} {benches[driver, wire]}" for driver, wire in BENCHES]
     broken = sum(bool(outcome.wrongs) for outcome in outcomes)
@@ -119,29 +119,32 @@ def table(outcomes: Sequence[Outcome], seed: int, repeated: int) -> list[str]:
         f"to the source off: {max(off, default=0.0):.1f} s, from its stop: "
         f"{max(stopped, default=0.0):.1f} s. Measurements that one further session "
         f"did not complete, two or three did: {sum(o.resumes > 1 for o in outcomes)}.",
-        "",
-        "| what went wrong | runs | struck | complete | ended early, by exit code | source said "
-        "to be | broken |",
-        "| --- | --- | --- | --- | --- | --- | --- |",
     ]
-    names = dict.fromkeys(name for model in models() for name in model.faults)
-    for name in (*names, *DISTURBANCES):
+    named = dict.fromkeys(name for model in models() for name in model.faults)
+    rows = {}
+    for name in (*named, *DISTURBANCES):
         mine = [o for o in outcomes if name in (o.case.fault_name, o.case.disturbance)]
         if mine:
-            lines.append(_row(name, mine))
+            rows[name] = mine
+    counts = [len(mine) for mine in rows.values()]
+    least, most = min(counts), max(counts)
+    lines += ["", f"Faults and disturbances: {len(rows)}, in {least} to {most} runs each."]
+    if broken:
+        lines += [
+            "",
+            "| what went wrong | runs | struck | source said to be | broken |",
+            "| --- | --- | --- | --- | --- |",
+        ]
+        lines += [_row(n, mine) for n, mine in rows.items() if any(o.wrongs for o in mine)]
     return lines
 
 
 def _row(name: str, mine: Sequence[Outcome]) -> str:
-    complete = sum(outcome.code == 0 for outcome in mine)
-    codes = Counter("killed" if o.code is None else str(o.code) for o in mine if o.code != 0)
     sources = Counter(outcome.source or "not touched" for outcome in mine)
     cells = [
         f"`{name}`",
         str(len(mine)),
         str(sum(o.fault_struck if o.case.fault_name == name else o.disturbed for o in mine)),
-        str(complete),
-        ", ".join(f"{code}: {codes[code]}" for code in sorted(codes)) or "-",
         ", ".join(f"{state} {sources[state]}" for state in sorted(sources)),
         str(sum(bool(outcome.wrongs) for outcome in mine)),
     ]
