@@ -6,6 +6,7 @@ library can crash. It estimates nothing.
 
 from __future__ import annotations
 
+import logging
 import os
 import warnings
 from collections.abc import Mapping
@@ -64,6 +65,8 @@ def read_record(
         columns = _mat(path)
     else:
         columns = _text(path)
+    if not columns:
+        raise FileFormatError(f"{path}: holds no numbers; give a recording")
     rates = [] if rate_hz is None else [(rate_hz, "--rate")]
     if said is not None:
         rates.append((said, "the file"))
@@ -147,6 +150,12 @@ def _tdms(path: Path) -> tuple[dict[str, NDArray[Any]], float | None]:
         raise InputError(
             f"{path}: TDMS files need nptdms; install it: pip install nptdms"
         ) from error
+    heard: list[str] = []
+    listener = logging.Handler(logging.WARNING)
+    listener.emit = lambda record: heard.append(record.getMessage())  # type: ignore[method-assign]
+    speakers = [logging.getLogger(f"nptdms.{name}") for name in ("reader", "tdms_segment")]
+    for speaker in speakers:
+        speaker.addHandler(listener)
     try:
         file = TdmsFile.read(path)
         channels = [channel for group in file.groups() for channel in group.channels()]
@@ -155,6 +164,12 @@ def _tdms(path: Path) -> tuple[dict[str, NDArray[Any]], float | None]:
     except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise FileFormatError(f"{path}: cannot be read as a TDMS file ({reason})") from error
+    finally:
+        for speaker in speakers:
+            speaker.removeHandler(listener)
+    if heard:
+        # It reads what is left of a file that is cut short, and says so there only.
+        raise FileFormatError(f"{path}: is damaged ({heard[0]}); give another copy")
     names = [key.split("/", 1)[1] for key in found]
     plain = {
         (name if names.count(name) == 1 else key): values
