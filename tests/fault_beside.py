@@ -35,6 +35,9 @@ _MEDDLING = {"": (
     b"SOFF 2 V", b"*ESR?", b"SSTR 2,60 Hz", b"SRPT 2,1", b"\xff\x00garbage", b"DSPY? 0", b"INPS?",
     b"*SRE 255", b"PSDU 2,1", b"SNPS 2,30", b"SSAM 0 mV", b"SRCO 0", b"OUTX 1", b"DISP 2,0",
     b"MEAS 0,44", b"VIEW 1,0", b"SSAL 2", b"SARS 2,1", b"DSPS?", b"SSTY 2,1",
+), "sampled": (
+    b"*IDN?", b"SOUR:VOLT 4", b"SOUR:VOLT?", b"*RST", b"ACQ:HALT", b"*CLS", b"SOUR:OFFS 2",
+    b"SOUR:NOW?", b"*ESR?", b"\xff\x00garbage", b"SOUR:VOLT 0", b"SOUR:OFFS 0",
 )}  # fmt: skip
 """What another program may say to the instrument of each driver."""
 
