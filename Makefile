@@ -53,8 +53,8 @@ lowest: $(LOWEST)/.ready
 	@NUMBA_CACHE_DIR=$(CURDIR)/$(LOWEST)/numba XDG_CACHE_HOME=$(CURDIR)/$(LOWEST)/cache \
 	  $(LOWEST)/bin/python -m pytest -W default --disable-warnings --numprocesses $(JOBS) --dist loadfile \
 	  tests/daq/test_formats_lossless.py tests/daq/test_formats_sdf.py tests/daq/test_formats_uff.py \
-	  tests/daq/test_store.py tests/daq/test_transports_visa.py tests/tui/test_cli.py \
-	  tests/tui/test_app_way.py tests/analysis/test_response_figure.py tests/sim/test_compiling.py
+	  tests/daq/store/test_store.py tests/daq/test_transports_visa.py tests/tui/test_cli.py \
+	  tests/tui/test_app_way.py tests/analysis/test_response_figure.py tests/sim/engine/test_compiling.py
 
 # Programs of others, as they are packaged, in a folder of their own: what is installed for the
 # tests stays as it is locked. Without the network those that need them are left out.
@@ -94,8 +94,8 @@ bench: $(READY)
 	@for script in $(wildcard tests/benchmarks/*.py); do $(BIN)/python $$script || exit 1; done
 
 blind: $(READY)
-	@$(BIN)/python -m pytest -m study tests/analysis/test_diagnosis.py tests/analysis/test_estimate.py \
-	  tests/analysis/test_paper.py
+	@$(BIN)/python -m pytest -m study tests/analysis/diagnosis/test_diagnose.py tests/analysis/estimate/test_estimate.py \
+	  tests/analysis/paper/test_reproduction.py
 	@$(BIN)/python tests/campaigns/blind_study.py
 	@$(BIN)/python tests/campaigns/ties.py
 	@$(BIN)/python tests/campaigns/smallest.py
@@ -140,7 +140,7 @@ $(READY): pyproject.toml requirements.lock
 	  from sim.response import Servo, simulate_cycles; \
 	  plan = SweepPlan((500.0,), (1.0,), settle_cycles=1, integrate_cycles=1); \
 	  [simulate_cycles([Servo.of(load_unit('adss'), 0.5)], plan, single=s) for s in (False, True)]; \
-	  from analysis.expectation import compile_all; compile_all()"
+	  from analysis.emulation.kernel_data import compile_all; compile_all()"
 	@touch $@
 
 $(LOWEST)/.ready: pyproject.toml | $(READY)

@@ -18,7 +18,7 @@ from matplotlib.ticker import MultipleLocator, NullLocator
 from analysis.resonance import LevelFeatures
 from daq.formats.atomic import replacing
 from daq.frf import FrequencyResponse, PointFlag
-from daq.visible_text import visible_line
+from daq.untrusted.visible_text import visible_line
 
 __all__ = ["draw_response", "save_response_figure"]
 

@@ -85,5 +85,5 @@ def posterior_folder() -> Path:
 
 
 def kept_runs() -> Path:
-    """The archive of the runs that come with lashbench, see `analysis.library`."""
+    """The archive of the runs that come with lashbench, see `analysis.ensemble.run_cache`."""
     return _root() / "runs.zip"

@@ -18,7 +18,7 @@ from pydantic import Field
 from daq.configs import config_path
 from daq.errors import LimitError
 from daq.plan import SweepPlan
-from daq.toml_files import NonNegative, Positive, Section, load_toml
+from daq.untrusted.toml_files import NonNegative, Positive, Section, load_toml
 
 __all__ = ["Bench", "Limits", "check_plan", "load_bench", "tightest"]
 

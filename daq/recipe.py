@@ -13,7 +13,7 @@ from pydantic import Field
 from daq.configs import config_path
 from daq.limits import Limits
 from daq.plan import Direction, Spacing, SweepPlan, spaced_frequencies
-from daq.toml_files import NonNegative, Positive, Section, load_toml
+from daq.untrusted.toml_files import NonNegative, Positive, Section, load_toml
 
 __all__ = ["Recipe", "load_recipe"]
 

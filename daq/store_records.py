@@ -11,9 +11,9 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 from daq.analyser import Identity, SourceState, SweepPoint
-from daq.bounded_text import parse_json
 from daq.errors import InputError
 from daq.plan import SweepPlan
+from daq.untrusted.bounded_text import parse_json
 
 __all__ = [
     "CORRECTABLE",

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from sim.assembly import Assembly, PiecewiseLinearSystem
 from sim.elements import (
     Amplifier,
     Damper,
@@ -23,6 +22,7 @@ from sim.elements import (
     Spring,
     Tachometer,
 )
+from sim.engine.system import Assembly, PiecewiseLinearSystem
 from sim.unit import Unit
 
 __all__ = ["Drivetrain", "paper_drivetrain", "shaft_end"]

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from sim.assembly import Assembly, Law
+from sim.engine.system import Assembly, Law
 
 __all__ = [
     "Amplifier",

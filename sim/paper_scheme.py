@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.compiling import njit
+from sim.engine.compiling import njit
 from sim.unit import StageBacklash, Unit
 
 __all__ = ["PAPER_LEVEL_VPK", "PAPER_STEP_S", "paper_gains"]

@@ -21,13 +21,13 @@ from numpy.typing import NDArray
 from daq.errors import AnalysisError
 from daq.frf import GAIN_STD_COMPONENTS, GAIN_STD_IS, FrequencyResponse, error_words
 from daq.plan import SweepPlan
-from sim.assembly import Law, PiecewiseLinearSystem
 from sim.effects import EffectSetting
-from sim.effort import spend
-from sim.engine import HARMONICS, LONGEST_STEP_S, Motion, Stretch, carry
+from sim.engine.effort import spend
+from sim.engine.engine import HARMONICS, LONGEST_STEP_S, Motion, Stretch, carry
+from sim.engine.stepping import Asking, shared_out, step_together
+from sim.engine.system import Law, PiecewiseLinearSystem
 from sim.reading import PERIODIC_SCATTER, response_of_cycles, scatter_of_cycles
 from sim.servo import START_SPREAD, Servo, parameters_of, states_at_start
-from sim.stepping import Asking, shared_out, step_together
 from sim.unit import Unit
 
 __all__ = [
@@ -128,7 +128,7 @@ def simulate_cycles(
         and the one before; servos that share their linear part with it go along, all others
         keep theirs.
     single
-        Step in single precision, at half of the cost (`sim.engine.advance`).
+        Step in single precision, at half of the cost (`sim.engine.engine.advance`).
     point_done
         Called after each frequency of each group, from the thread that simulated it.
 

@@ -14,18 +14,18 @@ import time
 from types import TracebackType
 
 from daq.errors import LinkError
-from sim.adapter import FakeAdapter
-from sim.adapter_dialects import (
+from sim.instrument.bus import Instrument
+from sim.instrument.gpib_adapter import FakeAdapter
+from sim.instrument.gpib_dialects import (
     AR488,
     AR488_LATE_EOI,
     PROLOGIX_ETHERNET,
     PROLOGIX_USB,
     Dialect,
 )
-from sim.instrument.bus import Instrument
 from sim.instrument.pace import ByTheClock, Fast, Pace
 from sim.instrument.serial_line import SerialInstrument, SerialLine
-from sim.wires import AdapterClient, Cable, Listener, RawClient, Terminal
+from sim.instrument.server_endpoints import AdapterClient, Cable, Listener, RawClient, Terminal
 
 __all__ = ["HOST", "Server"]
 

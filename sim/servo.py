@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.assembly import Law, PiecewiseLinearSystem
 from sim.effects import EffectSetting, drivetrain_with
+from sim.engine.system import Law, PiecewiseLinearSystem
 from sim.unit import Unit
 
 __all__ = ["START_SPREAD", "Servo", "parameters_of", "states_at_start"]

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError,
 
 from daq.configs import config_path
 from daq.errors import ConfigurationError
-from daq.toml_files import read_toml
+from daq.untrusted.toml_files import read_toml
 from sim.tolerance import Share, believed_shares, find_fault
 
 __all__ = ["StageBacklash", "Unit", "load_unit", "stage_backlash", "unit_from_mapping"]

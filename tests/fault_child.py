@@ -194,7 +194,7 @@ def shorten_waits() -> None:
     import daq.sr785.analyser
     import daq.sr785.safe
     import daq.sr785.setup
-    import daq.store_file
+    import daq.store.file
 
     short = {"reply_s": 1.0, "block_s": 1.5, "overhead_s": 3.0}
     timing = daq.hp35670a.setup.Timing
@@ -203,7 +203,7 @@ def shorten_waits() -> None:
     other = daq.sr785.setup.Timing
     daq.sr785.analyser.Timing = lambda: other(**short, point_s=0.1)
     daq.sr785.safe._BUDGET_S = daq.sr785.safe._RESET_S = 4.0
-    daq.store_file._BUSY_S = BUSY_S
+    daq.store.file._BUSY_S = BUSY_S
 
 
 def replace_instrument(instrument: Any) -> None:
@@ -303,7 +303,7 @@ def jump_clock(chance: random.Random) -> None:
         def now(cls, tz=None):
             return datetime.now(tz or UTC) + timedelta(seconds=offset())
 
-    daq.store.datetime = Jumping
+    daq.store.store.datetime = Jumping
     honest = time.time
     time.time = lambda: honest() + offset()
 

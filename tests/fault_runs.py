@@ -26,9 +26,9 @@ from fault_beside import Beside
 from fault_cases import LEVELS_VPK, Case
 from frozen_files import Freezer, freezer_of
 
-from daq.bench_lock import BenchLock
 from daq.errors import LashbenchError
 from daq.frf import PointFlag
+from daq.session.bench_lock import BenchLock
 from daq.store import Store
 
 END_S = 60.0

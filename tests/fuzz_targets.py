@@ -29,12 +29,12 @@ from sdf_files import File
 from wire import MemoryLink, TinyAdapter
 
 from daq.configs import config_path
+from daq.driving.replies import decode_reals, parse_error, parse_integer, parse_number, parse_string
 from daq.errors import BenchTimeout, InputError, LashbenchError, LinkError, ProtocolError
 from daq.formats import Reading, hdf5, read_response, record, sdf, write_response
 from daq.formats.foreign import dtt
 from daq.limits import load_bench
 from daq.recipe import load_recipe
-from daq.scpi import decode_reals, parse_error, parse_integer, parse_number, parse_string
 from daq.store import Store
 from daq.time_records.columns import read_record
 from daq.time_records.record import TimeRecord
@@ -43,12 +43,12 @@ from daq.transports.base import Deadline, ask, ask_block, take_block
 from daq.transports.prologix import PrologixTransport
 from daq.transports.prologix_adapter import Adapter
 from daq.transports.transcript import Replay
-from sim.adapter import FakeAdapter
-from sim.adapter_dialects import AR488, PROLOGIX_USB
 from sim.analyser35670a import Analyser35670A, Choices
+from sim.instrument.gpib_adapter import FakeAdapter
+from sim.instrument.gpib_dialects import AR488, PROLOGIX_USB
 from sim.instrument.plant import LinearPlant
 from sim.unit import load_unit
-from tui.history_rows import measurement_row
+from tui.measurements.history_rows import measurement_row
 
 Target = Callable[[bytes], Any]
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.causes import Hypothesis
+from analysis.ensemble.model import Hypothesis
 from daq.frf import DB_PER_NEPER, GAIN_STD_IS, FrequencyResponse, error_words
 from daq.plan import SweepPlan, spaced_frequencies
 from sim.catalogue import COMMON

@@ -3,8 +3,8 @@
 import numpy as np
 from synthetic import candidate, observation, read
 
-from analysis.adequacy import Adequacy
-from analysis.verdict import judge_candidates
+from analysis.checking.goodness_of_fit import Adequacy
+from analysis.selection.verdict import judge_candidates
 
 TRUE, WRONG = ("load-inertia",), ("shaft-stiffness",)
 FITS = Adequacy(0.0, 0.0)

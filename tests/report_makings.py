@@ -7,8 +7,8 @@ import pytest
 import synthetic
 from untrained import Untrained
 
-import analysis.diagnosis as diagnosis_module
-from analysis.calibration import Calibrated
+import analysis.diagnosis.diagnose as diagnosis_module
+from analysis.emulation.parameter_posterior import ParameterPosterior
 from analysis.inference.refine import Refined
 from daq.frf import FrequencyResponse
 from sim.unit import load_unit
@@ -69,7 +69,7 @@ def response(**words: object) -> FrequencyResponse:
 def sharpened(unit, candidate, *_):
     """What all its runs would tell of a candidate: where it is, sharply."""
     d = len(candidate.best.place)
-    return Calibrated(candidate.best.place, 0.02**2 * np.eye(d))
+    return ParameterPosterior(candidate.best.place, 0.02**2 * np.eye(d))
 
 
 def diagnosis(
@@ -92,5 +92,5 @@ def diagnosis(
     monkeypatch.setattr(diagnosis_module, "Posterior", SimpleNamespace(find=lambda *_: posterior))
     monkeypatch.setattr(diagnosis_module, "refine", lambda *_, **__: refined)
     monkeypatch.setattr(diagnosis_module, "propose_measurement", lambda *_, **__: None)
-    monkeypatch.setattr(diagnosis_module, "sharpen_candidate", sharpened)
+    monkeypatch.setattr(diagnosis_module, "refine_parameters", sharpened)
     return diagnosis_module.diagnose_response(response(), load_unit("adss"))

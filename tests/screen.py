@@ -8,9 +8,9 @@ from contextlib import asynccontextmanager
 from rich.console import Console
 
 from daq.store import Store
-from tui.app.analyses import Analyses
 from tui.app.application import BenchApp
 from tui.app.messages import InstrumentsListed
+from tui.app.state.analyses import Analyses
 
 SIZES = [(80, 24), (120, 40), (200, 60)]
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from screen import nothing_found, operated
 
-from tui.app.analyses import Analyses
+from tui.app.state.analyses import Analyses
 
 SIZE = (104, 34)
 """A size that reads well in a page."""

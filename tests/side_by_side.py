@@ -5,7 +5,7 @@ import numpy as np
 from oracle import rk4
 
 from sim.effects import drivetrain_with
-from sim.engine import Stretch, advance
+from sim.engine.engine import Stretch, advance
 from sim.unit import load_unit, stage_backlash
 
 ADSS, EDSS = load_unit("adss"), load_unit("edss")

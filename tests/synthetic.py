@@ -10,13 +10,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.branches import Motions
-from analysis.candidate import Candidate
-from analysis.causes import Hypothesis
-from analysis.observation import Observation
-from analysis.population import Population
-from analysis.spread import spread_of
-from analysis.surface import Surface
+from analysis.emulation.emulator import Emulator
+from analysis.emulation.fitted_model import FittedModel
+from analysis.emulation.regimes import Regimes
+from analysis.ensemble.datasheet_spread import spread_of
+from analysis.ensemble.model import Hypothesis
+from analysis.ensemble.runs import Population
+from analysis.observation.observation import Observation
 from daq.plan import SweepPlan
 from sim.effects import drivetrain_with
 from sim.unit import load_unit
@@ -128,8 +128,8 @@ def candidate(
     places, deviations, runs = np.array(places), np.array(deviations), np.array(runs)
     difference = runs - seen.values - np.tensordot(deviations, slopes, axes=1)
     width = np.array([0.4] + [0.4] * (hypothesis.d - 1))
-    motions = Motions.unknown(*difference.shape[::2])
-    surface = Surface(seen, places, difference, width, slopes, SIGMAS, motions, SPREAD.gain, 9.0)
+    motions = Regimes.unknown(*difference.shape[::2])
+    surface = Emulator(seen, places, difference, width, slopes, SIGMAS, motions, SPREAD.gain, 9.0)
     nothing = np.zeros(runs[:, 0].shape)
     population = Population(places, deviations, nothing + 1.0 + 0j, nothing)
-    return Candidate(hypothesis, population, surface, surface.climb(places.mean(axis=0)))
+    return FittedModel(hypothesis, population, surface, surface.climb(places.mean(axis=0)))

@@ -7,10 +7,11 @@ from collections import Counter
 import numpy as np
 import synthetic
 
-from analysis import hunt, population
-from analysis.causes import Hypothesis
-from analysis.population import Population
-from analysis.spread import spread_of
+from analysis.ensemble import runs as population
+from analysis.ensemble.datasheet_spread import spread_of
+from analysis.ensemble.model import Hypothesis
+from analysis.ensemble.runs import Population
+from analysis.inference import model_pool as hunt
 
 ADSS = synthetic.ADSS
 

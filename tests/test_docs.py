@@ -14,7 +14,7 @@ import pytest
 from links import broken_links
 from printed import Newcomer, mentions, pages, pieces, stocked_history
 
-from analysis.causes import every_single_cause
+from analysis.ensemble.model import every_single_cause
 from daq.analyser import SourceState
 from daq.formats import read_response
 from daq.plan import SweepPlan
@@ -219,7 +219,7 @@ def test_the_effect_of_the_page_needs_nothing_but_its_entry(monkeypatch, tmp_pat
     names = {}
     exec(code, names)
     effect = names["tight_bearing"]
-    for module in ("sim.effects", "analysis.causes"):
+    for module in ("sim.effects", "analysis.ensemble.model"):
         name = f"{module}.CATALOGUE"
         monkeypatch.setattr(name, {**CATALOGUE, effect.id: effect})
     unit = load_unit("adss")

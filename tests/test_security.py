@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from analysis import diagnosis_figures
+from analysis.diagnosis import figures as diagnosis_figures
 from daq.formats.atomic import file_stem
 from sim.analyser35670a import Analyser35670A, Choices
 from sim.instrument.plant import LinearPlant

@@ -14,11 +14,11 @@ import numpy as np
 from hidden import BANDS_HZ, LEVELS_VPK
 from numpy.typing import NDArray
 
-from analysis.family import Family, read_families
-from analysis.lattice import RATIO, Families, every_family
-from analysis.library import run_name, write_runs
-from analysis.observation import Observation, unread
-from analysis.spread import spread_of
+from analysis.ensemble.batch import Family, read_families
+from analysis.ensemble.datasheet_spread import spread_of
+from analysis.ensemble.run_cache import run_name, write_runs
+from analysis.estimate.design import RATIO, Families, every_family
+from analysis.observation.observation import Observation, unread
 from daq.plan import SweepPlan, spaced_frequencies
 from sim.unit import load_unit
 
@@ -26,7 +26,7 @@ RUNS = Path(__file__).parents[1] / "configs" / "runs.zip"
 POINTS = 61
 
 BITS = 11
-"""Kept of a reading: to 0.05 %, where a regression is trusted to 0.3 % (`analysis.surface`)."""
+"""Kept of a reading: to 0.05 %, where a regression is trusted to 0.3 % (`emulation.emulator`)."""
 
 VARIANCE_BITS = 7
 

@@ -16,17 +16,17 @@ from daq.errors import Interrupted, LashbenchError, MeasurementError
 
 if TYPE_CHECKING:
     from daq.analyser import Analyser
-    from daq.aside import Aside
-    from daq.bench_lock import BenchLock
     from daq.control import SessionControl
     from daq.driving.entry import Driver
     from daq.limits import Limits
     from daq.session import Session
+    from daq.session.bench_lock import BenchLock
+    from daq.session.watchdog import Watchdog
     from daq.session_events import Finished, SessionEvent
     from daq.session_request import SessionRequest
     from daq.store import Store
     from daq.transports.base import Transport
-    from daq.watchdog import Watchdog
+    from daq.untrusted.bounded_calls import Aside
     from sim.unit import Unit
 
 __all__ = ["bench_session", "connect", "connect_wire", "drives_hardware", "unit_limits"]
@@ -142,13 +142,13 @@ def bench_session(
         After the last: the fault that ended the session.
     """
     from daq.analyser import SourceState
-    from daq.aside import Aside
-    from daq.bench_lock import BenchLock
     from daq.control import Cancelled
     from daq.session import Session
+    from daq.session.bench_lock import BenchLock
+    from daq.session.history import ANSWER_S
     from daq.session_events import CheckLine, Finished, Opened, SourceSafe, Warned
-    from daq.session_history import ANSWER_S
     from daq.store import Store
+    from daq.untrusted.bounded_calls import Aside
 
     is_real = drives_hardware(url)
     reopen: Callable[[], Analyser] | None = (lambda: connect(url, unit)) if is_real else None
@@ -210,7 +210,7 @@ class _Place:
         self, get: Callable[[], _Held], let_go: Callable[[_Held], None], bound_s: float
     ) -> _Held:
         """Have something that lies on the history's file system, until the session's end."""
-        from daq.session_history import answered
+        from daq.session.history import answered
 
         got = answered(
             self._aside, get, str(self._history), bound_s=bound_s, look=self._control.check
@@ -220,7 +220,7 @@ class _Place:
 
     def answered(self, call: Callable[[], _Held]) -> _Held:
         """Ask the history something."""
-        from daq.session_history import answered
+        from daq.session.history import answered
 
         return answered(self._aside, call, str(self._history))
 
@@ -266,7 +266,7 @@ class _Watched(_Alone):
     """A watchdog for the length of a session, and what becomes of it at the end."""
 
     def __init__(self, url: str, history: Path, lock: BenchLock, place: _Place) -> None:
-        from daq.watchdog import Watchdog
+        from daq.session.watchdog import Watchdog
 
         super().__init__()
         self._place = place

@@ -28,13 +28,16 @@ from daq.errors import InputError, LashbenchError
 from tui.commands.bench import is_terminal
 from tui.entry import INTERRUPTED
 from tui.logs import LEVELS, logging_to_file, silence, telling_what_is_passed_over
-from tui.output import Console, hush
+from tui.text.output import Console, hush
 
 __all__ = ["VERBS", "build_app", "main"]
 
 VERBS = {
     "simulate": ("tui.commands.simulate:simulate", "Simulate a sweep and write the response."),
-    "extract": ("tui.commands.extract:extract", "Read ARF, RF and damping out of a response."),
+    "extract": (
+        "tui.commands.files.extract:extract",
+        "Read ARF, RF and damping out of a response.",
+    ),
     "estimate": ("tui.commands.estimate:estimate", "Tell the backlash of each gear stage."),
     "diagnose": ("tui.commands.diagnose:diagnose", "Tell what the simulation gets wrong, and why."),
     "reproduce": ("tui.commands.reproduce:reproduce", "Compute the paper's tables and figures."),
@@ -42,9 +45,9 @@ VERBS = {
     "prepare": ("tui.commands.prepare:prepare", "Train a posterior, or simulate a sweep ahead."),
     "history": ("tui.commands.history:history", "List a bench's measurements and their trend."),
     "correct": ("tui.commands.correct:correct", "Correct what was said of a measurement."),
-    "export": ("tui.commands.export:export", "Write a stored measurement to a file."),
-    "convert": ("tui.commands.convert:convert", "Write a response in another file format."),
-    "frf": ("tui.commands.frf:frf", "Estimate a response from a record over time."),
+    "export": ("tui.commands.files.export:export", "Write a stored measurement to a file."),
+    "convert": ("tui.commands.files.convert:convert", "Write a response in another file format."),
+    "frf": ("tui.commands.files.frf:frf", "Estimate a response from a record over time."),
     "report": ("tui.commands.report:report", "Write a report that prints, as one HTML file."),
     "new-unit": ("tui.commands.new_unit:new_unit", "Write a unit file to fill in."),
     "serve": ("tui.commands.serve:serve", "Serve a simulated 35670A on a wire."),

@@ -39,7 +39,7 @@ def _stand_in_for_closed_streams() -> None:
     """Let narration go nowhere where the caller closed stderr, and nothing come from stdin.
 
     The interpreter has None for these, which nobody expects, and the next file to be opened would
-    take the number. A result needs its stdout, and says so (`tui.output`).
+    take the number. A result needs its stdout, and says so (`tui.text.output`).
     """
     for name, mode in (("stdin", "r"), ("stderr", "w")):
         if getattr(sys, name) is None:

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from analysis.executor import Executor
+    from analysis.execution.executor import Executor
 
 __all__ = ["executor_at"]
 
@@ -29,7 +29,7 @@ def executor_at(address: str | None) -> Iterator[Executor | None]:
     if address is None:
         yield None
         return
-    from analysis.cluster import ClusterExecutor
+    from analysis.execution.dask_executor import ClusterExecutor
 
     with ClusterExecutor(address) as cluster:
         yield cluster

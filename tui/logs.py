@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
 
-from daq.visible_text import visible, visible_line
+from daq.untrusted.visible_text import visible, visible_line
 from tui.places import log_path
 
 __all__ = ["LEVELS", "logging_to_file", "silence", "telling_what_is_passed_over"]
@@ -80,7 +80,7 @@ def logging_to_file(level: str = "info") -> Iterator[Path | None]:
 
 @contextmanager
 def telling_what_is_passed_over(tell: Callable[[str], None]) -> Iterator[None]:
-    """Say what is not used because others could have written it, which `daq.trust` logs."""
+    """Say what is not used because others could write it, as `daq.untrusted.trust` logs."""
 
     class Teller(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:

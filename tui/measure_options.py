@@ -257,7 +257,7 @@ def _kept_refinement(configurations: Mapping[str, str]) -> Refinement | None:
 
 
 def _judge() -> Judge:
-    from analysis.feature_judge import judge_features
+    from analysis.resonance.adaptive import judge_features
 
     return judge_features
 
@@ -345,8 +345,8 @@ def _check_same_values(before: Measurement, unit: Unit) -> None:
     InputError
         Names each value that differs.
     """
-    from tui.reports import unit_as_measured
-    from tui.unit_differences import differing_values
+    from tui.measurements.reports import unit_as_measured
+    from tui.measurements.unit_differences import differing_values
 
     if "unit" not in before.header.configurations:
         return

@@ -68,7 +68,7 @@ def log_path() -> Path:
 
 def look_at_caches() -> None:
     """Log at once what will not be used of the caches, for a screen that cannot be written over."""
-    from daq.trust import distrust, own_folder, pass_over
+    from daq.untrusted.trust import distrust, own_folder, pass_over
 
     own_folder(cache_folder())
     numba = os.environ.get("NUMBA_CACHE_DIR")

@@ -17,7 +17,7 @@ from cyclopts import Group, Parameter
 
 from daq.errors import InputError
 from tui.options import Whole, real_number
-from tui.output import Console
+from tui.text.output import Console
 
 if TYPE_CHECKING:
     from daq.formats.reading import Reading

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.executor import Executor, LocalExecutor
+from analysis.execution.executor import Executor, LocalExecutor
 from analysis.inference.checkpoint import (
     Checkpoint,
     posterior_name,

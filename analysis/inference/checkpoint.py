@@ -20,7 +20,7 @@ import numpy as np
 from analysis.inference.network import Architecture
 from daq.configs import posterior_folder
 from daq.formats.atomic import replacing
-from daq.trust import own_folder, read_own
+from daq.untrusted.trust import own_folder, read_own
 from sim.catalogue import CATALOGUE
 from sim.unit import Unit
 

@@ -21,7 +21,7 @@ from analysis.inference.plans import Landmarks, landmarks, reference_response
 from analysis.inference.prior import COUNTS, Prior
 from analysis.inference.runs import Batch
 from analysis.inference.sets import CauseSets
-from analysis.observation import USUAL_NOISE_V
+from analysis.observation.observation import USUAL_NOISE_V
 from sim.unit import Unit
 
 __all__ = ["ROWS", "Examples", "Scales", "conditions", "estimated_noise", "read_batch"]

@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.ensemble import Machine
-from analysis.executor import Executor
-from analysis.family import Family, read_families
+from analysis.ensemble.batch import Family, read_families
+from analysis.ensemble.machine import Machine
+from analysis.ensemble.run_cache import run_families
+from analysis.execution.executor import Executor
 from analysis.inference.inputs import SweptLevels
-from analysis.library import run_families
-from analysis.observation import Observation
+from analysis.observation.observation import Observation
 from daq.plan import SweepPlan
 from sim.unit import Unit
 

@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.ensemble import Machine, safe_cycles
+from analysis.ensemble.machine import Machine, safe_cycles
 from daq.plan import SweepPlan, spaced_frequencies
-from sim.assembly import PiecewiseLinearSystem
 from sim.drivetrain import paper_drivetrain
+from sim.engine.system import PiecewiseLinearSystem
 from sim.unit import Unit
 
 __all__ = ["Landmarks", "draw_plan", "landmarks", "reference_response"]

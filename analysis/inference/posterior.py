@@ -15,16 +15,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.causes import Hypothesis
-from analysis.executor import Executor
+from analysis.ensemble.model import Hypothesis
+from analysis.execution.executor import Executor
 from analysis.inference.checkpoint import Checkpoint, find_checkpoint, shipped_checkpoints
 from analysis.inference.examples import Scales, conditions
+from analysis.inference.exclusion import ExclusionLimit
 from analysis.inference.inputs import SweptLevels
 from analysis.inference.network import Densities, densities, set_logits, summarise
 from analysis.inference.nominal import Nominal, nominal_of, relative
 from analysis.inference.prior import Prior
-from analysis.observation import Observation
-from analysis.unseen import Unseen
+from analysis.observation.observation import Observation
 from sim.catalogue import CATALOGUE
 from sim.unit import Unit
 
@@ -180,7 +180,7 @@ def limits(
     summary: NDArray[np.float32],
     named: Sequence[str] = (),
     without: Collection[str] = (),
-) -> tuple[Unseen, ...]:
+) -> tuple[ExclusionLimit, ...]:
     """How large each other cause may be and not show, beside what is named.
 
     The 95 % interval of its size given that it is there too; open where it reaches the end of the
@@ -209,7 +209,7 @@ def limits(
             low if low > least and (amid or not from_zero) else None,
             high if high < most and (amid or from_zero) else None,
         )
-        found.append(Unseen(effect, parameter.name, parameter.unit_symbol, *shown, known))
+        found.append(ExclusionLimit(effect, parameter.name, parameter.unit_symbol, *shown, known))
     return tuple(found)
 
 

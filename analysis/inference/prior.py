@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.ensemble import Machine
+from analysis.ensemble.machine import Machine
 from sim.catalogue import CATALOGUE, EffectParameter
 from sim.effects import EffectSetting
 from sim.response import START_SPREAD, Servo

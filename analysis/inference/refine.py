@@ -14,15 +14,15 @@ from itertools import combinations, islice
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.candidate import Candidate, Effects
-from analysis.causes import Hypothesis
-from analysis.executor import Executor
-from analysis.hunt import Hunt
+from analysis.emulation.fitted_model import Effects, FittedModel
+from analysis.ensemble.model import Hypothesis
+from analysis.execution.executor import Executor
+from analysis.execution.progress import Progress, part_of
+from analysis.inference.model_pool import ModelPool
 from analysis.inference.posterior import Posterior, SetPosterior
+from analysis.inference.run_design import Reach
 from analysis.inference.sets import CauseSets
-from analysis.observation import Observation
-from analysis.placement import Reach
-from analysis.progress import Progress, part_of
+from analysis.observation.observation import Observation
 
 Vector = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ class Refined:
     `summary` (1, hidden) of the observation; `proposed`: what it said of each candidate.
     """
 
-    candidates: list[Candidate]
+    candidates: list[FittedModel]
     summary: NDArray[np.float32]
     proposed: tuple[SetPosterior, ...]
 
@@ -91,7 +91,7 @@ def refine(
     longest = max(block.stop - block.start for block in observation.blocks)
     few = observation.thinned(max(longest // _FREQUENCIES, 1))
     report = part_of(progress, 0.0, 0.4, "simulating the likeliest causes")
-    coarse = Hunt(unit, few, rng, executor, report)
+    coarse = ModelPool(unit, few, rng, executor, report)
     found: dict[Effects, SetPosterior] = {}
     reaches: dict[Effects, Reach] = {}
 
@@ -102,30 +102,34 @@ def refine(
             found[key] = posterior.given(summary, int(number), float(probability[number]))
         starts = {key: _placed(Hypothesis(unit, key), found[key], coarse) for key in new}
         reaches.update({key: reach for key, (_, reach) in starts.items()})
-        coarse.start(starts, _FIRST_GROUPS)
+        coarse.simulate_about(starts, _FIRST_GROUPS)
 
     sets = posterior.scales.sets
     look_at([*first, *_parts(sets, int(first[0]))])
-    coarse.hear()
+    coarse.re_estimate_noise()
     for _ in range(_STEPS):
         leader = coarse.best.hypothesis.effects
         number = sets.index[tuple(sorted(sets.effects.index(effect) for effect in leader))]
         look_at([*_supersets(posterior, leader, probability), *_parts(sets, number)])
-    coarse.settle(_kept(coarse), _FIRST_GROUPS)
+    coarse.simulate_around_estimate(_kept(coarse), _FIRST_GROUPS)
     report = part_of(progress, 0.4, 1.0, "comparing the likeliest causes")
-    fine = Hunt(unit, observation, rng, executor, report)
+    fine = ModelPool(unit, observation, rng, executor, report)
     kept = dict.fromkeys([*_kept(coarse), ()])
-    fine.start({k: (coarse.found[k].best.place, _nearer(reaches[k])) for k in kept}, _FIRST_GROUPS)
-    fine.hear()
+    fine.simulate_about(
+        {k: (coarse.found[k].best.place, _nearer(reaches[k])) for k in kept}, _FIRST_GROUPS
+    )
+    fine.re_estimate_noise()
     for most, behind, groups in _ROUNDS:
         near = fine.leading(most, behind)
-        fine.settle(list(dict.fromkeys([*near, *_parts_of(near[0], fine)])), groups)
-    fine.hear()
+        fine.simulate_around_estimate(
+            list(dict.fromkeys([*near, *_parts_of(near[0], fine)])), groups
+        )
+    fine.re_estimate_noise()
     candidates = sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
     return Refined(candidates, summary, tuple(found.values()))
 
 
-def _kept(coarse: Hunt) -> list[Effects]:
+def _kept(coarse: ModelPool) -> list[Effects]:
     """Sets that the first look leaves, and parts of the first of them.
 
     A part has fewer sizes to fit with, and may be all that there is.
@@ -134,7 +138,7 @@ def _kept(coarse: Hunt) -> list[Effects]:
     return list(dict.fromkeys([*near, *_parts_of(near[0], coarse)]))
 
 
-def _parts_of(whole: Effects, fine: Hunt) -> list[Effects]:
+def _parts_of(whole: Effects, fine: ModelPool) -> list[Effects]:
     """Parts of a set that are not out of the question."""
     return [key for key in fine.leading(len(fine.found), _NEAR) if set(key) < set(whole)]
 
@@ -162,7 +166,7 @@ def _supersets(
     return list(islice(one_more, _BESIDE if leader else 0))
 
 
-def _placed(hypothesis: Hypothesis, one: SetPosterior, fine: Hunt) -> tuple[Vector, Reach]:
+def _placed(hypothesis: Hypothesis, one: SetPosterior, fine: ModelPool) -> tuple[Vector, Reach]:
     """Where the runs of a set lie (d,), and how far about it.
 
     By the network, and where a part of it leads, by that for what it holds.

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.executor import Executor
-from analysis.family import Family, read_families
+from analysis.ensemble.batch import Family, read_families
+from analysis.execution.executor import Executor
 from analysis.inference.nominal import nominal_runs
 from analysis.inference.plans import Landmarks, draw_plan
 from analysis.inference.prior import DrawnMachine, Prior

@@ -12,8 +12,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import TypeVar
 
+from daq.driving.replies import parse_integer, parse_number
 from daq.errors import BenchTimeout, LashbenchError, LinkError, ProtocolError
-from daq.scpi import parse_integer, parse_number
 from daq.transports.base import Deadline, Transport, ask
 
 __all__ = ["Conversation"]

@@ -20,11 +20,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.child import child_command, child_environment
 from daq.errors import FileFormatError, InputError, LashbenchError
 from daq.formats.reading import NOTHING_TOLD, Reading
 from daq.formats.record import ARRAYS, response_from, taken_apart
 from daq.frf import FrequencyResponse
+from daq.untrusted.child import child_command, child_environment
 
 __all__ = ["main", "read_apart", "read_arrays_apart"]
 

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.bounded_text import parse_toml, read_bytes
 from daq.errors import FileFormatError
+from daq.untrusted.bounded_text import parse_toml, read_bytes
 
 __all__ = ["COLUMNS", "Table", "has_our_header", "is_ours", "parsed", "text_of"]
 

@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.bounded_text import parse_json
 from daq.errors import FileFormatError, InputError
 from daq.frf import FrequencyResponse, PointFlag
+from daq.untrusted.bounded_text import parse_json
 
 __all__ = [
     "ARRAYS",

@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.bounded_text import parse_json
 from daq.errors import FileFormatError
 from daq.formats.atomic import write_text
 from daq.formats.foreign.choosing import foreign_response
@@ -29,6 +28,7 @@ from daq.formats.reading import NOTHING_TOLD, Reading
 from daq.formats.record import ARRAYS, checked_file, response_from, taken_apart
 from daq.formats.uff_sets import GENERAL, function, private, private_text
 from daq.frf import FrequencyResponse
+from daq.untrusted.bounded_text import parse_json
 
 __all__ = ["COMPANION", "read", "write"]
 

@@ -16,7 +16,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Literal
 
 from daq.analyser import Identity, PointSettings, SourceState, SweepPoint
-from daq.dialogue import Dialogue
+from daq.driving.replies import parse_string
+from daq.driving.scpi_connection import Dialogue
 from daq.errors import LashbenchError, LimitError, MeasurementError
 from daq.hp35670a.identity import identify
 from daq.hp35670a.safe import SafeOff, make_safe, read_source
@@ -34,7 +35,6 @@ from daq.hp35670a.setup import (
 )
 from daq.hp35670a.status import arm_events
 from daq.hp35670a.sweeps import Guard, check_grid, on_box, point_by_point
-from daq.scpi import parse_string
 from daq.transports.base import Transport
 
 __all__ = ["HP35670A", "Method"]

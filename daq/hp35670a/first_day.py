@@ -11,13 +11,13 @@ import time
 import numpy as np
 
 from daq.analyser import PointSettings, SourceState
-from daq.dialogue import Dialogue
 from daq.driving.first_day import Check, FirstDay
+from daq.driving.replies import parse_string
+from daq.driving.scpi_connection import Dialogue
 from daq.driving.variance import normalised_variance
 from daq.errors import LashbenchError
 from daq.hp35670a.setup import enter_swept_sine
 from daq.hp35670a.status import wait_until_done
-from daq.scpi import parse_string
 from daq.transports.base import Deadline
 
 __all__ = ["CHECKS"]
@@ -223,14 +223,14 @@ CHECKS = (
           _reset_zeroes),
     Check("bare level", "a level without unit is V peak; the driver always sends one", _SETTINGS,
           _bare_level),
-    Check("units", "? UNIT answers for every setting in doubt", "daq/scpi_settings.py", _units),
+    Check("units", "? UNIT answers for every setting in doubt", "daq/driving/settings.py", _units),
     Check("output switch", "OUTP? is refused in swept sine; the driver never asks there",
           "daq/hp35670a/safe.py", _output_in_sine),
     Check("longest integration", "234 cycles at most", _SETTINGS, _longest_dwell),
     Check("refusals", "-221 or -200 in the wrong mode; five entries in the queue",
-          "daq/dialogue.py", _refusals),
-    Check("user enable", "keeps a number (bare sockets)", "daq/dialogue.py", _user_enable),
-    Check("byte order", "big-endian reals", "daq/hp35670a/trace.py", _byte_order),
+          "daq/driving/scpi_connection.py", _refusals),
+    Check("user enable", "keeps a number (bare sockets)", "daq/driving/scpi_connection.py",
+    _user_enable), Check("byte order", "big-endian reals", "daq/hp35670a/trace.py", _byte_order),
     Check("manual points", "each start measures one point at FREQ:MAN", "daq/hp35670a/sweeps.py",
           _points, drives=True),
     Check("normalised variance", "scatter of single cycles, whatever their number",

@@ -9,10 +9,10 @@ from __future__ import annotations
 from contextlib import suppress
 
 from daq.analyser import Identity
-from daq.dialogue import Dialogue
 from daq.drivers import driver_for, stranger
+from daq.driving.replies import parse_string
+from daq.driving.scpi_connection import Dialogue
 from daq.errors import BenchTimeout, InstrumentError, ProtocolError
-from daq.scpi import parse_string
 from daq.transports.base import ask
 
 __all__ = ["identify", "parse_identity"]

@@ -11,11 +11,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from daq.analyser import SourceState
-from daq.dialogue import Dialogue
+from daq.driving.replies import parse_integer, parse_number, parse_string
 from daq.driving.safe_off import Attempt, SafeOff, Step
+from daq.driving.scpi_connection import Dialogue
 from daq.errors import LashbenchError
 from daq.hp35670a.settings import LEVEL
-from daq.scpi import parse_integer, parse_number, parse_string
 from daq.transports.base import Transport
 
 __all__ = ["SafeOff", "Step", "make_safe", "read_source"]

@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import Any
 
 from daq.analyser import PointSettings
+from daq.driving.settings import Choice, Number, Setting, Switch, down_to, near, up_to
 from daq.errors import LimitError
-from daq.scpi_settings import Choice, Number, Setting, Switch, down_to, near, up_to
 
 __all__ = [
     "CALCULATE",

@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.analyser import PointSettings
-from daq.dialogue import Dialogue
+from daq.driving.replies import QueueEntry
+from daq.driving.scpi_connection import Dialogue
+from daq.driving.settings import Setting
 from daq.errors import InputError, InstrumentError
 from daq.hp35670a.settings import (
     CALCULATE,
@@ -37,8 +39,6 @@ from daq.hp35670a.settings import (
 from daq.hp35670a.status import Questionable, arm_events, wait_until_done
 from daq.hp35670a.trace import prove_byte_order, read_axis
 from daq.plan import SweepPlan
-from daq.scpi import QueueEntry
-from daq.scpi_settings import Setting
 from daq.transports.base import Deadline
 
 __all__ = [

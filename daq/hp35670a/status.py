@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from enum import IntFlag
 
-from daq.dialogue import Dialogue
+from daq.driving.scpi_connection import Dialogue
 from daq.errors import BenchTimeout, InstrumentError, MeasurementError
 from daq.transports.base import Deadline
 

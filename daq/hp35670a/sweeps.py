@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.analyser import SweepPoint
-from daq.dialogue import Dialogue
+from daq.driving.scpi_connection import Dialogue
+from daq.driving.settings import Setting
 from daq.driving.variance import gain_standard_error
 from daq.errors import InputError
 from daq.frf import PointFlag
@@ -34,7 +35,6 @@ from daq.hp35670a.settings import (
 from daq.hp35670a.setup import SetUp, Timing, apply_all, prove_axis
 from daq.hp35670a.status import DeviceState, Voltage, polled
 from daq.hp35670a.trace import Picture, nearest_row, read_picture
-from daq.scpi_settings import Setting
 from daq.transports.base import Deadline
 
 __all__ = ["Guard", "check_grid", "on_box", "point_by_point"]

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.dialogue import Dialogue
+from daq.driving.replies import is_filler
+from daq.driving.scpi_connection import Dialogue
 from daq.errors import ProtocolError
 from daq.hp35670a.settings import GRID_HZ
-from daq.scpi import is_filler
 
 __all__ = ["Picture", "nearest_row", "prove_byte_order", "read_axis", "read_picture"]
 

@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.analyser import Identity, PointSettings, SourceState, SweepPoint
-from daq.dialogue import Dialogue
+from daq.driving.replies import parse_number
 from daq.driving.safe_off import SafeOff
+from daq.driving.scpi_connection import Dialogue
 from daq.driving.variance import gain_standard_error, normalised_variance
 from daq.errors import (
     BenchTimeout,
@@ -31,7 +32,6 @@ from daq.frf import PointFlag
 from daq.sampled.limits import BLIND_S, FASTEST_HZ, LEAST_SAMPLES, check_settings
 from daq.sampled.lockin import amplitudes, delay_of
 from daq.sampled.safe import make_safe
-from daq.scpi import parse_number
 from daq.transports.base import Deadline, Transport
 
 __all__ = ["SampledBench"]

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from daq.dialogue import Dialogue
+from daq.driving.replies import parse_number
 from daq.driving.safe_off import Attempt, SafeOff
+from daq.driving.scpi_connection import Dialogue
 from daq.errors import LashbenchError
-from daq.scpi import parse_number
 from daq.transports.base import Transport
 
 __all__ = ["make_safe"]

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.driving.conversation import Conversation
+from daq.driving.replies import parse_integer
 from daq.errors import ConfigurationError, InstrumentError, LinkError, ProtocolError
-from daq.scpi import parse_integer
 from daq.sr785.status import ENABLED_EVENTS, Event, Summary
 from daq.transports.address import SerialPort, parse_address
 from daq.transports.base import Deadline, Transport, ask

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from daq.driving.replies import parse_integer, parse_number
 from daq.errors import ProtocolError
-from daq.scpi import parse_integer, parse_number
 
 __all__ = ["LevelScale", "is_zero", "scale_of"]
 

@@ -12,9 +12,9 @@ import time
 from collections.abc import Callable
 
 from daq.analyser import SourceState
+from daq.driving.replies import parse_integer, parse_number
 from daq.driving.safe_off import Attempt, SafeOff, Step
 from daq.errors import LashbenchError
-from daq.scpi import parse_integer, parse_number
 from daq.sr785.dialogue import Dialogue
 from daq.sr785.levels import is_zero
 from daq.transports.base import Transport

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from daq.analyser import PointSettings
+from daq.driving.replies import parse_number
 from daq.errors import LimitError
-from daq.scpi import parse_number
 
 __all__ = [
     "HIGHEST_HZ", "INTEGRATE", "LEAST_INTEGRATE_S", "LEAST_POINTS", "LEAST_SETTLE_S", "LOWEST_HZ",

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from daq.driving.replies import parse_number
 from daq.errors import ProtocolError
-from daq.scpi import parse_number
 from daq.sr785.dialogue import RS232, Dialogue
 
 __all__ = ["read_axis", "read_bin", "read_length", "read_trace", "response_of"]

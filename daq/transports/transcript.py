@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Any, TextIO, TypeVar
 
 from daq import errors
-from daq.aside import Aside, NoReturn
-from daq.bounded_text import parse_json, read_text
 from daq.errors import FileFormatError, InputError, LashbenchError, ProtocolError
 from daq.transports.base import Deadline, Transport
+from daq.untrusted.bounded_calls import Aside, NoReturn
+from daq.untrusted.bounded_text import parse_json, read_text
 
 __all__ = ["Recorder", "Replay"]
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
-from sim.analyser35670a.commands import Answer, Hold, Later
+from sim.analyser35670a.commands.registry import Answer, Hold, Later
+from sim.analyser35670a.commands.tokens import Assembler, Unit
 from sim.analyser35670a.errors import ScpiError
-from sim.analyser35670a.tokens import Assembler, Unit
 from sim.instrument.bus import Talk, TalkState
 
 __all__ = ["INPUT_QUEUE_BYTES", "Exchange"]

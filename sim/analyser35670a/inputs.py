@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from sim.analyser35670a.commands.tokens import Argument
 from sim.analyser35670a.errors import ScpiError
 from sim.analyser35670a.kinds import Number, show_real
-from sim.analyser35670a.tokens import Argument
 from sim.analyser35670a.units import RANGE, Quantity, from_volts_peak, volts_peak
 
 __all__ = [

@@ -10,19 +10,19 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from sim.analyser35670a.calibration import Calibration
 from sim.analyser35670a.choices import Choices
-from sim.analyser35670a.commands import Answer, Hold
-from sim.analyser35670a.dispatch import Dispatcher, all_settings, is_query
+from sim.analyser35670a.commands.dispatch import Dispatcher, all_settings, is_query
+from sim.analyser35670a.commands.registry import Answer, Hold
 from sim.analyser35670a.errors import ErrorQueue, ScpiError
 from sim.analyser35670a.exchange import Exchange
-from sim.analyser35670a.measurement import Measurement
+from sim.analyser35670a.measuring.calibration import Calibration
+from sim.analyser35670a.measuring.measurement import Measurement
+from sim.analyser35670a.measuring.spectrum import Spectrum
+from sim.analyser35670a.measuring.traces import TraceBoxes
 from sim.analyser35670a.operations import Operations
 from sim.analyser35670a.settings import Mode, Settings
 from sim.analyser35670a.source import slew_vpk_per_s
-from sim.analyser35670a.spectrum import Spectrum
 from sim.analyser35670a.status import Device, Event, StatusModel
-from sim.analyser35670a.traces import TraceBoxes
 from sim.analyser35670a.units import volts_peak
 from sim.faults import FaultBoard
 from sim.instrument.agenda import Agenda

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from sim.analyser35670a.commands.tokens import Argument
 from sim.analyser35670a.errors import ScpiError
-from sim.analyser35670a.tokens import Argument
 from sim.analyser35670a.units import NONE, Quantity, UnitTable
 
 __all__ = [

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from enum import Enum, StrEnum
 from typing import TYPE_CHECKING, Any
 
+from sim.analyser35670a.commands.tree import key_of
 from sim.analyser35670a.errors import ScpiError
 from sim.analyser35670a.kinds import Kind
-from sim.analyser35670a.tree import key_of
 from sim.analyser35670a.units import Quantity
 
 if TYPE_CHECKING:

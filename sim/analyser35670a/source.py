@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from sim.analyser35670a.commands.tokens import Argument
 from sim.analyser35670a.errors import ScpiError
 from sim.analyser35670a.kinds import Number, show_real
-from sim.analyser35670a.tokens import Argument
 from sim.analyser35670a.units import Quantity, UnitTable, from_volts_peak, volts_peak
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import report_makings as makings
 
-from analysis import diagnosis as module
-from analysis.next_measurement import NextMeasurement
-from analysis.unseen import list_unseen
+from analysis.diagnosis import diagnose as module
+from analysis.diagnosis.experiment_design import NextMeasurement
+from analysis.inference.exclusion import list_unseen
 from daq.errors import AnalysisError
 from daq.plan import SweepPlan
 from sim.catalogue import CATALOGUE
@@ -147,7 +147,7 @@ def test_what_says_the_same_is_counted_once(monkeypatch, explained):
     """Probabilities of a document add up to one."""
     verdict = explained.verdict
     monkeypatch.setattr(
-        type(verdict), "says_the_same", lambda self, one: one.effects == STIFF, raising=True
+        type(verdict), "is_equivalent", lambda self, one: one.effects == STIFF, raising=True
     )
     document = explained.to_json()
     assert [one["causes"] for one in document["rivals"]].count([*STIFF]) == 0

@@ -9,12 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from usual_runs import usual_families, usual_sweep
 
-from analysis.causes import Hypothesis
+from analysis.ensemble.model import Hypothesis
+from analysis.ensemble.run_cache import run_name
 from analysis.estimate import estimate_response
 from analysis.inference.checkpoint import posterior_name
-from analysis.library import run_name
-from analysis.observation import observe
-from analysis.swept import check_together
+from analysis.observation.joint import check_together
+from analysis.observation.observation import observe
 from daq.configs import config_path
 from daq.errors import InputError
 from daq.formats import read_response, write_response

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from analysis.ensemble import Machine
-from analysis.library import run_families
-from analysis.observation import unread
+from analysis.ensemble.machine import Machine
+from analysis.ensemble.run_cache import run_families
+from analysis.observation.observation import unread
 from daq.plan import SweepPlan
 from sim.unit import load_unit
 

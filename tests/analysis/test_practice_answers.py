@@ -12,7 +12,7 @@ import pytest
 
 from analysis.advice import advise
 from analysis.answer import accept_model
-from analysis.verdict_words import verdict_words
+from analysis.selection.wording import verdict_words
 from sim.unit import load_unit
 
 DATA = Path(__file__).parents[1] / "data"

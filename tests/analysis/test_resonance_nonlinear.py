@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.candidates import Curve
-from analysis.peak import read_peak
 from analysis.resonance import extract
+from analysis.resonance.extrema import Curve
+from analysis.resonance.local_peak import read_peak
 from daq.formats import read_response
 from daq.frf import DB_PER_NEPER, FrequencyResponse
 

@@ -7,7 +7,7 @@ import pytest
 from judging import TRUE, WRONG, judge, seen
 from synthetic import candidate
 
-import analysis.verdict as rules
+import analysis.selection.verdict as rules
 
 RARE, TEN_TIMES = ("motor-inertia",), 34.5
 """A rare cause, and what it takes to lead one that is not."""
@@ -81,9 +81,9 @@ def test_what_stands_in_for_a_refused_leader_is_not_named_alone(
     monkeypatch.setattr(rules, "_score", lambda c, _: scores[c.hypothesis.effects])
     monkeypatch.setattr(rules, "judge_chance", lambda *_: 0.0)
     monkeypatch.setattr(
-        rules, "find_objection", lambda c, *_: objection if c.hypothesis.effects == WRONG else ""
+        rules, "find_rejection", lambda c, *_: objection if c.hypothesis.effects == WRONG else ""
     )
-    monkeypatch.setattr(rules, "is_felt_alike", lambda *_: alike)
+    monkeypatch.setattr(rules, "is_equivalent_at_load", lambda *_: alike)
     verdict = rules.judge_candidates(found, observed, np.random.default_rng(0))
     assert verdict.word == word
     assert verdict.best.effects == (WRONG if word == "unexplained" else TRUE)
@@ -104,7 +104,7 @@ def test_what_stands_in_for_a_refused_leader_is_not_named_alone(
 def test_what_is_refused_is_a_rival_where_more_is_believed_of_others(
     best, holding, objection, rivals, monkeypatch
 ):
-    monkeypatch.setattr(rules, "is_felt_alike", lambda *_: False)
+    monkeypatch.setattr(rules, "is_equivalent_at_load", lambda *_: False)
     found = judge(seen(TRUE, 1), ((), TRUE, WRONG), 1)
     first = replace(found.best, probability=best)
     (wrong,) = (one for one in found.judged if one.effects == WRONG)
@@ -120,7 +120,7 @@ def test_what_is_refused_near_three_causes_is_a_rival_however_likely_they_are(
     behind, rivals, monkeypatch
 ):
     """A tachometer's gain, withheld, was told to be three other causes with 0.71."""
-    monkeypatch.setattr(rules, "is_felt_alike", lambda *_: False)
+    monkeypatch.setattr(rules, "is_equivalent_at_load", lambda *_: False)
     found = judge(seen(TRUE, 1), ((), TRUE, WRONG), 1)
     three = tuple(sorted((*TRUE, "cable-stiffness", "total-backlash")))
     best = replace(found.best, candidate=candidate(seen(TRUE, 1), three, 1), probability=0.9)
@@ -155,7 +155,9 @@ def test_what_says_the_same_counts_for_the_best(alike, against, rivals, monkeypa
         for behind in (10.0, 26.0)
     )
     same = replace(same, objection=against)
-    monkeypatch.setattr(rules, "is_felt_alike", lambda one, _: alike and one is same.candidate)
+    monkeypatch.setattr(
+        rules, "is_equivalent_at_load", lambda one, _: alike and one is same.candidate
+    )
     # Half as likely again, the best is 32 ahead of the other, of which 30 are asked.
     verdict = replace(found, judged=(found.best, same, other, found.baseline))
     names = {id(same): "same", id(other): "other"}

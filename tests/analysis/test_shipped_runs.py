@@ -9,10 +9,10 @@ import pytest
 from hidden import BANDS_HZ
 from usual_runs import RUNS, agreement, usual_families, usual_sweep
 
-import analysis.library as module
+import analysis.ensemble.run_cache as module
+from analysis.ensemble.batch import Family, read_family
+from analysis.ensemble.run_cache import run_families, run_name
 from analysis.estimate import estimate_response
-from analysis.family import Family, read_family
-from analysis.library import run_families, run_name
 from daq.formats import read_response
 from sim.unit import load_unit
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from synthetic import candidate, observation, read, thinned
 
-from analysis.verdict import judge_candidates
+from analysis.selection.verdict import judge_candidates
 
 TRUE, WRONG = ("load-inertia",), ("shaft-stiffness",)
 WEAK = 0.1

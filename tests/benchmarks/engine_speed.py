@@ -23,11 +23,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from oracle import rk4  # noqa: E402
 from side_by_side import ADSS, EDSS, drive, half_plays  # noqa: E402
 
-from analysis.causes import Hypothesis  # noqa: E402
+from analysis.ensemble.model import Hypothesis  # noqa: E402
 from sim.catalogue import CATALOGUE  # noqa: E402
 from sim.drivetrain import paper_drivetrain  # noqa: E402
-from sim.engine import LONGEST_STEP_S  # noqa: E402
-from sim.propagator import build_propagator, find_modes  # noqa: E402
+from sim.engine.engine import LONGEST_STEP_S  # noqa: E402
+from sim.engine.propagator import build_propagator, find_modes  # noqa: E402
 
 CYCLES = 10
 CASES = (("ADSS", ADSS, 0.25, 125.0), ("EDSS", EDSS, 0.5, 70.0))

@@ -31,7 +31,7 @@ from yardsticks.matrices import Matrices, matrices  # noqa: E402
 from yardsticks.page import machine, replace_block  # noqa: E402
 
 from sim.effects import drivetrain_with, parse_effect  # noqa: E402
-from sim.layout import STEPS_SEEN  # noqa: E402
+from sim.engine.layout import STEPS_SEEN  # noqa: E402
 
 LEVEL = 2.5
 TARGET = 0.02, 0.2

@@ -21,12 +21,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from yardsticks.page import DOCS, machine, replace_block  # noqa: E402
 
+from analysis.ensemble.batch import Family, read_family  # noqa: E402
+from analysis.ensemble.datasheet_spread import spread_of  # noqa: E402
+from analysis.ensemble.run_cache import run_families  # noqa: E402
 from analysis.estimate import estimate_response  # noqa: E402
-from analysis.family import Family, read_family  # noqa: E402
-from analysis.lattice import RATIO, every_family, near_families, wide_families  # noqa: E402
-from analysis.library import run_families  # noqa: E402
-from analysis.observation import observe  # noqa: E402
-from analysis.spread import spread_of  # noqa: E402
+from analysis.estimate.design import RATIO, every_family, near_families, wide_families  # noqa: E402
+from analysis.observation.observation import observe  # noqa: E402
 from daq.plan import SweepPlan, spaced_frequencies  # noqa: E402
 from sim.response import simulate  # noqa: E402
 from sim.unit import load_unit  # noqa: E402

@@ -41,16 +41,16 @@ print(time.perf_counter() - began, time.process_time() - used)
 """
 ARITHMETIC = """
 import time
-from analysis.expectation import compile_all
+from analysis.emulation.kernel_data import compile_all
 began, used = time.perf_counter(), time.process_time()
 compile_all()
 print(time.perf_counter() - began, time.process_time() - used)
 """
 TABLE2 = """
 import time
-from analysis.paper_features import read_grid
-from analysis.paper_numbers import load_paper
-from analysis.paper_runs import exact_runs_db, grid_hz
+from analysis.paper.table2 import read_grid
+from analysis.paper.published import load_paper
+from analysis.paper.runs import exact_runs_db, grid_hz
 from sim.unit import load_unit
 from sim.response import simulate
 from daq.plan import SweepPlan

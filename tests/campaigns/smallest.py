@@ -26,11 +26,11 @@ from hidden import EVERY_EFFECT, off_datasheet, reading
 from kept import Kept, drawn_seed
 from yardsticks.page import replace_block
 
-from analysis.causes import Hypothesis
+from analysis.ensemble.model import Hypothesis
 from analysis.inference.posterior import Posterior
 from analysis.inference.refine import refine
-from analysis.observation import observe
-from analysis.verdict import judge_candidates
+from analysis.observation.observation import observe
+from analysis.selection.verdict import judge_candidates
 from daq.plan import SweepPlan, spaced_frequencies
 from sim.effects import EffectSetting
 from sim.response import simulate

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
-from analysis.paper_features import read_grid  # noqa: E402
-from analysis.paper_numbers import UnitName  # noqa: E402
-from analysis.paper_runs import EXACT_STEP_S, START_SPREAD, exact_runs_db, grid_hz  # noqa: E402
+from analysis.paper.published import UnitName  # noqa: E402
+from analysis.paper.runs import EXACT_STEP_S, START_SPREAD, exact_runs_db, grid_hz  # noqa: E402
+from analysis.paper.table2 import read_grid  # noqa: E402
 from daq.plan import Direction, SweepPlan  # noqa: E402
 from sim.paper_scheme import PAPER_LEVEL_VPK  # noqa: E402
 from sim.response import Servo, simulate_cycles  # noqa: E402

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from responses import measured
 
-from daq.child import child_command, child_environment
 from daq.errors import FileFormatError
 from daq.formats import read_response, write_response
 from daq.formats.apart import read_apart
+from daq.untrusted.child import child_command, child_environment
 
 CRASH = Path(__file__).parents[1] / "data" / "crash.mat"
 LASHBENCH = str(Path(sys.executable).with_name("lashbench"))

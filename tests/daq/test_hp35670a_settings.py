@@ -11,12 +11,12 @@ import re
 import pytest
 
 from daq.analyser import PointSettings, SourceState
-from daq.dialogue import Dialogue
+from daq.driving.scpi_connection import Dialogue
+from daq.driving.settings import Choice, Number, Switch
 from daq.errors import InstrumentError, LimitError
 from daq.hp35670a import HP35670A
 from daq.hp35670a.settings import LEVEL, SETTINGS, check_drive, standing_settings
 from daq.hp35670a.setup import enter_swept_sine, planned_settings
-from daq.scpi_settings import Choice, Number, Switch
 from sim.analyser35670a import Analyser35670A, Choices, LinearPlant
 from sim.loopback import Loopback
 

@@ -15,9 +15,9 @@ from analysis.resonance import extract
 from daq.analyser import PointSettings, SourceState
 from daq.drivers import driver_at, open_analyser
 from daq.errors import ConfigurationError, InstrumentError, LimitError, LinkError
-from daq.instrument_claim import wire_name
 from daq.sampled.lockin import amplitudes, delay_of
 from daq.sampled.stream import StreamConverter
+from daq.session.instrument_claim import wire_name
 from daq.store import Store
 from sim.instrument.plant import LinearPlant
 from sim.loopback import Loopback

@@ -3,9 +3,9 @@
 import pytest
 from wire import Script
 
-from daq.dialogue import Dialogue
+from daq.driving.scpi_connection import Dialogue
+from daq.driving.settings import Number, near
 from daq.errors import BenchTimeout, InstrumentError, LinkError, ProtocolError
-from daq.scpi_settings import Number, near
 
 LEVEL = Number("level (V)", "VOLT", "V", 0.0, 5.0, near(0.1))
 QUIET = '> SYST:ERR?\n< +0,"No error"\n'

@@ -12,7 +12,7 @@ from daq.analyser import SourceState
 from daq.errors import FileFormatError, InputError, LashbenchError
 from daq.frf import PointFlag
 from daq.store import Store
-from daq.store_schema import APPLICATION_ID, SCHEMA_VERSION
+from daq.store.schema import APPLICATION_ID, SCHEMA_VERSION
 
 V1 = (Path(__file__).parents[1] / "data" / "history-v1.sql").read_text()
 
@@ -99,7 +99,7 @@ def test_an_older_file_that_may_not_be_written_is_read_as_it_is(old):
 
 
 def test_an_upgrade_that_fails_changes_nothing(old, monkeypatch):
-    from daq import store_schema
+    from daq.store import schema as store_schema
 
     steps = (*store_schema._STEPS, ("CREATE TABLE half (id INTEGER)", "CREATE nonsense"))
     monkeypatch.setattr(store_schema, "_STEPS", steps)

@@ -11,7 +11,7 @@ import pytest
 
 from daq.errors import FileFormatError
 from daq.store import Store
-from daq.store_schema import SCHEMA_VERSION
+from daq.store.schema import SCHEMA_VERSION
 
 V2 = (Path(__file__).parents[1] / "data" / "history-v2.sql").read_text()
 

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim.compiling import njit
+from sim.engine.compiling import njit
 
 STATES = (
     "i_a", "th_m", "w_m", "th_g1", "w_g1", "th_s1", "w_s1", "th_p2", "w_p2",

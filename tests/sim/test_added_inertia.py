@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from sim.assembly import PiecewiseLinearSystem
 from sim.catalogue import CATALOGUE
 from sim.effects import EffectSetting, drivetrain_with
+from sim.engine.system import PiecewiseLinearSystem
 from sim.unit import Unit, load_unit
 
 FREQUENCIES = np.geomspace(10.0, 400.0, 9)

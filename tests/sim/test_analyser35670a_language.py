@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim.analyser35670a import Analyser35670A, Choices, LinearPlant, TalkState
-from sim.analyser35670a.dispatch import _commands, all_settings
+from sim.analyser35670a.commands.dispatch import _commands, all_settings
 from sim.analyser35670a.kinds import Pick, Quoted, Switch, Text, Whole
 from sim.analyser35670a.settings import Setting
 

@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from side_by_side import ADSS, EDSS, FRICTIONLESS, drive
 
-from sim.assembly import Law
 from sim.drivetrain import Drivetrain
 from sim.effects import drivetrain_with, parse_effect
 from sim.elements import HardeningSpring, Inertia, Mesh, Spring
+from sim.engine.system import Law
 
 UNITS = {"adss": ADSS, "edss": EDSS}
 SAMPLE_HZ = 250.0

@@ -8,7 +8,6 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 from side_by_side import drive, law_parameters, rows_of
 
-from sim.assembly import Assembly, Law
 from sim.elements import (
     Amplifier,
     ConstantTorque,
@@ -19,6 +18,7 @@ from sim.elements import (
     Mesh,
     Spring,
 )
+from sim.engine.system import Assembly, Law
 
 J = 2e-5
 

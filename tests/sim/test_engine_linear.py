@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from side_by_side import ADSS, EDSS, FRICTIONLESS, drive, state_space
 
-from sim import propagator
 from sim.drivetrain import paper_drivetrain
 from sim.effects import drivetrain_with, parse_effect
-from sim.propagator import build_propagator, find_modes
+from sim.engine import propagator
+from sim.engine.propagator import build_propagator, find_modes
 
 FREQUENCIES = np.geomspace(1.0, 1000.0, 16)
 C_S1 = 2e-3

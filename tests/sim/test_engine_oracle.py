@@ -15,8 +15,8 @@ from side_by_side import (
     rows_of,
 )
 
-from sim import solving
 from sim.effects import drivetrain_with, parse_effect
+from sim.engine import solving
 
 # The last number is the oracle's step: dampers on tiny inertias make it unstable at 2 us.
 LIGHT = (ADSS.with_parameters(b_t_deg=0.02), 0.25, {"c_s1": 0.02}, 2e-6)

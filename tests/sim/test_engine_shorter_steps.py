@@ -7,10 +7,10 @@ import pytest
 from side_by_side import EDSS, law_parameters
 
 from daq.errors import AnalysisError
-from sim import engine
 from sim.effects import drivetrain_with, parse_effect
-from sim.engine import Stretch, advance, carry
-from sim.stepping import step_together
+from sim.engine import engine
+from sim.engine.engine import Stretch, advance, carry
+from sim.engine.stepping import step_together
 
 LONG, SHORT, SHORTEST = 1e-5, 5e-6, 2.5e-6
 FREQUENCIES = (70.0, 72.0, 74.0, 76.0, 78.0, 80.0, 82.0, 84.0, 86.0, 88.0, 90.0)

@@ -6,11 +6,11 @@ from permutation import permutation_p
 from side_by_side import ADSS, EDSS, FRICTIONLESS, departure, drive, engine_gain
 
 from daq.plan import SweepPlan
-from sim import propagator, stepping
 from sim.catalogue import CATALOGUE
 from sim.drivetrain import paper_drivetrain
 from sim.effects import EffectSetting, drivetrain_with, parse_effect
-from sim.machine_code import architecture
+from sim.engine import propagator, stepping
+from sim.engine.machine_code import architecture
 from sim.response import Servo, simulate_cycles
 
 STEP_S = 1e-5

@@ -9,9 +9,9 @@ import pytest
 from side_by_side import ADSS, EDSS, drive
 from yardsticks.operations import SERVO, count_steps
 
-from sim import stepping
 from sim.drivetrain import paper_drivetrain
-from sim.layout import STEPS_SEEN
+from sim.engine import stepping
+from sim.engine.layout import STEPS_SEEN
 
 PAGE = Path(__file__).parents[2] / "docs" / "performance.md"
 

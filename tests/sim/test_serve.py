@@ -129,7 +129,7 @@ def test_two_clients_get_their_own_replies():
 
 
 def test_who_asks_without_end_and_never_listens_is_hung_up_on(monkeypatch):
-    monkeypatch.setattr("sim.wires._MOST_UNHEARD", 10_000)
+    monkeypatch.setattr("sim.instrument.server_endpoints._MOST_UNHEARD", 10_000)
 
     def ask_on(wire):
         # A connection that stays holds no more than the buffers of both its ends.

@@ -10,12 +10,12 @@ ROOT = Path(__file__).parents[2]
 # The laws that a servo may have, in lanes that fill two wide vectors but for a few.
 PROGRAM = """
 import hashlib
-from sim import machine_code
+from sim.engine import machine_code
 machine_code.has_wide_vectors = lambda: {wide}
 import numpy as np
 from daq.plan import SweepPlan
 from sim.effects import parse_effect
-from sim.lanes import VECTOR_BYTES
+from sim.engine.lanes import VECTOR_BYTES
 from sim.response import Servo, simulate_cycles
 from sim.unit import load_unit
 EFFECTS = (

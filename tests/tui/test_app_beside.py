@@ -11,7 +11,7 @@ import pytest
 from screen import operated, run
 
 from daq.configs import config_path
-from tui.app.beside import Beside
+from tui.app.state.background import Beside
 from tui.cli import main
 
 SHORT = ["--settle-cycles", "3", "--integrate-cycles", "3", "--serial", "SN 7"]

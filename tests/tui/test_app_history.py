@@ -6,10 +6,10 @@ import pytest
 from screen import ESTIMATE, operated, quick_analyses, run
 
 from daq.store import Store
-from tui.app.analyses import Analyses
+from tui.app.state.analyses import Analyses
 from tui.cli import main
-from tui.kept import keep_estimate
 from tui.logs import logging_to_file
+from tui.measurements.stored_answers import keep_estimate
 from tui.places import log_path
 
 SHORT = ["--settle-cycles", "3", "--integrate-cycles", "3", "--serial", "SN 7"]

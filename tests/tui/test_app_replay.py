@@ -9,8 +9,8 @@ from screen import text_of
 from daq.configs import sample_path
 from daq.errors import InputError
 from daq.store import Store
-from tui.app.recording import read_recording
-from tui.app.replay import ReplayApp
+from tui.app.state.recording import read_recording
+from tui.app.state.replay import ReplayApp
 from tui.cli import main
 
 

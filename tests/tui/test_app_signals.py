@@ -94,8 +94,8 @@ app = Driven""",
 REPLAY = """
 import sys
 from pathlib import Path
-from tui.app.recording import read_recording
-from tui.app.replay import ReplayApp
+from tui.app.state.recording import read_recording
+from tui.app.state.replay import ReplayApp
 sys.exit(ReplayApp(read_recording(Path(sys.argv[1]), None)).run() or 0)
 """
 

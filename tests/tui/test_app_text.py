@@ -16,10 +16,10 @@ from daq.plan import SweepPlan
 from daq.session_events import CheckLine, Finished, Warned
 from daq.store import Store
 from daq.store_records import MeasurementHeader
-from daq.visible_text import visible, visible_line
+from daq.untrusted.visible_text import visible, visible_line
 from tui.app import messages
-from tui.app.recording import read_recording
-from tui.app.replay import ReplayApp
+from tui.app.state.recording import read_recording
+from tui.app.state.replay import ReplayApp
 from tui.app.terminal_app import TerminalApp
 from tui.app.widgets.plain import Caption, Choices, Field, Passage, Push, Table, Words, choice
 from tui.cli import main

@@ -19,12 +19,12 @@ from screen import (
     sweeping,
 )
 
-from analysis.swept import sweep_document
+from analysis.observation.joint import sweep_document
 from daq.analyser import SourceState
 from daq.frf import PointFlag
 from daq.plan import SweepPlan
 from daq.store import Store
-from tui.app.dialogs import ErrorDialog
+from tui.app.dialogs.dialogs import ErrorDialog
 
 
 @pytest.mark.parametrize("place", ["sweep", "field", "dialog"])

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from screen import DIAGNOSIS, operated, run, text_of
 
-from analysis.unseen import Unseen
+from analysis.inference.exclusion import ExclusionLimit
 from daq import session_events as kinds
 from daq.analyser import SourceState, SweepPoint
 from daq.errors import InputError
 from daq.frf import FrequencyResponse, PointFlag
 from daq.plan import SweepPlan
 from daq.store_records import StoredPoint
-from tui.app.desk import plan_of_document
 from tui.app.run_view import RunView, source_words
 from tui.app.screens.diagnosis_screen import diagnosis_lines
+from tui.app.state.desk import plan_of_document
 from tui.app.widgets.axes import DegreeAxis, LogHertzAxis
 from tui.app.widgets.traces import legend, traces_of_points, traces_of_response
 
@@ -187,7 +187,7 @@ def test_a_diagnosis_is_told_with_causes_rivals_and_what_next():
     plain = {"causes": [], "probability": 0.7}
     judged = "\n".join(diagnosis_lines(nothing | {"rivals": [plain]}))
     assert "\nSets judged\n - no cause  probability 0.70" in judged
-    load = Unseen("load-inertia", "J_L", "kg.m^2", 0.0026, 0.0029, 0.00275)
+    load = ExclusionLimit("load-inertia", "J_L", "kg.m^2", 0.0026, 0.0029, 0.00275)
     size = "\n - load-inertia: J_L 0.0026 to 0.0029 kg.m^2"
     plain = nothing | {"verdict": "consistent", "unseen": [load.to_json()]}
     assert (

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from daq import errors
-from tui import cli, output
+from tui import cli
+from tui.text import output
 
 HEAVY = (
     "scipy",
@@ -179,7 +180,7 @@ def test_what_a_line_lacks_is_said_plainly(line, said, capsys):
 def talking(body):
     """The command of a program whose one verb does that with its console."""
     program = (
-        "import sys, types; from tui import cli, output;"
+        "import sys, types; from tui import cli; from tui.text import output;"
         "talk = types.ModuleType('talk'); sys.modules['talk'] = talk;"
         f"exec('def talk(*, console: Injected): {body}',"
         "{'Injected': output.Injected}, talk.__dict__);"
@@ -238,7 +239,7 @@ def test_json_has_null_for_what_is_no_number():
 
 
 def test_a_terminal_without_the_character_shows_another():
-    program = "from tui.output import Console; Console().data('1 ± 2')"
+    program = "from tui.text.output import Console; Console().data('1 ± 2')"
     run = subprocess.run(
         [sys.executable, "-c", program],
         env={"PYTHONIOENCODING": "ascii"},

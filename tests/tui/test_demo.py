@@ -15,11 +15,11 @@ from daq.store import Store
 from sim.catalogue import CATALOGUE, COMMON
 from sim.drawn_effects import draw_effect
 from sim.unit import load_unit
-from tui.bode_text import bode_lines
 from tui.cli import main
 from tui.commands import demo as verb
 from tui.demonstration import hidden as secrets
 from tui.demonstration import sweep
+from tui.text.bode_text import bode_lines
 
 ADSS = load_unit("adss")
 
@@ -268,7 +268,7 @@ def test_the_plot_keeps_its_size_whatever_is_in_it():
 
 def test_on_a_terminal_the_plot_is_drawn_in_place():
     program = (
-        "from tui.output import Console; c = Console()\n"
+        "from tui.text.output import Console; c = Console()\n"
         "for n in range(3):\n"
         "    c.picture(['top', f'bottom {n}']); c.progress(n / 3, 'now')\n"
         "c.note('over')"

@@ -12,7 +12,7 @@ from daq.errors import ConfigurationError, InputError
 from daq.plan import SweepPlan
 from daq.store import Store
 from sim.unit import load_unit
-from tui.app.desk import Desk
+from tui.app.state.desk import Desk
 
 SHIPPED = load_unit("adss")
 

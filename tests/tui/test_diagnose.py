@@ -12,16 +12,16 @@ import hidden
 import numpy as np
 import pytest
 
-from analysis.next_measurement import NextMeasurement
-from analysis.swept import check_together
+from analysis.diagnosis.experiment_design import NextMeasurement
+from analysis.observation.joint import check_together
 from daq.configs import config_path
 from daq.errors import InputError, LashbenchError
 from daq.formats import read_response
 from daq.frf import FrequencyResponse
 from daq.plan import SweepPlan
-from sim.machine_code import code_folder
+from sim.engine.machine_code import code_folder
 from tui.cli import main
-from tui.pasted import proposing
+from tui.text.shell_quote import proposing
 
 PRACTICE = Path(__file__).parents[1] / "data" / "practice"
 SWEEP = str(PRACTICE / "practice-09.csv")
@@ -176,12 +176,12 @@ def test_who_says_last_where_it_was_measured_is_believed(said, asked):
 def test_a_figure_that_cannot_be_made_does_not_cost_the_answer(
     calls, capsys, monkeypatch, tmp_path
 ):
-    import analysis.diagnosis_figures
+    import analysis.diagnosis.figures
 
     def full(result, folder):
         raise LashbenchError("a.png: could not be written (No space left on device)")
 
-    monkeypatch.setattr(analysis.diagnosis_figures, "draw_diagnosis", full)
+    monkeypatch.setattr(analysis.diagnosis.figures, "draw_diagnosis", full)
     words = ["diagnose", SWEEP, "--unit", "adss", "--json", "--plots", str(tmp_path / "out")]
     assert main(words) == 1
     told = capsys.readouterr()
@@ -190,12 +190,12 @@ def test_a_figure_that_cannot_be_made_does_not_cost_the_answer(
 
 
 def test_who_reads_no_answer_may_still_want_its_figures(calls, capfd, monkeypatch, tmp_path):
-    import analysis.diagnosis_figures
+    import analysis.diagnosis.figures
 
     reading, writing = os.pipe()
     os.close(reading)
     monkeypatch.setattr(
-        analysis.diagnosis_figures, "draw_diagnosis", lambda result, folder: [folder / "a.png"]
+        analysis.diagnosis.figures, "draw_diagnosis", lambda result, folder: [folder / "a.png"]
     )
     with os.fdopen(writing, "w") as nobody, monkeypatch.context() as patch:
         patch.setattr(sys, "stdout", nobody)
@@ -213,10 +213,10 @@ def test_a_folder_that_cannot_be_filled_is_refused_before_the_work(calls, capsys
 
 
 def test_figures_go_where_they_are_asked_for(calls, capsys, monkeypatch, tmp_path):
-    import analysis.diagnosis_figures
+    import analysis.diagnosis.figures
 
     monkeypatch.setattr(
-        analysis.diagnosis_figures, "draw_diagnosis", lambda result, folder: [folder / "a.png"]
+        analysis.diagnosis.figures, "draw_diagnosis", lambda result, folder: [folder / "a.png"]
     )
     assert main(["diagnose", SWEEP, "--unit", "adss", "--plots", str(tmp_path / "out")]) == 0
     assert (tmp_path / "out").is_dir()

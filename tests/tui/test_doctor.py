@@ -175,7 +175,7 @@ def test_versions_are_numbers_not_text(version, specifiers, good):
 def test_an_engine_that_is_not_compiled_not_kept_or_not_there(monkeypatch, tmp_path):
     from numba import config
 
-    from sim import machine_code
+    from sim.engine import machine_code
 
     with monkeypatch.context() as patch:
         patch.setattr(config, "DISABLE_JIT", 1)
@@ -202,7 +202,7 @@ def test_an_engine_that_is_not_compiled_not_kept_or_not_there(monkeypatch, tmp_p
         assert "cannot cache function 'agree': no locator" in finding.found
         assert "NUMBA_CACHE_DIR" in finding.remedy
     with monkeypatch.context() as patch:
-        patch.setitem(sys.modules, "sim.machine_code", None)
+        patch.setitem(sys.modules, "sim.engine.machine_code", None)
         finding = only(software.check_engine())
         assert finding.state == "failed"
         assert "cannot be loaded" in finding.found

@@ -15,7 +15,7 @@ from daq.formats import read_response, write_response
 from daq.store import Store
 from sim.unit import load_unit
 from tui import cli
-from tui.kept import kept_estimate
+from tui.measurements.stored_answers import kept_estimate
 
 CURE = "multiply phase_deg by 57.29578"
 PLAN = ["--level", "2.5", "--start", "100", "--stop", "180", "--points", "21"]

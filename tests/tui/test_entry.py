@@ -13,7 +13,7 @@ from tui import cli, entry
 ROOT = Path(entry.__file__).parents[1]
 
 
-@pytest.mark.parametrize("module", ["tui.cli", "cyclopts", "tui.output"])
+@pytest.mark.parametrize("module", ["tui.cli", "cyclopts", "tui.text.output"])
 def test_an_interrupt_while_the_command_line_is_loaded_is_told_in_one_line(module):
     program = f"""
 import sys

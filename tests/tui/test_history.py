@@ -14,8 +14,8 @@ from daq.configs import config_path
 from daq.errors import AnalysisError, LinkError
 from daq.formats import read_response
 from daq.store import Store
-from tui.kept import keep_estimate
-from tui.layout import columns_of
+from tui.measurements.stored_answers import keep_estimate
+from tui.text.layout import columns_of
 
 
 def test_an_empty_history_and_one_that_is_not_there(run, db):

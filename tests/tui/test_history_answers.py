@@ -9,7 +9,12 @@ from screen import DIAGNOSIS, ESTIMATE
 
 from daq.store import Store
 from sim.unit import load_unit
-from tui.kept import keep_diagnosis, keep_estimate, kept_diagnosis, kept_estimate
+from tui.measurements.stored_answers import (
+    keep_diagnosis,
+    keep_estimate,
+    kept_diagnosis,
+    kept_estimate,
+)
 
 REFUTED = ESTIMATE | {"refuted": True, "warnings": ["the model leaves 3 standard deviations"]}
 EXPLAINED = DIAGNOSIS | {

@@ -14,7 +14,7 @@ import pytest
 from daq.analyser import SourceState
 from daq.errors import LashbenchError
 from daq.store import Store
-from tui.narrator import _AHEAD, Narrator
+from tui.text.narrator import _AHEAD, Narrator
 
 POINTS = 500
 """Lines of progress that more than fill a terminal's buffer, which is full after some 350."""

@@ -12,11 +12,11 @@ from fake_analyser import known_gain
 from killed import begun, check_kept, end, killed_after, source_state, start, wait_for_watchdog
 
 from daq.analyser import SourceState
-from daq.bench_lock import BenchLock
 from daq.drivers import DRIVERS
 from daq.errors import MeasurementError
 from daq.frf import PointFlag
 from daq.hp35670a.setup import Timing
+from daq.session.bench_lock import BenchLock
 from daq.store import Store
 from sim.instrument.plant import LinearPlant
 from tui import cli

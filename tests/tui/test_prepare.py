@@ -5,11 +5,11 @@ import json
 import pytest
 from measuring import QUICK, SHORT, measuring
 
-import analysis.preparation as module
+import analysis.precompute as module
 from analysis.estimate import estimate_response
 from analysis.inference.checkpoint import posterior_name, read_checkpoint
 from analysis.inference.nominal import nominal_of
-from analysis.observation import USUAL_NOISE_V, observe, unread
+from analysis.observation.observation import USUAL_NOISE_V, observe, unread
 from daq.configs import config_path
 from daq.formats import read_response
 from daq.plan import SweepPlan

@@ -12,14 +12,14 @@ import report_makings as makings
 
 import analysis.diagnosis
 import analysis.estimate
-from analysis.next_measurement import NextMeasurement
+from analysis.diagnosis.experiment_design import NextMeasurement
 from daq.configs import config_path, sample_path
 from daq.errors import AnalysisError
 from daq.plan import SweepPlan
 from daq.store import Store
 from sim.unit import load_unit
 from tui import cli
-from tui.kept import keep_estimate, kept_estimate
+from tui.measurements.stored_answers import keep_estimate, kept_estimate
 
 SAMPLE = str(sample_path("adss-sweep"))
 QUICK = ["--level", "2.5", "--start", "130", "--stop", "170", "--points", "5"]
@@ -199,7 +199,7 @@ def test_what_cannot_be_reported_on_ends_with_2_and_no_file(
 
 
 def test_the_bench_screen_writes_the_same_report(found, bench, tmp_path):
-    from tui.app.analyses import Analyses, Task
+    from tui.app.state.analyses import Analyses, Task
 
     task = Task(lambda message: None, bench, 1, load_unit("adss"), threading.Event())
     Analyses().report(task, found, tmp_path / "r.html")

@@ -19,7 +19,7 @@ from screen import DIAGNOSIS, ESTIMATE, operated, run
 from daq.store import Store
 from sim.unit import load_unit
 from tui import cli
-from tui.kept import keep_diagnosis, keep_estimate
+from tui.measurements.stored_answers import keep_diagnosis, keep_estimate
 
 TABLES = ("units", "instruments", "plans", "measurements", "points", "events", "estimates",
           "diagnoses", "diagnosed_points", "corrections")  # fmt: skip

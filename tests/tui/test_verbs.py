@@ -92,7 +92,7 @@ def test_estimate_gives_the_fields_that_scripts_use(capsys):
 def calls(monkeypatch):
     """Estimates at once, without a simulation; the calls are kept."""
     from analysis import estimate
-    from analysis.paper_estimate import IndexCurve
+    from analysis.estimate.from_features import IndexCurve
 
     made = []
 
@@ -177,7 +177,7 @@ def test_reproduce_gives_the_fields_that_scripts_use(capsys, tmp_path):
 @pytest.fixture
 def cluster(monkeypatch):
     """A cluster that does nothing but know where it is, and whether it was left."""
-    from analysis import cluster
+    from analysis.execution import dask_executor as cluster
 
     class Cluster:
         """Knows whether it was closed."""

@@ -361,7 +361,7 @@ def test_a_disk_that_confirms_nothing_ends_it(tmp_path):
 LOADED_LATER = """
 import sys
 from pathlib import Path
-from daq import watchdog_child
+from daq.session import watchdog_child
 url, db = sys.argv[1:]
 watchdog_child.load(url)
 before = set(sys.modules)

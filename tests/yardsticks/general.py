@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from yardsticks.matrices import OUTPUT, SAMPLES, Matrices, gains
 
-from sim.compiling import njit
+from sim.engine.compiling import njit
 
 Drive = tuple[float, int, float]
 """Frequency in Hz, cycles, source level in V peak."""

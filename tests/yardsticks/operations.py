@@ -15,9 +15,9 @@ from unittest.mock import patch
 import numpy as np
 from llvmlite import ir
 
-from sim.compiling import njit
-from sim.kernel import Program
-from sim.layout import STEPS_SEEN, Layout, Structure
+from sim.engine.compiling import njit
+from sim.engine.kernel import Program
+from sim.engine.layout import STEPS_SEEN, Layout, Structure
 
 _KINDS = {"fadd": "add or multiply", "fsub": "add or multiply", "fmul": "add or multiply",
           "fdiv": "divide", "fcmp_ordered": "compare"}  # fmt: skip

@@ -13,7 +13,7 @@ import numpy as np
 from side_by_side import half_plays
 from yardsticks.matrices import OUTPUT, STATES
 
-from sim.compiling import njit
+from sim.engine.compiling import njit
 
 
 def constants(unit, ratio: float, c_s1: float = 0.0) -> tuple[float, ...]:

@@ -21,19 +21,20 @@ from textual.screen import ModalScreen, Screen
 from daq.analyser import SourceState
 from daq.errors import LashbenchError
 from daq.session_events import Finished, PointStored, RunIn
-from daq.visible_text import visible, visible_line
-from tui.app import bench_owner, messages
-from tui.app.analyses import Analyses
-from tui.app.analysis_keeper import AnalysisKeeper
-from tui.app.beside import Beside
+from daq.untrusted.visible_text import visible, visible_line
+from tui.app import messages
 from tui.app.copied import keep_copy
-from tui.app.desk import Desk
-from tui.app.dialogs import KEYS, ErrorDialog, HelpDialog, QuestionDialog
+from tui.app.dialogs.dialogs import KEYS, ErrorDialog, HelpDialog, QuestionDialog
 from tui.app.run_view import RunView
 from tui.app.screens import SCREENS
 from tui.app.screens.instrument_screen import InstrumentScreen
-from tui.app.session_keeper import SessionKeeper
-from tui.app.sessions import one_session
+from tui.app.state import bench_owner
+from tui.app.state.analyses import Analyses
+from tui.app.state.analysis_keeper import AnalysisKeeper
+from tui.app.state.background import Beside
+from tui.app.state.desk import Desk
+from tui.app.state.session_keeper import SessionKeeper
+from tui.app.state.sessions import one_session
 from tui.app.step_screen import STEPS, StepScreen
 from tui.app.style import STYLE
 from tui.app.terminal_app import TerminalApp

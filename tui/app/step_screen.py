@@ -22,7 +22,7 @@ from tui.app.widgets.plain import Words
 
 if TYPE_CHECKING:
     from tui.app.application import BenchApp
-    from tui.app.desk import Desk
+    from tui.app.state.desk import Desk
 
 __all__ = ["STEPS", "StepScreen"]
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from textual.app import App
 
-from daq.visible_text import visible, visible_line
+from daq.untrusted.visible_text import visible, visible_line
 from tui.entry import INTERRUPTED
 from tui.signals import ending_on_signals
 
@@ -39,7 +39,7 @@ class TerminalApp(App[int]):
         if sys.platform != "win32":
             from textual.drivers.linux_driver import LinuxDriver
 
-            from tui.app.lasting_driver import LastingDriver
+            from tui.app.state.lasting_driver import LastingDriver
 
             return LastingDriver if found is LinuxDriver else found
         return found
@@ -86,7 +86,7 @@ class TerminalApp(App[int]):
         driver = self._driver
         if sys.platform == "win32" or driver is None:
             return
-        from tui.app.lasting_driver import LastingDriver
+        from tui.app.state.lasting_driver import LastingDriver
 
         if not isinstance(driver, LastingDriver):
             return

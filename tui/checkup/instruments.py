@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from tui.checkup.finding import Finding, failed, noted, passed
-from tui.pasted import pip_install
+from tui.text.shell_quote import pip_install
 
 __all__ = ["check_serial_ports", "check_visa"]
 

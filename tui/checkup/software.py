@@ -15,7 +15,7 @@ from importlib import import_module, metadata
 from pathlib import Path
 
 from tui.checkup.finding import Finding, failed, noted, passed
-from tui.pasted import pip_install
+from tui.text.shell_quote import pip_install
 
 __all__ = ["check_engine", "check_packages", "check_python", "satisfies"]
 
@@ -58,9 +58,9 @@ def check_engine() -> Iterator[Finding]:
             slow = "numba compiles nothing: a diagnosis takes hundreds of times longer"
             yield failed(name, slow, "unset NUMBA_DISABLE_JIT")
             return
-        from sim.machine_code import code_folder, multiplies_and_adds
+        from sim.engine.machine_code import code_folder, multiplies_and_adds
 
-        import_module("analysis.agreement")
+        import_module("analysis.emulation.kernels")
     except ImportError as error:
         yield failed(name, f"cannot be loaded: {error}", "put the packages right first")
         return

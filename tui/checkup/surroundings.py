@@ -11,7 +11,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from daq.trust import distrust
+from daq.untrusted.trust import distrust
 from tui.checkup.finding import Finding, failed, noted, passed
 from tui.places import cache_folder, history_path, log_path
 

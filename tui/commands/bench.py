@@ -9,8 +9,8 @@ import sys
 from pathlib import Path
 
 from daq.errors import InputError
-from tui.output import Injected
 from tui.places import history_path, look_at_caches
+from tui.text.output import Injected
 
 __all__ = ["bench", "is_terminal", "require_terminal"]
 

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from tui.output import Injected
+from tui.text.output import Injected
 
 __all__ = ["completion"]
 

@@ -13,10 +13,10 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from daq.errors import InputError
-from tui.history_rows import correction_words
+from tui.measurements.history_rows import correction_words
 from tui.options import Json, Whole
-from tui.output import Injected
 from tui.places import history_path
+from tui.text.output import Injected
 
 __all__ = ["correct"]
 

@@ -16,9 +16,9 @@ from cyclopts import Parameter
 from daq.errors import InputError
 from tui.entry import INTERRUPTED
 from tui.options import Json, Tolerance, Whole, prepare_directory, tolerance_shares
-from tui.output import Console, Injected
-from tui.pasted import pasted
 from tui.places import cache_folder
+from tui.text.output import Console, Injected
+from tui.text.shell_quote import pasted
 
 if TYPE_CHECKING:
     from daq.frf import FrequencyResponse
@@ -149,7 +149,7 @@ def _judge(
     from analysis.diagnosis import diagnose_response
     from analysis.estimate import estimate_response
     from tui.demonstration.hidden import compare, worded
-    from tui.reports import report_measurement
+    from tui.measurements.reports import report_measurement
 
     cache = cache_folder()
     tell("\n3. Its backlash by stage, as the plain model has it\n")

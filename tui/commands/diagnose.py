@@ -21,14 +21,14 @@ from tui.options import (
     prepare_directory,
     tolerance_shares,
 )
-from tui.output import Console, Injected, readers_may_leave
-from tui.pasted import proposing
 from tui.places import cache_folder
 from tui.reading_options import NO_OPTIONS, ReadingOptions, read_files
+from tui.text.output import Console, Injected, readers_may_leave
+from tui.text.shell_quote import proposing
 
 if TYPE_CHECKING:
     from analysis.diagnosis import Diagnosis
-    from analysis.executor import Executor
+    from analysis.execution.executor import Executor
     from analysis.paper_diagnosis import PaperDiagnosis
     from daq.frf import FrequencyResponse
     from sim.unit import Unit
@@ -84,9 +84,9 @@ def diagnose(
         return
     response, *others = read_files([file, *further], given, console)
     from analysis.diagnosis import diagnose_response
-    from analysis.input_check import check_inputs
-    from analysis.stated_error import error_doubts, error_notes
-    from analysis.swept import check_together, unit_doubts
+    from analysis.observation.input_check import check_inputs
+    from analysis.observation.joint import check_together, unit_doubts
+    from analysis.observation.stated_error import error_doubts, error_notes
 
     check_together((response, *others))
     said = check_inputs((response, *others), subject, as_is)
@@ -107,7 +107,7 @@ def diagnose(
     result = proposing(result, unit, (response, *others))
     _tell(result, json, console, _advice(result, subject))
     if plots is not None:
-        from analysis.diagnosis_figures import draw_diagnosis
+        from analysis.diagnosis.figures import draw_diagnosis
 
         for path in draw_diagnosis(result, plots):
             console.note(f"wrote {path}")
@@ -122,7 +122,7 @@ def _settings(
 ) -> list[str]:
     """Refuse what is likely swept otherwise than stated, or say it where a cause does as much."""
     from analysis.estimate import free_axes
-    from analysis.setting_check import search_doubt
+    from analysis.estimate.settings import search_doubt
 
     if unit.stages == 1:
         return []

@@ -15,7 +15,7 @@ from tui.checkup.self_test import check_itself
 from tui.checkup.software import check_engine, check_packages, check_python
 from tui.checkup.surroundings import check_folders, check_terminal
 from tui.options import Json
-from tui.output import Console, Injected, readers_may_leave
+from tui.text.output import Console, Injected, readers_may_leave
 
 __all__ = ["CHECKS", "doctor"]
 

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 from daq.errors import InputError
 from tui.executors import executor_at
 from tui.options import Cluster, Json, Real, Tolerance, UnitName, tolerance_shares
-from tui.output import Injected
 from tui.places import cache_folder
 from tui.reading_options import NO_OPTIONS, ReadingOptions, read_files
+from tui.text.output import Injected
 
 if TYPE_CHECKING:
     from sim.unit import Unit
@@ -83,9 +83,9 @@ def estimate(
         subject = _unit(unit, tolerance)
         responses = read_files([file, *further], given, console)
         from analysis.estimate import estimate_response
-        from analysis.input_check import check_inputs
-        from analysis.stated_error import error_notes
-        from analysis.swept import unit_doubts
+        from analysis.observation.input_check import check_inputs
+        from analysis.observation.joint import unit_doubts
+        from analysis.observation.stated_error import error_notes
 
         said = check_inputs(responses, subject, as_is)
         warnings = unit_doubts(responses, subject)

@@ -15,7 +15,7 @@ from cyclopts import Parameter
 
 from daq.errors import InputError, LimitError, MeasurementError
 from tui.options import Json, Real, UnitName
-from tui.output import Console, Injected
+from tui.text.output import Console, Injected
 
 if TYPE_CHECKING:
     from daq.analyser import Identity
@@ -125,11 +125,11 @@ def _looked_at(
     from dataclasses import asdict
 
     from daq.analyser import SourceState
-    from daq.bench_lock import BenchLock
     from daq.driving import first_day as checks
     from daq.driving.first_day import FirstDay
     from daq.formats.atomic import write_text
-    from daq.watchdog import Watchdog
+    from daq.session.bench_lock import BenchLock
+    from daq.session.watchdog import Watchdog
     from sim.unit import load_unit
     from tui.bench import connect_wire
 

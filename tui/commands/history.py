@@ -19,7 +19,7 @@ from cyclopts import Parameter
 
 from daq.errors import AnalysisError, ConfigurationError, InputError, LashbenchError
 from tui.executors import executor_at
-from tui.history_rows import (
+from tui.measurements.history_rows import (
     QUANTITIES,
     Trends,
     answer_words,
@@ -28,14 +28,14 @@ from tui.history_rows import (
     told_groups,
     trend_lines,
 )
-from tui.layout import WIDTH, table_lines, wrapped
+from tui.measurements.reports import unit_as_measured
 from tui.options import Cluster, Json, Whole
-from tui.output import Console, Injected, as_json
 from tui.places import cache_folder, history_path
-from tui.reports import unit_as_measured
+from tui.text.layout import WIDTH, table_lines, wrapped
+from tui.text.output import Console, Injected, as_json
 
 if TYPE_CHECKING:
-    from analysis.executor import Executor
+    from analysis.execution.executor import Executor
     from daq.store import Store
     from daq.store_records import Answer, HistoryLine
 
@@ -200,9 +200,9 @@ def _estimates(
 def _estimate(db: Path, number: int, executor: Executor | None, console: Console) -> Answer | None:
     """Make an estimate and keep it; it is given back where it cannot be kept."""
     from analysis.estimate import estimate_response
-    from analysis.input_check import check_inputs
+    from analysis.observation.input_check import check_inputs
     from daq.store import Store
-    from tui.kept import keep_estimate, loose_answer
+    from tui.measurements.stored_answers import keep_estimate, loose_answer
 
     began_s = time.monotonic()
     with Store(db, read_only=True) as store:

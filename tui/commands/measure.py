@@ -19,9 +19,9 @@ from daq.errors import InputError, LashbenchError, MeasurementError
 from tui.entry import INTERRUPTED
 from tui.measure_options import PlanOptions, read_band, session_request
 from tui.options import Json, Real, UnitName, Whole
-from tui.output import Console, Injected, readers_may_leave
-from tui.pasted import pasted
 from tui.places import history_path
+from tui.text.output import Console, Injected, readers_may_leave
+from tui.text.shell_quote import pasted
 
 if TYPE_CHECKING:
     from daq.session_events import Finished, SessionEvent

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from daq.errors import InputError
-from tui.output import Injected
+from tui.text.output import Injected
 
 __all__ = ["new_unit"]
 

@@ -14,12 +14,12 @@ from daq.errors import InputError, LashbenchError
 from tui.executors import executor_at
 from tui.measure_options import PlanOptions, swept_plan
 from tui.options import Cluster, Json, Real, Tolerance, UnitName, Whole, tolerance_shares
-from tui.output import Console, Injected
 from tui.places import cache_folder
 from tui.reading_options import NO_LAYOUT, LayoutOptions, ReadingOptions, read_file
+from tui.text.output import Console, Injected
 
 if TYPE_CHECKING:
-    from analysis.observation import Observation
+    from analysis.observation.observation import Observation
     from daq.plan import Direction
     from sim.unit import Unit
 
@@ -99,7 +99,7 @@ def prepare(
             "--machines: the posterior serves every sweep; leave out the options of a sweep"
         )
     observation = _observation(file, options, recipe, layout, console)
-    from analysis.preparation import prepare_sweep
+    from analysis.precompute import prepare_sweep
 
     began, folder = time.perf_counter(), cache_folder()
     with executor_at(cluster) as executor:
@@ -140,7 +140,7 @@ def prepare(
 def _train(subject: Unit, machines: int, cluster: str | None, json: bool, console: Console) -> None:
     if machines < 1:
         raise InputError(f"--machines: {machines} is too few; give 1 or more")
-    from analysis.preparation import prepare_unit
+    from analysis.precompute import prepare_unit
 
     began, folder = time.perf_counter(), cache_folder()
     with executor_at(cluster) as executor:
@@ -173,7 +173,7 @@ def _observation(
 ) -> Observation:
     """The sweep that is meant: that of a response, or one that will be measured."""
     if file is None:
-        from analysis.observation import USUAL_NOISE_V, unread
+        from analysis.observation.observation import USUAL_NOISE_V, unread
         from daq.recipe import load_recipe
 
         if layout != NO_LAYOUT:
@@ -183,11 +183,11 @@ def _observation(
     told, sweep = _said_of(file, options, layout)
     if sweep or recipe is not None:
         raise InputError(f"{file}: give either a response or the options of a sweep, not both")
-    from analysis.observation import observe
-    from analysis.settled import settled
-    from analysis.thinning import thin_all
+    from analysis.observation.observation import observe
+    from analysis.observation.rounding import settled
+    from analysis.observation.thinning import thin_responses
 
-    (response,), _ = thin_all([settled(read_file(file, told, console))])
+    (response,), _ = thin_responses([settled(read_file(file, told, console))])
     return observe(response)
 
 

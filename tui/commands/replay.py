@@ -39,11 +39,11 @@ def replay(
     """
     if not 0.001 <= speed <= 1e6:
         raise InputError(f"--speed {speed:g} must be between 0.001 and 1000000")
-    from tui.app.recording import read_recording
+    from tui.app.state.recording import read_recording
 
     recording = read_recording(file, id, given.reading())
     require_terminal("replay")
-    from tui.app.replay import ReplayApp
+    from tui.app.state.replay import ReplayApp
 
     code = ReplayApp(recording, speed).run()
     return code or 0

@@ -17,19 +17,19 @@ from cyclopts import Parameter
 
 from daq.errors import InputError, LashbenchError
 from tui.options import Tolerance, UnitName, tolerance_shares
-from tui.output import Console, Injected
-from tui.pasted import proposing
 from tui.places import cache_folder, history_path
 from tui.reading_options import NO_OPTIONS, ReadingOptions, read_file
+from tui.text.output import Console, Injected
+from tui.text.shell_quote import proposing
 
 if TYPE_CHECKING:
     from analysis.diagnosis import Diagnosis
     from analysis.report import Diagnosed
-    from analysis.report_data import Origin
+    from analysis.report.document import Origin
     from daq.frf import FrequencyResponse
     from daq.store_records import Measurement
     from sim.unit import Unit
-    from tui.kept import StoredDiagnosis
+    from tui.measurements.stored_answers import StoredDiagnosis
 
 __all__ = ["report"]
 
@@ -72,8 +72,8 @@ def report(
     as_is
         Estimate and diagnose a response as it stands, also if it looks like a mistake.
     """
-    from analysis.input_check import check_inputs
-    from analysis.swept import unit_doubts
+    from analysis.observation.input_check import check_inputs
+    from analysis.observation.joint import unit_doubts
     from daq.formats.atomic import checked_target
     from sim.unit import load_unit
 
@@ -148,7 +148,7 @@ class _Kept:
 def _stored(db: Path, number: int, unit: Unit) -> _Kept:
     from analysis.report import stored_origin
     from daq.store import Store
-    from tui.kept import kept_diagnosis, kept_estimate
+    from tui.measurements.stored_answers import kept_diagnosis, kept_estimate
 
     with Store(db, read_only=True) as store:
         return _Kept(
@@ -169,8 +169,8 @@ def _estimate(
     console: Console,
 ) -> dict[str, Any] | None:
     from analysis.estimate import estimate_response
-    from analysis.input_check import doubted
-    from tui.kept import keep_estimate
+    from analysis.observation.input_check import doubted
+    from tui.measurements.stored_answers import keep_estimate
 
     console.note("estimating")
     began_s = time.monotonic()
@@ -197,7 +197,7 @@ def _diagnose(
     console: Console,
 ) -> Diagnosis | None:
     from analysis.diagnosis import diagnose_response
-    from tui.kept import keep_diagnosis
+    from tui.measurements.stored_answers import keep_diagnosis
 
     console.note("diagnosing")
     try:

@@ -6,7 +6,7 @@ Owns the options of the verb only.
 from __future__ import annotations
 
 from tui.options import Json, Plots, prepare_directory
-from tui.output import Injected
+from tui.text.output import Injected
 
 __all__ = ["reproduce"]
 

@@ -13,7 +13,7 @@ from cyclopts import Parameter
 
 from daq.errors import InputError
 from tui.options import Real, UnitName, Whole
-from tui.output import Injected
+from tui.text.output import Injected
 
 __all__ = ["serve"]
 

@@ -14,7 +14,7 @@ from cyclopts import Parameter
 
 from daq.errors import InputError
 from tui.options import Real, UnitName, Whole, parameter_settings
-from tui.output import Injected
+from tui.text.output import Injected
 
 __all__ = ["simulate"]
 

@@ -11,14 +11,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.errors import MeasurementError
-from tui.bode_text import Point, bode_lines
 from tui.demonstration.hidden import BAND_HZ
+from tui.text.bode_text import Point, bode_lines
 
 if TYPE_CHECKING:
     from daq.session_events import Finished, SessionEvent
     from daq.session_request import SessionRequest
     from sim.unit import Unit
-    from tui.output import Console
+    from tui.text.output import Console
 
 __all__ = ["Picture", "sweep"]
 

@@ -11,8 +11,8 @@ import os
 import re
 from pathlib import Path
 
-from daq.bounded_text import read_bytes
 from daq.errors import FileFormatError
+from daq.untrusted.bounded_text import read_bytes
 
 __all__ = ["decoded", "text_in"]
 

@@ -16,7 +16,7 @@ from daq.configs import config_names, config_path
 from daq.errors import InputError
 from daq.formats.foreign.quantities import QUANTITIES
 from daq.formats.foreign.table import Separator, Table
-from daq.toml_files import Positive, load_toml
+from daq.untrusted.toml_files import Positive, load_toml
 
 __all__ = ["Profile", "load_profile", "matches", "profile_path", "profiles_like", "save_profile"]
 

@@ -14,7 +14,7 @@ from analysis.inference.network import densities, first_weights, set_logits, sum
 from analysis.inference.plans import Landmarks, reference_response
 from analysis.inference.posterior import Posterior, swept_levels
 from analysis.inference.prior import Prior
-from analysis.observation import observe
+from analysis.observation.observation import observe
 from daq.configs import config_path
 from daq.frf import FrequencyResponse
 from sim.unit import load_unit

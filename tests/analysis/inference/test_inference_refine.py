@@ -6,7 +6,7 @@ import synthetic_runs
 from untrained import Untrained
 
 from analysis.inference.refine import refine
-from analysis.verdict import judge_candidates
+from analysis.selection.verdict import judge_candidates
 
 LAG, LOAD, MESH = "amplifier-lag", "load-inertia", "mesh1-damping"
 

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from analysis.ensemble import Machine
-from analysis.family import Family, read_family
+from analysis.ensemble.batch import Family, read_family
+from analysis.ensemble.machine import Machine
 from analysis.inference.inputs import SweptLevels
 from analysis.inference.nominal import RUNS, compare, expected, nominal_of, nominal_runs, relative
-from analysis.observation import USUAL_NOISE_V, unread
+from analysis.observation.observation import USUAL_NOISE_V, unread
 from daq.plan import SweepPlan, spaced_frequencies
 from sim.unit import load_unit
 

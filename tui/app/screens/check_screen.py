@@ -15,10 +15,10 @@ from textual.binding import Binding
 from textual.containers import Vertical, VerticalScroll
 
 from daq.errors import LashbenchError
-from tui.app.desk import Desk, Results
-from tui.app.dialogs import QuestionDialog
-from tui.app.plan_dialog import PlanDialog
+from tui.app.dialogs.dialogs import QuestionDialog
+from tui.app.dialogs.plan import PlanDialog
 from tui.app.run_view import RunView
+from tui.app.state.desk import Desk, Results
 from tui.app.step_screen import StepScreen
 from tui.app.widgets.plain import Words
 from tui.app.words import plan_words

@@ -14,13 +14,13 @@ from textual.binding import Binding
 from textual.containers import VerticalScroll
 from textual.widgets import ProgressBar
 
-from analysis.believed import believed_lines
-from analysis.swept import sweep_lines
-from analysis.unseen import head_unseen, list_unseen
-from analysis.verdict_words import verdict_words
+from analysis.ensemble.datasheet_belief import believed_lines
+from analysis.inference.exclusion import head_unseen, list_unseen
+from analysis.observation.joint import sweep_lines
+from analysis.selection.wording import verdict_words
 from daq.errors import LashbenchError
-from tui.app.desk import plan_of_document
 from tui.app.screens.result_screen import answer_lines
+from tui.app.state.desk import plan_of_document
 from tui.app.step_screen import StepScreen
 from tui.app.widgets.plain import Words
 from tui.app.words import plan_words

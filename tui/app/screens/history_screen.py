@@ -16,14 +16,14 @@ from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
 
-from tui.app.correction_dialog import CorrectionDialog
-from tui.app.sessions import audit_trail, correct_session, responses_of
+from tui.app.dialogs.correction import CorrectionDialog
+from tui.app.state.sessions import audit_trail, correct_session, responses_of
 from tui.app.step_screen import StepScreen
 from tui.app.widgets.bode import BodePlot
 from tui.app.widgets.panel import Panel
 from tui.app.widgets.plain import Table, Words
 from tui.app.widgets.traces import traces_of_response
-from tui.history_rows import Trends, answer_words, measurement_row, trend_lines
+from tui.measurements.history_rows import Trends, answer_words, measurement_row, trend_lines
 
 if TYPE_CHECKING:
     from daq.frf import FrequencyResponse

@@ -13,8 +13,8 @@ from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
 from textual.widgets.option_list import Option
 
-from tui.app.desk import SIMULATED_URL
 from tui.app.messages import InstrumentsListed
+from tui.app.state.desk import SIMULATED_URL
 from tui.app.step_screen import StepScreen
 from tui.app.widgets.plain import Caption, Choices, Field, Words, choice
 

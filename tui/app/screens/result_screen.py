@@ -22,7 +22,7 @@ from tui.app.widgets.plain import Words
 from tui.app.widgets.traces import traces_of_response
 
 if TYPE_CHECKING:
-    from analysis.features import LevelFeatures
+    from analysis.resonance.records import LevelFeatures
     from sim.unit import Unit
 
 __all__ = ["ResultScreen", "answer_lines"]
@@ -137,8 +137,8 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
             self.action_estimate()
 
     def _lines(self) -> list[str]:
-        from analysis.believed import believed_lines
-        from analysis.features import summary
+        from analysis.ensemble.datasheet_belief import believed_lines
+        from analysis.resonance.records import summary
 
         desk, results = self.desk, self.desk.results
         lines: list[str] = []
@@ -162,7 +162,7 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
 
 def _brief(features: Sequence[LevelFeatures]) -> list[str]:
     """A line per level, for narrow screens, and what a reader should know below."""
-    from analysis.features import with_error
+    from analysis.resonance.records import with_error
 
     lines = []
     for level in features:

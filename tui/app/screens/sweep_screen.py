@@ -14,8 +14,8 @@ from textual.binding import Binding
 from textual.containers import Vertical
 from textual.widgets import ProgressBar
 
-from tui.app.dialogs import QuestionDialog
-from tui.app.sessions import latest_complete, one_session
+from tui.app.dialogs.dialogs import QuestionDialog
+from tui.app.state.sessions import latest_complete, one_session
 from tui.app.step_screen import StepScreen
 from tui.app.widgets.bode import BodePlot
 from tui.app.widgets.plain import Words

@@ -14,8 +14,8 @@ from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.widgets.option_list import Option
 
 from daq.errors import LashbenchError
-from daq.visible_text import visible_line
-from tui.app.sessions import one_session, recent_sessions
+from daq.untrusted.visible_text import visible_line
+from tui.app.state.sessions import one_session, recent_sessions
 from tui.app.step_screen import StepScreen
 from tui.app.widgets.plain import Caption, Choices, Field, Table, Words, choice
 

@@ -15,7 +15,7 @@ from textual.content import Content
 from textual.widgets import Button, DataTable, Input, Label, OptionList, Static, TextArea
 from textual.widgets.option_list import Option
 
-from daq.visible_text import visible, visible_line
+from daq.untrusted.visible_text import visible, visible_line
 
 __all__ = [
     "Caption", "Choices", "Field", "Passage", "Push", "Table", "Words", "choice", "plain",

@@ -1,0 +1,122 @@
+"""Whether an observation looks like one of a hypothesis's own runs.
+
+Owns the tests behind "unexplained" (does it fit, does it predict levels that
+it was not fitted to, as own runs do) and the one behind "consistent": whether
+what a cause explains better is more than it would explain by chance where
+nothing is hidden. All take a hypothesis's own runs as if they had been
+observed. It ranks no hypotheses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.checking.cross_validation import HeldOut, hold_out_surface
+from analysis.checking.lack_of_fit import credited, judge_structure
+from analysis.checking.replicates import FEWEST_RUNS, MOST_RUNS, Replicate, replicates_of
+from analysis.emulation.fitted_model import FittedModel
+from analysis.execution.executor import side_by_side
+
+__all__ = ["Adequacy", "judge_adequacy", "judge_chance", "judge_gain", "misses_alike"]
+
+_TRIES = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Adequacy:
+    """How the fit of an observation compares with those of a hypothesis's own runs.
+
+    `sigma`: by how many standard deviations it is worse, negative where it is
+    better than most. `structure`: by how many it leaves more structure. Both are 0 where no runs
+    can be compared.
+    """
+
+    sigma: float
+    structure: float
+
+
+def judge_adequacy(candidate: FittedModel, rng: np.random.Generator) -> Adequacy:
+    """Compare the fit of the observation with the fits of runs of the same hypothesis.
+
+    The runs are given reading noise; each is fitted by the half of the others that deviates
+    otherwise (`analysis.checking.replicates`). In both numbers the lowest level has a credit (see
+    `analysis.checking.lack_of_fit.credited`).
+    """
+    fits = side_by_side(
+        lambda run: run.alone.climb(run.place, tries=1), replicates_of(candidate, rng)
+    )
+    if len(fits) < FEWEST_RUNS:
+        # Nearly every run did alone what it did: nothing speaks against the observation.
+        return Adequacy(0.0, 0.0)
+    surface, best = candidate.surface, candidate.best
+    own = [fit.log_likelihood for fit in fits]
+    sigma = _worse([best.log_likelihood, *own])
+    lowest, *others = surface.observation.levels
+    if others:
+        above = [np.sum(fit.density[:, lowest.stop :]) for fit in [best, *fits]]
+        sigma = credited(sigma, _worse(above))
+    structure = judge_structure(best, fits, surface.observation, surface.sigmas)
+    return Adequacy(sigma, structure)
+
+
+def _worse(likelihoods: Sequence[float]) -> float:
+    """Standard deviations by which the first of some log-likelihoods is less than the others."""
+    seen, *own = likelihoods
+    centre = np.median(own)
+    below = [centre - value for value in own if value <= centre]
+    return float((centre - seen) / max(1.4826 * np.median(below), 1e-9))
+
+
+def judge_chance(simpler: FittedModel, alleged: FittedModel, rng: np.random.Generator) -> float:
+    """Share of a hypothesis's own runs that another explains better by as much as it does here.
+
+    A cause with a broad range may imitate one branch of a motion that has
+    several: it then fits better than the hypothesis that is true, whose
+    expectation is blurred over all branches, and does so for its own runs, too
+    (D. R. Cox, "Tests of separate families of hypotheses", 1961).
+    """
+    share, _ = judge_gain(simpler, alleged, rng)
+    return share
+
+
+def judge_gain(
+    simpler: FittedModel, alleged: FittedModel, rng: np.random.Generator
+) -> tuple[float, float]:
+    """That share, and by how many of their standard deviations the gain exceeds own runs' mean one.
+
+    Where few own runs are on the branch that was observed, their share says little, and gains that
+    differ by hundreds from run to run say that such a gain is none. Nor does it say more than a
+    standard deviation that own runs lose: what the other adds can be none, and its own runs, made
+    for the observation, may not reach them. Infinite where no runs can be compared.
+    """
+    seen = alleged.best.log_likelihood - simpler.best.log_likelihood
+
+    def gain(run: Replicate) -> float:
+        there = run.seen_by(alleged.surface).climb(alleged.best.place, tries=_TRIES)
+        return there.log_likelihood - run.alone.climb(run.place, tries=_TRIES).log_likelihood
+
+    gains = side_by_side(gain, replicates_of(simpler, rng))
+    if len(gains) < FEWEST_RUNS:
+        return 0.0, float("inf")
+    scatter = max(float(np.std(gains)), 1e-9)
+    beyond = (seen - max(float(np.mean(gains)), -scatter)) / scatter
+    return float(np.mean(np.array(gains) >= seen)), beyond
+
+
+def misses_alike(
+    candidate: FittedModel, held_out: HeldOut, share: float, rng: np.random.Generator
+) -> bool:
+    """Whether more than a share of a hypothesis's own runs miss levels not fitted by as much."""
+    observation = candidate.surface.observation
+    asked, alike = 0, 0
+    for run in replicates_of(candidate, rng):
+        asked += 1
+        missed = hold_out_surface(run.alone, run.place, observation).missed
+        alike += missed >= held_out.missed
+        # Each takes a second or so: no more are asked than decide.
+        if alike > share * MOST_RUNS:
+            return True
+    return alike > share * asked

@@ -1,0 +1,85 @@
+"""Whether a size is where no bench has it, where every bench does, or where none could see it.
+
+Owns what "at the end of a plausible range", "within its tolerance" and "out of sight" mean:
+the cause is another then. It simulates nothing and passes no verdict.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.emulation.fitted_model import FittedModel
+from analysis.emulation.likelihood import TEMPERATURE
+from sim.catalogue import CATALOGUE
+
+__all__ = [
+    "EDGE",
+    "is_out_of_sight",
+    "is_pressed",
+    "may_be_within_tolerance",
+]
+
+EDGE = 0.02
+"""How near its end, as a share of its range, a size is at the end."""
+
+_INWARDS = 0.05
+"""How far inside it is put to see whether it is pressed against that end: whether that costs more
+than the heat, as it does not where the size says little."""
+
+_TOWARDS, _AS_GOOD = 0.15, 2.0 * TEMPERATURE
+"""How near to an end of its range a datasheet value is that may as well be there, half or twice of
+what it should be, and the log-likelihood by which the end must be worse (two standard
+deviations). A shaft that hardens is taken for one that is twice as stiff, or more."""
+
+
+_IN_SIGHT = 2.0
+"""By what factor a resonance may lie outside the frequencies that were measured, and its shape tell
+it from a load or a brake: one found at 22 Hz, below a band from 100, was a brake, withheld."""
+
+
+def is_pressed(candidate: FittedModel) -> bool:
+    """Whether a size wants to be beyond its plausible range, or may as well be at its end."""
+    best, fit = candidate.best, candidate.surface.fit
+    for at, amid in enumerate(candidate.hypothesis.amid, start=1):
+        inside, beyond = best.place.copy(), best.place.copy()
+        inside[at] += _INWARDS if inside[at] < 0.5 else -_INWARDS
+        beyond[at] = round(best.place[at])
+        off = abs(best.place[at] - beyond[at])
+        if off < EDGE and fit(inside).log_likelihood < best.log_likelihood - TEMPERATURE:
+            return True
+        if amid and off < _TOWARDS and fit(beyond).log_likelihood > best.log_likelihood - _AS_GOOD:
+            return True
+    return False
+
+
+def is_out_of_sight(candidate: FittedModel, place: NDArray[np.float64] | None = None) -> bool:
+    """Whether what it is told by is a resonance far outside all that was measured.
+
+    At a place (d,), that of its best fit if not given.
+    """
+    hypothesis, measured = candidate.hypothesis, candidate.surface.observation.frequency_hz
+    low, high = measured.min() / _IN_SIGHT, measured.max() * _IN_SIGHT
+    there = candidate.best.place if place is None else place
+    values = zip(hypothesis.parameters, hypothesis.values(there), strict=True)
+    return any(
+        CATALOGUE[effect].resonance == parameter.name and not low < value < high
+        for (effect, parameter), value in values
+    )
+
+
+def may_be_within_tolerance(candidate: FittedModel) -> bool:
+    """Whether a datasheet value is no further off than its tolerance, or may as well not be.
+
+    The second is asked of several causes alone: one of them may be there for what the other
+    leaves, and a value that is hardly off, or not for sure, then explains nothing.
+    """
+    hypothesis, best, fit = candidate.hypothesis, candidate.best, candidate.surface.fit
+    if any(hypothesis.within_tolerance(best.place)):
+        return True
+    if len(hypothesis.effects) < 2:
+        return False
+    return any(
+        fit(place).log_likelihood > best.log_likelihood - _AS_GOOD
+        for place in hypothesis.brought_within_tolerance(best.place)
+    )

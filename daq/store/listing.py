@@ -1,0 +1,186 @@
+"""The history as a list: one bounded row per measurement, with what was said of it.
+
+Owns the queries that choose rows and read nothing else of the file: no point, no
+plan, no whole document. What a row means is `daq.store_records.HistoryLine`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import sqlalchemy as sa
+
+from daq.analyser import SourceState
+from daq.store.rows import document_of, moment, real, state_of, text, whole
+from daq.store_records import LONGEST_NAME, Answer, HistoryLine
+from daq.untrusted.bounded_text import parse_json
+
+__all__ = [
+    "ESTIMATE_IN_FORCE",
+    "Choice",
+    "count_lines",
+    "read_lacking",
+    "read_lines",
+    "unit_names",
+]
+
+_MOST_NAMES = 1000
+
+ESTIMATE_IN_FORCE = """(SELECT max(id) FROM estimates AS x
+    WHERE x.measurement_id = m.id AND x.points_version = m.points_version)"""
+"""The last estimate that is of the points as they are; `m` is the measurement."""
+
+DIAGNOSIS_IN_FORCE = """(SELECT max(x.id) FROM diagnoses AS x
+    WHERE x.measurement_id = m.id AND x.as_measured
+        AND EXISTS (SELECT 1 FROM diagnosed_points AS q
+            WHERE q.diagnosis_id = x.id AND q.measurement_id = m.id)
+        AND NOT EXISTS (SELECT 1 FROM diagnosed_points AS q
+            JOIN measurements AS o ON o.id = q.measurement_id
+            WHERE q.diagnosis_id = x.id AND q.points_version <> o.points_version))"""
+"""The last diagnosis whose measurements all have the points that it saw."""
+
+_LONGEST_SUMMARY = 65536
+_LINES = f"""
+SELECT m.id, u.name AS unit, u.serial, m.started, m.ended, m.state, m.source_state, m.points,
+    m.flagged, p.points AS planned, p.levels, i.simulated, m.operator, m.notes,
+    (SELECT count(*) FROM corrections AS c WHERE c.measurement_id = m.id) AS corrections,
+    e.made AS e_made, e.software AS e_software, e.edition AS e_edition, e.summary AS e_summary,
+    d.made AS d_made, d.software AS d_software, d.edition AS d_edition, d.summary AS d_summary
+FROM (SELECT m.* FROM measurements AS m {{where}} ORDER BY m.id DESC LIMIT :last) AS m
+JOIN units AS u ON u.id = m.unit_id
+JOIN plans AS p ON p.id = m.plan_id
+LEFT JOIN instruments AS i ON i.id = m.instrument_id
+LEFT JOIN estimates AS e ON e.id = {ESTIMATE_IN_FORCE}
+LEFT JOIN diagnoses AS d ON d.id = {DIAGNOSIS_IN_FORCE}
+ORDER BY m.id"""
+
+
+_COUNT = "SELECT count(*) FROM measurements AS m {where}"
+_LACKING = f"""
+SELECT m.id FROM (SELECT m.* FROM measurements AS m {{where}} ORDER BY m.id DESC LIMIT :last) AS m
+LEFT JOIN estimates AS e ON e.id = {ESTIMATE_IN_FORCE}
+WHERE m.state = 'complete' AND (e.id IS NULL OR (:edition IS NOT NULL AND (e.edition <> :edition
+    OR (json_valid(e.summary) AND json_extract(e.summary, '$.failed') IS NOT NULL))))
+ORDER BY m.id"""
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """Which measurements are meant.
+
+    Parameters
+    ----------
+    unit
+        Name of the unit, in any case; all, if left out.
+    serial
+        Serial number; all, if left out.
+    last
+        At most so many, the newest.
+    with_points
+        Leave out what has no point.
+    exact
+        Take the unit's name as it stands.
+    """
+
+    unit: str | None = None
+    serial: str | None = None
+    last: int | None = None
+    with_points: bool = False
+    exact: bool = False
+
+    def asked(self, connection: sa.Connection, query: str, **more: Any) -> sa.CursorResult[Any]:
+        """Ask a query that has a place for the conditions; they are such as an index serves."""
+        values: dict[str, Any] = {"last": -1 if self.last is None else self.last, **more}
+        kinds, which = [], []
+        if self.unit is not None:
+            names = [self.unit]
+            if not self.exact:
+                folded = self.unit.casefold()
+                names = [name for name in unit_names(connection) if name.casefold() == folded]
+            values |= {f"name{place}": name for place, name in enumerate(names)}
+            places = ", ".join(f":name{place}" for place in range(len(names)))
+            kinds.append(f"name IN ({places})")
+        if self.serial is not None:
+            values["serial"] = self.serial
+            kinds.append("serial = :serial")
+        if kinds:
+            which.append(f"m.unit_id IN (SELECT id FROM units WHERE {' AND '.join(kinds)})")
+        if self.with_points:
+            which.append("m.points > 0")
+        where = f"WHERE {' AND '.join(which)}" if which else ""
+        return connection.execute(sa.text(query.format(where=where)), values)
+
+
+def read_lines(connection: sa.Connection, choice: Choice) -> Iterator[HistoryLine]:
+    """Measurements as a list shows them, oldest first.
+
+    Raises
+    ------
+    ValueError
+        If a row holds what no measurement has.
+    """
+    levels: dict[str, tuple[float, ...]] = {}
+    for row in choice.asked(connection, _LINES):
+        if row.levels not in levels:
+            # Most measurements share a plan.
+            levels.clear()
+            levels[row.levels] = _levels(row.levels)
+        yield HistoryLine(
+            id=whole(row.id),
+            unit=text(row.unit, LONGEST_NAME),
+            serial=text(row.serial, LONGEST_NAME),
+            started=moment(row.started),
+            ended=None if row.ended is None else moment(row.ended),
+            state=state_of(row.state),
+            source_state=SourceState(row.source_state),
+            points=whole(row.points),
+            flagged=whole(row.flagged),
+            planned=whole(row.planned),
+            levels_vpk=levels[row.levels],
+            simulated=bool(row.simulated),
+            operator=text(row.operator, LONGEST_NAME),
+            notes=text(row.notes),
+            corrections=whole(row.corrections),
+            estimate=_answer(row.e_made, row.e_software, row.e_edition, row.e_summary),
+            diagnosis=_answer(row.d_made, row.d_software, row.d_edition, row.d_summary),
+        )
+
+
+def count_lines(connection: sa.Connection, choice: Choice) -> int:
+    """How many measurements are meant."""
+    return int(choice.asked(connection, _COUNT).scalar_one())
+
+
+def read_lacking(
+    connection: sa.Connection, choice: Choice, edition: str | None = None
+) -> list[int]:
+    """Complete measurements without an estimate in force.
+
+    Parameters
+    ----------
+    edition
+        Count what failed, or is of another edition than this, as none.
+    """
+    return [whole(row.id) for row in choice.asked(connection, _LACKING, edition=edition)]
+
+
+def unit_names(connection: sa.Connection) -> list[str]:
+    """Names of the units that were measured, each once, by the alphabet."""
+    query = f"SELECT DISTINCT name FROM units ORDER BY name LIMIT {_MOST_NAMES}"
+    return [text(row.name, LONGEST_NAME) for row in connection.execute(sa.text(query))]
+
+
+def _levels(stored: object) -> tuple[float, ...]:
+    found = parse_json(text(stored))
+    if not isinstance(found, list):
+        raise ValueError("levels of a plan are no list")
+    return tuple(map(real, found))
+
+
+def _answer(made: Any, software: Any, edition: Any, summary: Any) -> Answer | None:
+    if summary is None:
+        return None
+    document = document_of(parse_json(text(summary, _LONGEST_SUMMARY)))
+    return Answer(moment(made), text(software), text(edition), document)

@@ -1,0 +1,109 @@
+"""Sets that say the same of the load: a payload far from what was measured is no payload."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from synthetic import ADSS, FREQUENCIES
+
+from analysis.checking.equivalence import is_equivalent_at_load
+from analysis.ensemble.model import Hypothesis
+from analysis.selection import verdict as rules
+
+J_L = ADSS.load.J_L
+SWINGING, BRAKED, HEAVY, TIED = (
+    ("payload-flexibility",), ("load-viscous-damping",), ("load-inertia",), ("cable-stiffness",)
+)  # fmt: skip
+LOW, HIGH = FREQUENCIES[0], FREQUENCIES[-1]
+FAR_BELOW, FAR_ABOVE, AMID = (
+    [0.2 * J_L, f_p, zeta] for f_p, zeta in [(0.1 * LOW, 2.0), (5.0 * HIGH, 0.02), (140.0, 0.03)]
+)
+
+
+def believed(effects, values=None):
+    """A set at a place; where none is given, amid the ranges."""
+    hypothesis = Hypothesis(ADSS, effects)
+    place = np.full(hypothesis.d, 0.5) if values is None else hypothesis.place(0.4, values)
+    seen = SimpleNamespace(frequency_hz=np.tile(FREQUENCIES, 2))
+    return SimpleNamespace(
+        hypothesis=hypothesis,
+        best=SimpleNamespace(place=place),
+        surface=SimpleNamespace(observation=seen),
+    )
+
+
+@pytest.mark.parametrize(
+    ("payload", "other", "alike"),
+    [
+        (FAR_ABOVE, HEAVY, True), (FAR_ABOVE, BRAKED, False), (FAR_ABOVE, TIED, False),
+        # Below its resonance a damped payload hangs behind: a brake, hardly heavier.
+        (FAR_BELOW, BRAKED, True), (FAR_BELOW, HEAVY, False), (FAR_BELOW, TIED, False),
+        (AMID, HEAVY, False), (AMID, BRAKED, False), (AMID, TIED, False),
+    ],
+)  # fmt: skip
+def test_a_payload_is_another_cause_far_from_what_was_measured_alone(payload, other, alike):
+    assert is_equivalent_at_load(believed(SWINGING, payload), believed(other)) is alike
+
+
+def test_a_load_that_is_heavier_and_braked_is_what_a_payload_above_a_brake_is():
+    heavy = believed(tuple(sorted(HEAVY + BRAKED)))
+    swinging = Hypothesis(ADSS, tuple(sorted(SWINGING + BRAKED)))
+    values = {"B_L": 0.2, "J_p": 0.2 * J_L, "f_p": 5.0 * HIGH, "zeta_p": 0.02}
+    one = believed(swinging.effects, [values[p.name] for _, p in swinging.parameters])
+    assert is_equivalent_at_load(one, heavy)
+    assert not is_equivalent_at_load(heavy, one)
+
+
+@pytest.mark.parametrize("extra", [("amplifier-gain",), ("load-coulomb-friction",)])
+def test_what_is_not_at_the_load_must_be_the_same(extra):
+    known = {"k_a": 4.5, "T_f_L": 0.05}
+    with_extra = Hypothesis(ADSS, tuple(sorted(SWINGING + extra)))
+    sizes = dict(zip(["J_p", "f_p", "zeta_p"], FAR_ABOVE, strict=True)) | known
+    one = believed(with_extra.effects, [sizes[p.name] for _, p in with_extra.parameters])
+    assert is_equivalent_at_load(one, believed(tuple(sorted(HEAVY + extra))))
+    assert not is_equivalent_at_load(one, believed(HEAVY))
+
+
+def test_nothing_is_like_a_set_with_as_many_sizes():
+    assert not is_equivalent_at_load(believed(HEAVY), believed(HEAVY))
+    assert not is_equivalent_at_load(believed(BRAKED), believed(HEAVY))
+
+
+@pytest.mark.parametrize(("alike", "rivals"), [(True, []), (False, [SWINGING])])
+def test_what_says_the_same_with_more_sizes_is_no_rival_and_marked_so(monkeypatch, alike, rivals):
+    verdict = standing([(BRAKED, 0.0), (SWINGING, -10.0), ((), -300.0)])
+    payload = verdict.judged[1]
+    monkeypatch.setattr(
+        rules, "is_equivalent_at_load", lambda one, _: alike and one is payload.candidate
+    )
+    assert [one.effects for one in verdict.rivals] == rivals
+    said = ["", "equivalent, with more parameters" if alike else "", ""]
+    assert [verdict.remark(one) for one in verdict.judged] == said
+    refused = replace(payload, objection="needs a size outside its plausible range")
+    assert verdict.remark(refused) == refused.objection
+
+
+@pytest.mark.parametrize(
+    ("behind", "alike", "named"),
+    [(19.0, True, BRAKED), (21.0, True, SWINGING), (19.0, False, SWINGING)],
+)
+def test_the_simpler_of_two_that_say_the_same_is_named_where_they_tie(
+    monkeypatch, behind, alike, named
+):
+    monkeypatch.setattr(
+        rules,
+        "is_equivalent_at_load",
+        lambda one, other: alike and one.hypothesis.d > other.hypothesis.d,
+    )
+    judged = standing([(SWINGING, 0.0), (BRAKED, -behind), ((), -300.0)]).judged
+    assert rules._leader(judged).effects == named
+
+
+def standing(scores):
+    """A verdict over sets with such scores, all of them adequate."""
+    judged = tuple(
+        rules.Judged(believed(effects), SimpleNamespace(missed=0.8), score, 0.0, 0.0, 0.0, "")
+        for effects, score in scores
+    )
+    return rules.Verdict("explained", judged[0], judged, judged[-1])

@@ -1,0 +1,112 @@
+"""Whether a measurement looks like a hypothesis' own runs, in a world whose answers are known."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from synthetic import candidate, observation, read, shape
+
+from analysis.checking import goodness_of_fit as adequacy
+from analysis.checking.goodness_of_fit import judge_adequacy
+
+TRUE = ("load-inertia",)
+
+
+def seen(effects, seed):
+    return observation(read(effects, np.array([0.5, 0.5]), np.random.default_rng(seed)))
+
+
+@pytest.mark.parametrize(
+    ("missed", "share", "alike", "asked"),
+    [(0.1, 0.0, True, 1), (0.1, 0.03, True, 2), (9.0, 0.0, False, 48), (0.1, 1.0, False, 48)],
+)
+def test_own_runs_are_asked_about_other_levels_until_they_decide(
+    missed, share, alike, asked, monkeypatch
+):
+    """Own runs miss other levels by one standard deviation or so: never by 0.1 or 9."""
+    count, held_out = [], adequacy.hold_out_surface
+    monkeypatch.setattr(
+        adequacy, "hold_out_surface", lambda *given: count.append(1) or held_out(*given)
+    )
+    own = candidate(seen(TRUE, 2), TRUE)
+    asks = SimpleNamespace(missed=missed)
+    assert adequacy.misses_alike(own, asks, share, np.random.default_rng(0)) is alike
+    assert len(count) == asked
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_an_observation_like_own_runs_is_adequate_and_another_is_not(seed):
+    fitting = seen(TRUE, seed)
+    rng = np.random.default_rng(seed)
+    # Twelve draws of about a standard normal: above 3.5 once in 400 of such tests.
+    assert judge_adequacy(candidate(fitting, TRUE, seed), rng).sigma < 3.5
+    odd = observation(fitting.values + 0.3 * shape(77))
+    assert judge_adequacy(candidate(odd, TRUE, seed), rng).sigma > 4.0
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_misfit_at_the_lowest_level_has_a_credit_and_at_a_higher_one_has_none(seed, monkeypatch):
+    """What is asked is the misfit at all levels, and that at all but the lowest."""
+    asked = []
+    monkeypatch.setattr(adequacy, "credited", lambda *both: asked.append(both) or -7.0)
+    fitting = seen(TRUE, seed)
+    for level in (fitting.blocks[0], fitting.blocks[-1]):
+        odd = fitting.values.copy()
+        odd[:, level] += 0.3 * shape(77)[:, level]
+        rng = np.random.default_rng(seed)
+        assert judge_adequacy(candidate(observation(odd), TRUE, seed), rng).sigma == -7.0
+    (everywhere, above_odd), (_, odd_above) = asked
+    # Of a standard normal, more or less, 3.5 is exceeded once in 4,000 draws.
+    assert above_odd < 3.5 < 4.0 < everywhere
+    assert odd_above > 4.0
+
+
+@pytest.mark.parametrize("comparable", [0, 1])
+def test_where_every_run_did_alone_what_it_did_nothing_speaks_against_the_observation(
+    comparable, monkeypatch
+):
+    """Two short sweeps of a cable at one level had no run that others did as; it was no error.
+
+    One run has no scatter, by which anything would be far off.
+    """
+    other = SimpleNamespace(log_likelihood=20.0, place=None)
+    surface = SimpleNamespace(climb=lambda *_, tries: other)
+    run = SimpleNamespace(alone=surface, place=None, seen_by=lambda surface: surface)
+    monkeypatch.setattr(adequacy, "replicates_of", lambda *_: iter((run,) * comparable))
+    one = SimpleNamespace(best=SimpleNamespace(log_likelihood=10.0, place=None), surface=surface)
+    assert adequacy.judge_adequacy(one, None) == adequacy.Adequacy(0.0, 0.0)
+    assert adequacy.judge_chance(one, one, None) == 0.0
+    assert adequacy.judge_gain(one, one, None) == (0.0, np.inf)
+
+
+@pytest.mark.parametrize(
+    ("ahead", "mean", "share", "beyond"),
+    # By chance two less to two more than a mean in this world, a standard deviation of sqrt(2).
+    [
+        (0.0, -1.0, 0.4, 1.0 / np.sqrt(2.0)),
+        (1.0, -1.0, 0.2, np.sqrt(2.0)),
+        (6.0, -1.0, 0.0, 7.0 / np.sqrt(2.0)),
+        (6.0, 4.0, 0.2, np.sqrt(2.0)),
+        # Losing by more says no more.
+        (6.0, -1.5, 0.0, 6.0 / np.sqrt(2.0) + 1.0),
+        (6.0, -99.0, 0.0, 6.0 / np.sqrt(2.0) + 1.0),
+    ],
+)
+def test_a_gain_is_held_against_what_own_runs_bring_by_chance(
+    monkeypatch, ahead, mean, share, beyond
+):
+    def standing(likelihood):
+        best = SimpleNamespace(log_likelihood=likelihood, place=None)
+        climbs = SimpleNamespace(climb=lambda place, tries: best)
+        return SimpleNamespace(best=best, surface=climbs, climb=climbs.climb)
+
+    simpler, alleged = standing(100.0), standing(100.0 + ahead)
+
+    def run(gain):
+        seen = standing(50.0 + gain)
+        return SimpleNamespace(seen_by=lambda _: seen, alone=standing(50.0), place=None)
+
+    runs = [run(gain) for gain in mean + np.arange(-2.0, 3.0)]
+    monkeypatch.setattr(adequacy, "replicates_of", lambda *_: iter(runs))
+    assert adequacy.judge_gain(simpler, alleged, None) == pytest.approx((share, beyond))
+    assert adequacy.judge_chance(simpler, alleged, None) == pytest.approx(share)

@@ -1,0 +1,180 @@
+"""What a diagnosis says in words, and in its document: each rival for what it is."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import report_makings as makings
+
+from analysis.diagnosis.diagnose import _causes
+from analysis.emulation.parameter_posterior import ParameterPosterior
+from analysis.ensemble.model import Hypothesis
+from analysis.selection import cancellation as second_thoughts
+from analysis.selection import credible_set as certainty
+from sim.unit import load_unit
+
+STIFF = ("shaft-stiffness",)
+
+
+@pytest.fixture(scope="module")
+def explained():
+    with pytest.MonkeyPatch.context() as patch:
+        return makings.diagnosis(patch, ("load-inertia",), [("load-inertia",), STIFF])
+
+
+def tied(explained, lead, objection, effects=STIFF):
+    """The same with one other set, so far ahead of what is named."""
+    best = explained.verdict.best
+    (other,) = (one for one in explained.verdict.judged if one.effects == effects)
+    other = replace(other, score=best.score + lead, probability=0.48, objection=objection)
+    judged = tuple(sorted([best, other], key=lambda one: -one.score))
+    return replace(explained, verdict=replace(explained.verdict, word="ambiguous", judged=judged))
+
+
+@pytest.mark.parametrize(
+    ("effects", "lead", "objection", "said"),
+    [
+        (STIFF, -1.0, "", ", but so may shaft-stiffness."),
+        (STIFF, 1.0, "unlike", "; shaft-stiffness is likelier, and is no explanation."),
+        ((), -17.0, "unlike", "; nothing beyond tolerance comes near, and is no explanation."),
+        ((), -30.0, "", ", but so may nothing beyond tolerance."),
+    ],
+)
+def test_a_rival_may_explain_it_too_or_is_said_not_to(explained, effects, lead, objection, said):
+    found = tied(explained, lead, objection, effects)
+    probability = found.verdict.probability
+    assert found.summary()[0].endswith(f" explains it with probability {probability:.2f}{said}")
+    assert found.to_json()["rivals"] == [
+        {
+            "causes": list(effects),
+            "probability": 0.48,
+            "remark": objection,
+            "within_tolerance": not effects,
+            "site": ["plant"] if effects else [],
+            "rival": True,
+        }
+    ]
+
+
+def test_an_answer_without_a_rival_says_how_probable_it_is(explained):
+    probability = explained.verdict.probability
+    assert explained.summary()[0].endswith(f" explains it with probability {probability:.2f}.")
+    assert explained.to_json()["causes"][0]["probability"] == pytest.approx(probability)
+
+
+@pytest.mark.parametrize(("judged", "warned"), [(STIFF, True), (("load-inertia",), False)])
+def test_the_ratio_of_a_model_that_does_not_explain_is_warned_of(monkeypatch, judged, warned):
+    found = makings.diagnosis(monkeypatch, ("load-inertia",), [judged])
+    assert (found.verdict.word == "unexplained") == warned
+    said = [t for t in found.to_json()["warnings"] if "contribution ratio is that of" in t]
+    assert len(said) == warned
+    assert all(any(text in line for line in found.summary()) for text in said)
+
+
+PAIR = ("cable-stiffness", "load-inertia")
+
+
+def known(effects, log_likelihood):
+    best = SimpleNamespace(log_likelihood=log_likelihood)
+    return SimpleNamespace(hypothesis=Hypothesis(load_unit("adss"), effects), best=best)
+
+
+@pytest.mark.parametrize(
+    ("alone", "first"),
+    [
+        ({PAIR[:1]: 20.0, PAIR[1:]: 80.0}, PAIR[1]),
+        ({PAIR[:1]: 80.0, PAIR[1:]: 20.0}, PAIR[0]),
+        # What nobody simulated alone is further behind than all that was.
+        ({PAIR[1:]: -500.0}, PAIR[1]),
+        ({PAIR[:1]: -500.0}, PAIR[0]),
+    ],
+)
+def test_the_cause_that_costs_most_to_leave_out_comes_first(alone, first):
+    pair = known(PAIR, 100.0)
+    verdict = SimpleNamespace(best=SimpleNamespace(candidate=pair), probability=0.9)
+    found = ParameterPosterior(np.array([0.4, 0.2, 0.7]), 1e-4 * np.eye(3))
+    candidates = [pair, *(known(effects, value) for effects, value in alone.items())]
+    causes = _causes(verdict, found, candidates)
+    assert [cause.effect for cause in causes] == [first, *(e for e in PAIR if e != first)]
+    values = dict(zip(PAIR, pair.hypothesis.values(found.mean), strict=True))
+    assert {cause.effect: cause.sizes[0].value for cause in causes} == pytest.approx(values)
+
+
+def as_the_datasheet(sharpened):
+    def close(unit, candidate, *_):
+        found = sharpened(unit, candidate)
+        # A load's inertia lies amid its range: half to twice of what the datasheet says.
+        return replace(found, mean=np.append(found.mean[:1], [0.53] * (len(found.mean) - 1)))
+
+    return close
+
+
+def test_a_value_that_may_be_the_datasheets_is_not_named(monkeypatch, explained):
+    """Its plain model fits no better for it: nothing explains that measurement."""
+    assert [cause.effect for cause in explained.causes] == ["load-inertia"]
+    monkeypatch.setattr(makings, "sharpened", as_the_datasheet(makings.sharpened))
+    found = makings.diagnosis(monkeypatch, ("load-inertia",), [("load-inertia",)])
+    document = found.to_json()
+    assert (document["verdict"], document["causes"]) == ("unexplained", [])
+    (line,) = (text for text in found.summary() if text.strip().endswith("from the datasheet)"))
+    assert "load-inertia" in line
+
+
+def test_what_is_left_of_several_is_sized_and_asked_the_same(monkeypatch):
+    """A part that is named in place of the whole is told by runs of its own."""
+    braked, load, asked = ("load-inertia", "load-viscous-damping"), ("load-inertia",), []
+
+    def held(verdict, found):
+        asked.append((verdict.best.effects, len(found.mean)))
+        if verdict.best.effects == load:
+            return verdict
+        part = next(one for one in verdict.judged if one.effects == load)
+        return replace(verdict, word="ambiguous", best=part, also=(verdict.best,))
+
+    monkeypatch.setattr(makings.diagnosis_module, "compare_with_datasheet", held)
+    found = makings.diagnosis(monkeypatch, braked, [braked, load])
+    assert asked == [(braked, 3), (load, 2)]
+    document = found.to_json()
+    assert [cause["effect"] for cause in document["causes"]] == [*load]
+    assert [*braked] in [rival["causes"] for rival in document["rivals"]]
+
+
+@pytest.mark.parametrize(("left", "named"), [(0.5, False), (0.9, True)])
+def test_causes_that_undo_one_another_are_not_named(monkeypatch, left, named):
+    """An operator is told which, and what to do; the ratio is not that of such a tale."""
+    monkeypatch.setattr(second_thoughts, "cancellation_ratio", lambda *_: left)
+    braked = ("load-inertia", "load-viscous-damping")
+    found = makings.diagnosis(monkeypatch, braked, [braked])
+    document = found.to_json()
+    told = [text for text in document["warnings"] if "each alone takes the model" in text]
+    assert bool(document["causes"]) == named
+    assert (found.ratio_extended == found.ratio_baseline) != named
+    if named:
+        assert (document["verdict"], told) == ("explained", [])
+        return
+    assert document["verdict"] == "unexplained"
+    (warning,) = told
+    assert "load-inertia and load-viscous-damping would" in warning
+    assert any(warning in line for line in found.summary())
+    assert any("cancel each other" in line for line in found.summary())
+
+
+@pytest.mark.parametrize(("asked", "word"), [(0.0, "explained"), (2.0, "ambiguous")])
+def test_what_shares_the_probability_is_told_as_a_rival(monkeypatch, asked, word):
+    monkeypatch.setattr(certainty, "_SURE", asked)
+    found = makings.diagnosis(monkeypatch, ("load-inertia",), [("load-inertia",), STIFF])
+    document = found.to_json()
+    assert document["verdict"] == word
+    assert [cause["effect"] for cause in document["causes"]] == ["load-inertia"]
+    assert bool(found.verdict.rivals) == (word == "ambiguous")
+
+
+@pytest.mark.parametrize("asked", [0.0, 2.0])
+def test_what_shares_the_probability_does_not_keep_a_value_that_may_be_the_datasheets(
+    monkeypatch, asked
+):
+    monkeypatch.setattr(certainty, "_SURE", asked)
+    monkeypatch.setattr(makings, "sharpened", as_the_datasheet(makings.sharpened))
+    found = makings.diagnosis(monkeypatch, ("load-inertia",), [("load-inertia",), PAIR])
+    assert found.to_json()["causes"] == []

@@ -1,0 +1,63 @@
+import numpy as np
+import pytest
+
+from analysis.ensemble.model import Hypothesis
+from analysis.ensemble.runs import Group, simulate_groups
+from analysis.observation.observation import unread
+from daq.errors import AnalysisError
+from daq.plan import SweepPlan
+from sim.unit import load_unit
+
+ADSS = load_unit("adss")
+SHORT = SweepPlan((120.0, 140.0), (2.0,), settle_cycles=1, integrate_cycles=2)
+RATIOS = np.linspace(0.2, 0.8, 3)
+
+
+def runs(groups, seed=0):
+    return simulate_groups(ADSS, groups, unread(SHORT, 1e-4), np.random.default_rng(seed))
+
+
+def test_runs_are_kept_by_hypothesis_with_their_places():
+    inertia = Hypothesis(ADSS, ("load-inertia",))
+    groups = [Group(Hypothesis(ADSS), RATIOS, np.empty(0)), Group(inertia, RATIOS, np.array([0.6]))]
+    found = runs(groups)
+    assert found[()].places.shape == (3, 1)
+    np.testing.assert_array_equal(found[("load-inertia",)].places[:, 1], 0.6)
+    assert found[()].mean.shape == found[()].variance.shape == (3, 2)
+    # Another load must show.
+    assert np.abs(found[()].mean - found[("load-inertia",)].mean).min() > 1e-5
+
+
+def test_no_groups_are_no_runs():
+    assert runs([]) == {}
+
+
+def test_neighbouring_groups_deviate_in_opposite_ways_by_one_tolerance():
+    found = runs([Group(Hypothesis(ADSS), RATIOS, np.empty(0))] * 14)
+    off = found[()].deviations[:: len(RATIOS)]
+    np.testing.assert_allclose(off[::2], -off[1::2])
+    np.testing.assert_allclose(np.abs(off), np.full((14, 5), 0.005))
+    # Seven pairs tell five slopes apart.
+    assert np.linalg.cond(off) < 3.0
+
+
+def test_the_same_seed_gives_the_same_runs():
+    groups = [Group(Hypothesis(ADSS), RATIOS, np.empty(0))]
+    np.testing.assert_array_equal(runs(groups)[()].mean, runs(groups)[()].mean)
+
+
+def test_a_step_too_long_is_halved_before_giving_up(monkeypatch):
+    import sim.response as module
+
+    steps = []
+
+    def fussy(servos, plan, steps_s, *told):
+        steps.append(steps_s)
+        raise AnalysisError("grew without bound")
+
+    monkeypatch.setattr(module, "_sweep", fussy)
+    with pytest.raises(AnalysisError):
+        runs([Group(Hypothesis(ADSS), RATIOS, np.empty(0))])
+    # Lots of one group may be stepped side by side.
+    assert steps[0] == (1e-5, 5e-6, 2.5e-6)
+    assert sorted(set(steps)) == [(2.5e-6,), (5e-6, 2.5e-6), (1e-5, 5e-6, 2.5e-6)]

@@ -1,0 +1,101 @@
+"""Work between simulations on several cores: all of it, in order, and nothing after an error."""
+
+from threading import Barrier, current_thread, main_thread
+from time import sleep
+
+import numpy as np
+import pytest
+from synthetic import candidate, observation, read
+
+from analysis.checking.cross_validation import hold_out
+from analysis.checking.goodness_of_fit import judge_adequacy, judge_gain
+from analysis.execution import executor
+from analysis.execution.executor import side_by_side
+
+
+@pytest.fixture
+def two_cores(monkeypatch):
+    monkeypatch.setattr(executor, "_cores", lambda: 2)
+
+
+def test_two_pieces_of_work_are_done_at_once_and_come_back_in_order(two_cores):
+    both = Barrier(2, timeout=20.0)
+
+    def work(number):
+        # Neither gets past this alone.
+        both.wait()
+        return 10 * number
+
+    assert side_by_side(work, iter(range(6))) == [0, 10, 20, 30, 40, 50]
+
+
+def test_one_piece_of_work_is_done_here(two_cores):
+    assert side_by_side(lambda _: current_thread(), [1]) == [main_thread()]
+    assert side_by_side(lambda _: pytest.fail("asked"), []) == []
+
+
+def test_one_core_does_all_of_it_here(monkeypatch):
+    monkeypatch.setattr(executor, "_cores", lambda: 1)
+    assert side_by_side(lambda _: current_thread(), [1, 2]) == [main_thread()] * 2
+
+
+def test_an_error_ends_the_whole_and_what_has_not_begun_is_dropped(two_cores):
+    begun = []
+
+    def work(number):
+        begun.append(number)
+        if number == 0:
+            raise ZeroDivisionError(number)
+        # All of it would take seconds: enough for the error to be heard long before.
+        sleep(0.01)
+
+    with pytest.raises(ZeroDivisionError):
+        side_by_side(work, range(500))
+    assert len(begun) < 500
+
+
+def test_work_may_share_out_its_own(two_cores):
+    def work(number):
+        return sum(side_by_side(lambda other: number * other, range(4)))
+
+    assert side_by_side(work, range(5)) == [0, 6, 12, 18, 24]
+
+
+def test_many_cores_are_not_all_taken_where_the_interpreter_would_be_waited_for(monkeypatch):
+    taken = []
+    monkeypatch.setattr(executor, "_cores", lambda: 64)
+    monkeypatch.setattr(
+        executor, "LocalExecutor", lambda cores: taken.append(cores) or executor_of_one()
+    )
+    assert side_by_side(str, range(3)) == ["0", "1", "2"]
+    assert taken == [4]
+
+
+def executor_of_one():
+    class One:
+        def each(self, work, tasks):
+            return [work(task) for task in tasks]
+
+    return One()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_judged_does_not_depend_on_the_cores(monkeypatch, seed):
+    """To the last bit: all that is drawn is drawn before the work is shared out."""
+    cause = ("load-inertia",)
+    seen = observation(read(cause, np.array([0.55, 0.4]), np.random.default_rng(seed)))
+    found = []
+    for cores in (1, 2, 3):
+        monkeypatch.setattr(executor, "_cores", lambda cores=cores: cores)
+        one, plain = candidate(seen, cause, seed), candidate(seen, (), seed)
+        held_out = hold_out(one, seen)
+        found.append(
+            (
+                one.best.log_likelihood,
+                judge_adequacy(one, np.random.default_rng(seed)),
+                judge_gain(plain, one, np.random.default_rng(seed)),
+                held_out.score,
+                held_out.residual.tolist(),
+            )
+        )
+    assert found[0] == found[1] == found[2]

@@ -1,0 +1,42 @@
+"""The bookkeeping of runs and candidates, where everything but the simulations is real."""
+
+import numpy as np
+import pytest
+import synthetic
+import synthetic_runs
+
+from analysis.inference.model_pool import ModelPool
+
+LOAD = ("load-inertia",)
+
+
+@pytest.fixture
+def looking(runs):
+    """A hunt for a load of a known inertia, with nothing simulated yet."""
+
+    def begun(seed):
+        rng = np.random.default_rng(seed)
+        return ModelPool(synthetic.ADSS, synthetic_runs.observed(LOAD, [0.8], rng), rng, None, None)
+
+    return begun
+
+
+def test_a_look_close_about_a_place_stays_there(looking):
+    hunt = looking(1)
+    key, place = ("amplifier-lag", "load-inertia"), np.array([0.4, 0.5, 0.8])
+    hunt.simulate_about({key: (place, (0.1, 0.02))}, 3)
+    assert np.all(abs(hunt.found[key].population.places - place) <= [0.1, 0.02, 0.02])
+    assert (len(hunt.found), hunt.best) == (1, hunt.found[key])
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_further_runs_close_in_on_what_is_there(looking, seed):
+    hunt = looking(seed)
+    reach = (0.3, 0.3)
+    hunt.simulate_about({LOAD: (np.array([0.55, 0.6]), reach), (): (np.array([0.5]), reach)}, 6)
+    for _ in range(2):
+        hunt.simulate_around_estimate([LOAD, ()], 6)
+    assert hunt.leading(5) == [LOAD, ()]
+    assert hunt.leading(5, 20.0) == [LOAD]
+    assert len(hunt.found[LOAD].population) == 5 * 18
+    assert hunt.best.best.place == pytest.approx([0.4, 0.8], abs=0.05)

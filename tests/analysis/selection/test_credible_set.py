@@ -1,0 +1,108 @@
+"""What is named without a rival is believed, and is not three causes that fit nearly anything."""
+
+from types import SimpleNamespace
+
+import pytest
+from synthetic import ADSS
+
+from analysis.ensemble.model import Hypothesis
+from analysis.selection.credible_set import require_credible_set
+from analysis.selection.verdict import NO_GAIN, Judged, Verdict
+
+BRAKE, SHAFT, LOAD = "load-viscous-damping", "shaft-stiffness", "load-inertia"
+
+
+def standing(effects, probability, objection=""):
+    candidate = SimpleNamespace(hypothesis=Hypothesis(ADSS, effects))
+    return Judged(candidate, None, 100.0 * probability, 0.0, 0.0, probability, objection)
+
+
+def told(best, *others, word="explained"):
+    ranked = sorted([best, *others], key=lambda one: -one.probability)
+    baseline = standing((), 0.0)
+    return Verdict(word, best, (*ranked, baseline), baseline)
+
+
+@pytest.fixture(autouse=True)
+def alike(monkeypatch):
+    """Likeness is not asked of what has no surface, nor who is near: that has tests of its own."""
+    same = set()
+    monkeypatch.setattr(Verdict, "is_equivalent", lambda _, one: one.effects in same)
+    monkeypatch.setattr(
+        Verdict,
+        "probability",
+        property(
+            lambda self: (
+                self.best.probability
+                + sum(
+                    one.probability for one in self.judged if one.effects in same or self.holds(one)
+                )
+            )
+        ),
+    )
+    monkeypatch.setattr(Verdict, "_is_rival", lambda *_: False)
+    return same
+
+
+def rivals(verdict):
+    return [one.effects for one in verdict.rivals]
+
+
+@pytest.mark.parametrize(("believed", "word"), [(0.951, "explained"), (0.949, "ambiguous")])
+@pytest.mark.parametrize("objection", ["", "leaves structure", "too improbable to be checked"])
+def test_what_shares_more_than_a_twentieth_is_a_rival_refused_or_not(believed, word, objection):
+    verdict = told(standing((LOAD,), believed), standing((SHAFT,), 1.0 - believed, objection))
+    held = require_credible_set(verdict)
+    assert held.word == word
+    assert held.best is verdict.best
+    assert rivals(held) == ([(SHAFT,)] if word == "ambiguous" else [])
+
+
+def test_a_further_cause_that_does_no_better_is_no_rival():
+    """What is named is there in both; whether there is more is told as what is not seen."""
+    verdict = told(standing((LOAD,), 0.7), standing((BRAKE, LOAD), 0.3))
+    held = require_credible_set(verdict)
+    assert (held.word, rivals(held)) == ("explained", [])
+    assert held.probability == pytest.approx(1.0)
+
+
+def test_what_leads_though_it_is_refused_is_a_rival():
+    verdict = told(standing((LOAD,), 0.4), standing((BRAKE, LOAD), 0.6, "leaves structure"))
+    held = require_credible_set(verdict)
+    assert (held.word, held.best.effects) == ("ambiguous", (LOAD,))
+    assert rivals(held) == [(BRAKE, LOAD)]
+
+
+def test_no_more_are_rivals_than_hold_nearly_all_that_is_believed():
+    others = [standing((effect,), p) for effect, p in ((SHAFT, 0.3), (BRAKE, 0.06))]
+    least = standing(("cable-stiffness",), 0.04)
+    verdict = told(standing((LOAD,), 0.6), *others, least)
+    assert rivals(require_credible_set(verdict)) == [(SHAFT,), (BRAKE,)]
+
+
+def test_what_has_not_earned_its_name_takes_nothing_away():
+    verdict = told(standing((LOAD,), 0.79), standing((BRAKE, LOAD), 0.21, NO_GAIN))
+    assert require_credible_set(verdict) is verdict
+
+
+def test_what_says_the_same_counts_for_the_best(alike):
+    verdict = told(standing((LOAD,), 0.5), standing(("payload-flexibility",), 0.5))
+    assert require_credible_set(verdict).word == "ambiguous"
+    alike.add(("payload-flexibility",))
+    assert require_credible_set(verdict) is verdict
+
+
+@pytest.mark.parametrize("word", ["consistent", "ambiguous", "unexplained"])
+def test_only_what_is_named_for_sure_is_asked(word):
+    verdict = told(standing((LOAD,), 0.5), standing((SHAFT,), 0.5), word=word)
+    assert require_credible_set(verdict) is verdict
+
+
+def test_three_causes_are_never_named_without_their_best_part():
+    """Three of the chain, of friction and of play made up for a tachometer's gain, with 1.00."""
+    three, part = (BRAKE, LOAD, SHAFT), standing((BRAKE, SHAFT), 1e-9, "leaves structure")
+    verdict = told(standing(three, 1.0), part, standing((BRAKE,), 1e-12))
+    held = require_credible_set(verdict)
+    assert (held.word, rivals(held)) == ("ambiguous", [(BRAKE, SHAFT)])
+    # Where no part was looked at it is the plain model.
+    assert rivals(require_credible_set(told(standing(three, 1.0)))) == [()]

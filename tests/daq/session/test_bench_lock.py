@@ -1,0 +1,91 @@
+"""One session at a time on one bench, by whatever name its history is called."""
+
+import os
+
+import pytest
+
+from daq.errors import InputError, MeasurementError
+from daq.session.bench_lock import BenchLock
+
+
+def test_links_to_one_history_are_one_bench(tmp_path):
+    history = tmp_path / "bench.db"
+    history.touch()
+    (tmp_path / "elsewhere").mkdir()
+    link = tmp_path / "elsewhere" / "link.db"
+    link.symlink_to(history)
+    for first, second in ((history, link), (link, history)):
+        with (
+            BenchLock(first),
+            pytest.raises(MeasurementError, match=rf"process {os.getpid()}\) is measuring"),
+        ):
+            BenchLock(second)
+    with BenchLock(link):
+        assert (tmp_path / "bench.db-lock").exists()
+    assert sorted(path.name for path in tmp_path.rglob("*-lock")) == []
+
+
+def test_a_link_to_a_history_that_is_still_to_be_made_is_that_bench(tmp_path):
+    history = tmp_path / "bench.db"
+    link = tmp_path / "link.db"
+    link.symlink_to(history)
+    with BenchLock(link), pytest.raises(MeasurementError, match="another session"):
+        BenchLock(history)
+
+
+def test_two_histories_are_two_benches(tmp_path):
+    with BenchLock(tmp_path / "one.db"), BenchLock(tmp_path / "two.db"):
+        pass
+
+
+def test_a_lock_that_cannot_be_made_is_told(tmp_path):
+    with pytest.raises(InputError, match="lock cannot be made"):
+        BenchLock(tmp_path / "nowhere" / "bench.db")
+
+
+@pytest.mark.parametrize("kind", ["link", "hard link", "text", "folder", "pipe"])
+def test_what_is_no_lock_of_ours_is_left_as_it_is(tmp_path, kind):
+    theirs, place = tmp_path / "colleague.txt", tmp_path / "bench.db-lock"
+    theirs.write_text("the colleague's results")
+    if kind == "link":
+        place.symlink_to(theirs)
+    elif kind == "hard link":
+        place.hardlink_to(theirs)
+    elif kind == "text":
+        place.write_text("28617 is what I measured")
+    elif kind == "folder":
+        place.mkdir()
+    else:
+        os.mkfifo(place)
+    before = place.lstat()
+    with pytest.raises(InputError, match=r"is no lock of lashbench.*move it away") as told:
+        BenchLock(tmp_path / "bench.db", patience_s=0.2)
+    assert str(place) in str(told.value)
+    assert theirs.read_text() == "the colleague's results"
+    assert place.lstat() == before
+
+
+def test_a_link_to_nothing_makes_no_file(tmp_path):
+    (tmp_path / "bench.db-lock").symlink_to(tmp_path / "new")
+    with pytest.raises(InputError, match="is a link"):
+        BenchLock(tmp_path / "bench.db")
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize("left", ["", "999999999\n"])
+def test_a_lock_that_was_left_is_taken_over(tmp_path, left):
+    (tmp_path / "bench.db-lock").write_text(left)
+    with BenchLock(tmp_path / "bench.db", patience_s=0.2):
+        assert (tmp_path / "bench.db-lock").read_text() == f"{os.getpid()}\n"
+
+
+def test_a_full_disk_is_told_and_leaves_no_lock(tmp_path, small_disk):
+    (small_disk / "filler").write_bytes(bytes(64 << 10))
+    with pytest.raises(MeasurementError, match=r"bench\.db-lock: .*No space left.*make room"):
+        BenchLock(small_disk / "bench.db")
+    assert [path.name for path in small_disk.iterdir()] == ["filler"]
+
+
+def test_a_name_that_is_too_long_is_told(tmp_path):
+    with pytest.raises(InputError, match=r"lock cannot be made \(File name too long\)"):
+        BenchLock(tmp_path / ("x" * 250 + ".db"))

@@ -1,0 +1,95 @@
+"""The dialog in which what was said of a stored measurement is corrected.
+
+Owns its fields. What may be corrected, and that the old values stay, is the history's part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Horizontal, Vertical
+from textual.screen import ModalScreen
+
+from daq.store_records import CORRECTABLE
+from daq.untrusted.visible_text import visible_line
+from tui.app.widgets.plain import Caption, Field, Words
+
+__all__ = ["CorrectionDialog"]
+
+_LABELS = {"serial": "serial number", "operator": "operator", "notes": "notes"}
+
+
+class CorrectionDialog(ModalScreen[tuple[str, dict[str, str]] | None]):
+    """Asks for new values and who gives them; None where nothing is to be corrected.
+
+    Parameters
+    ----------
+    measurement
+        Identifier, for the heading.
+    values
+        What stands there now.
+    person
+        Who is likely to correct.
+    """
+
+    BINDINGS = [
+        Binding("escape", "leave", "Leave it", priority=True),
+        Binding("enter", "take", "Correct it", priority=True),
+    ]
+
+    DEFAULT_CSS = """
+    CorrectionDialog { align: center middle; }
+    CorrectionDialog > #dialog {
+        width: 70; max-width: 96%; height: auto;
+        border: round $accent; background: $surface; padding: 0 1;
+    }
+    CorrectionDialog Caption { width: 18; }
+    CorrectionDialog Field { width: 1fr; }
+    CorrectionDialog #fault { color: $text-error; height: auto; }
+    """
+
+    def __init__(self, measurement: int, values: Mapping[str, Any], person: str) -> None:
+        super().__init__()
+        self._measurement, self._person = measurement, person
+        self._values = {name: str(values[name]) for name in CORRECTABLE}
+
+    def compose(self) -> ComposeResult:
+        """A line per field."""
+        with Vertical(id="dialog"):
+            yield Words(f"Correct measurement {self._measurement}", classes="heading")
+            for name, value in self._values.items():
+                with Horizontal(classes="field"):
+                    yield Caption(_LABELS[name])
+                    yield Field(visible_line(value), id=f"correct-{name}", compact=True)
+            with Horizontal(classes="field"):
+                yield Caption("corrected by")
+                yield Field(visible_line(self._person), id="correct-person", compact=True)
+            yield Words("", id="fault")
+            yield Words("Enter corrects it, Esc leaves it, Tab goes on; old values are kept")
+
+    def action_leave(self) -> None:
+        """Close without a change."""
+        self.dismiss(None)
+
+    def action_take(self) -> None:
+        """Read the fields; stay where one is wrong."""
+        person = self._text("person")
+        changes = {
+            name: self._text(name)
+            for name, value in self._values.items()
+            # What came from a history is shown with escapes, and stays unless it is changed.
+            if self._text(name) != visible_line(value).strip()
+        }
+        fault = "" if person else "say who corrects it"
+        for name, value in {"corrected by": person, **changes}.items():
+            fault = fault if value.isprintable() else f"{name} is not one line of text"
+        if fault:
+            self.query_one("#fault", Words).update(fault)
+            return
+        self.dismiss((person, changes) if changes else None)
+
+    def _text(self, name: str) -> str:
+        return self.query_one(f"#correct-{name}", Field).value.strip()

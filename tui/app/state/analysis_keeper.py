@@ -1,0 +1,116 @@
+"""Beginning and giving up analyses for the application, and where their results go.
+
+Owns how far each analysis is and whom its result concerns. It draws nothing;
+what people must know it hands to the application.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from daq.errors import LashbenchError
+from tui.app.state.analyses import Analyses, Task, diagnose, read_result, write_report
+from tui.app.state.desk import Results
+
+if TYPE_CHECKING:
+    from tui.app import messages
+    from tui.app.application import BenchApp
+
+__all__ = ["AnalysisKeeper"]
+
+
+class AnalysisKeeper:
+    """The analyses of one application.
+
+    Parameters
+    ----------
+    app
+        Whose workers run them and whose desk takes the results.
+    analyses
+        What is called.
+    """
+
+    def __init__(self, app: BenchApp, analyses: Analyses) -> None:
+        self._app = app
+        self._analyses = analyses
+        self._given_up = threading.Event()
+        self.progress: dict[str, tuple[float, str]] = {}
+        """How far each is and what it does, by job; none that is over."""
+
+    def begin(self, job: messages.Job, path: Path | None = None) -> None:
+        """Begin an analysis of the measurement in view, unless it runs already."""
+        desk = self._app.desk
+        if job in self.progress or desk.measurement is None or desk.unit is None:
+            return
+        post = self._app.post_message
+        task = Task(post, desk.db, desk.measurement, desk.unit, self._given_up,
+                    desk.results.as_is)  # fmt: skip
+        works: dict[str, Callable[[], None]] = {
+            "result": partial(read_result, task, self._analyses),
+            "diagnosis": partial(diagnose, task, self._analyses),
+            "report": partial(
+                write_report, task, self._analyses,
+                desk.results.diagnosis, path or Path("report.html"),
+            ),
+        }  # fmt: skip
+        desk.results.faults.pop(job, None)
+        self.progress[job] = (0.0, "")
+        self._app.run_worker(works[job], thread=True, group=job, name=job, exit_on_error=False)
+
+    def view(self, measurement: int | None) -> None:
+        """Make a measurement the one that results are about; work on another is given up."""
+        self.give_up()
+        self._given_up = threading.Event()
+        self.progress.clear()
+        self._app.desk.measurement, self._app.desk.results = measurement, Results()
+
+    def give_up(self) -> None:
+        """End what runs, at its next word."""
+        self._given_up.set()
+
+    # ------------------------------------------------------------ told by the workers
+
+    def progressed(self, message: messages.AnalysisProgressed) -> None:
+        """Remember how far it is."""
+        if message.job in self.progress:
+            self.progress[message.job] = (message.fraction, message.text)
+
+    def done(self, message: messages.AnalysisDone) -> None:
+        """Put the result on the desk, if it is about the measurement in view."""
+        desk = self._app.desk
+        if message.measurement != desk.measurement:
+            return
+        if message.job == "result" and isinstance(message.result, tuple):
+            # The first part of two: features come before the estimate.
+            desk.results.response, desk.results.features = message.result
+            return
+        if message.job == "stored diagnosis":
+            # One that is made meanwhile, or was made, goes before it.
+            if desk.results.diagnosis is None and "diagnosis" not in self.progress:
+                desk.results.diagnosis = message.result
+            return
+        self.progress.pop(message.job, None)
+        if message.job == "result":
+            desk.results.estimate = message.result
+        elif message.job == "diagnosis":
+            desk.results.diagnosis = message.result
+            self._app.notify("diagnosis done: step 6")
+        elif message.job == "report":
+            desk.results.report = message.result
+            self._app.notify(f"report written: {message.result}", timeout=10)
+
+    def failed(self, message: messages.AnalysisFailed) -> None:
+        """Say why, and leave the rest as it is."""
+        if message.measurement != self._app.desk.measurement:
+            return
+        self.progress.pop(message.job, None)
+        error = message.error
+        text = str(error)
+        if not isinstance(error, LashbenchError):
+            text = f"internal fault ({type(error).__name__}). {self._app.log_words}"
+        self._app.desk.results.faults[message.job] = text
+        self._app.notify(f"{message.job}: {text}", severity="error", timeout=10)

@@ -1,0 +1,289 @@
+"""What the operator has on the desk: unit, instrument, plan, the measurement in view, its results.
+
+Owns these choices and how they become a session request. It opens no
+instrument, draws nothing and decides nothing about a measurement.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from daq.drivers import is_simulated
+from daq.errors import InputError
+from tui.app.run_view import RunView
+from tui.measure_options import PlanOptions
+from tui.measurements.follow_up import following
+
+if TYPE_CHECKING:
+    from analysis.resonance.records import LevelFeatures
+    from daq.analyser import Identity
+    from daq.frf import FrequencyResponse
+    from daq.plan import SweepPlan
+    from daq.session_request import SessionRequest
+    from daq.store_records import Measurement
+    from sim.unit import Unit
+
+__all__ = ["Desk", "Results", "plan_of_document"]
+
+SIMULATED_URL = "sim:?ratio=0.3&seed=1"
+"""The simulated bench that is offered first."""
+
+_WITHOUT_RECIPE = PlanOptions((2.0,), 50.0, 250.0, 81)
+"""The sweep that is offered for a unit without a recipe of its own."""
+
+
+@dataclass(slots=True)
+class Results:
+    """What analyses said of the measurement in view; None where not asked or not there yet."""
+
+    response: FrequencyResponse | None = None
+    features: tuple[LevelFeatures, ...] = ()
+    estimate: Mapping[str, Any] | None = None
+    """The document of ``estimate --json``."""
+    diagnosis: Any = None
+    """With ``to_json()`` and ``summary()``."""
+    report: Path | None = None
+    """Where the report was written."""
+    faults: dict[str, str] = field(default_factory=dict)
+    """Why an analysis gave nothing, by job."""
+    as_is: bool = False
+    """Whether it is taken as it stands, also if it looks like a mistake."""
+
+
+@dataclass(slots=True)
+class Desk:
+    """Everything chosen so far.
+
+    Parameters
+    ----------
+    db
+        File of the bench's history; made by the first session if it is not there.
+    """
+
+    db: Path
+    unit_name: str = ""
+    """Name or path that `unit` was chosen by, or of which measurement it is."""
+    unit: Unit | None = None
+    unit_origin: str = ""
+    """Which one it is, where it is none of those that come with lashbench."""
+    unit_text: str | None = None
+    """The file of a unit that came from the history and has no name or path."""
+    serial: str = ""
+    operator: str = ""
+    notes: str = ""
+    url: str = SIMULATED_URL
+    identity: Identity | None = None
+    """Who answered at `url`; None until someone did."""
+    link_fault: str = ""
+    """Why nobody did."""
+    options: PlanOptions = PlanOptions()
+    """What the operator says of the sweep; the rest is the recipe's."""
+    given_plan: SweepPlan | None = None
+    """A plan that came whole, from a diagnosis; it goes before `options`."""
+    follows: int | None = None
+    """The measurement whose diagnosis proposed `given_plan`, if that is where it came from."""
+    resume: int | None = None
+    run: RunView = field(default_factory=RunView)
+    measurement: int | None = None
+    """The measurement that results, diagnosis and report are about."""
+    results: Results = field(default_factory=Results)
+    reference: FrequencyResponse | None = None
+    """Response of an earlier session, drawn behind the one in hand."""
+    reference_name: str = ""
+
+    @property
+    def remarks_of(self) -> int | None:
+        """The measurement that serial number, operator and notes are of already: it keeps them."""
+        return (self.run.measurement if self.run.live else None) or self.resume
+
+    @property
+    def simulated(self) -> bool:
+        """Whether the instrument is a simulated one, as far as is known."""
+        return is_simulated(self.url) or (self.identity is not None and self.identity.simulated)
+
+    def choose_unit(self, name: str) -> Unit:
+        """Put a unit on the desk, with the sweep that goes with it.
+
+        Raises
+        ------
+        ConfigurationError
+            If there is none of that name or path; the one before stays.
+        """
+        from sim.unit import load_unit
+
+        unit = load_unit(name)
+        self.take_unit(name, unit)
+        return unit
+
+    def take_unit(self, name: str, unit: Unit) -> None:
+        """Put a unit on the desk that was read by its name or path."""
+        from daq.configs import config_names
+
+        shipped = name.lower() in config_names("units")
+        self._put(name.lower() if shipped else name, unit, None)
+
+    def begin_anew(self) -> None:
+        """What was to be gone on with is left; the next session is a measurement of its own."""
+        if self.resume is not None:
+            self.resume = self.given_plan = None
+
+    def take_up(self, measurement: Measurement) -> str:
+        """Put the measurement that is to be resumed on the desk, with unit and address.
+
+        What to say of remarks that it overwrites, as `take_remarks`.
+        """
+        typed = self.serial
+        self.choose_unit_of(measurement)
+        self.serial = typed
+        lost = self.take_remarks(measurement)
+        header = measurement.header
+        self.url, self.identity = header.address, None
+        self.resume, self.given_plan = measurement.id, header.plan
+        return lost
+
+    def take_remarks(self, measurement: Measurement) -> str:
+        """Put serial number, operator and notes of a measurement on the desk: it keeps them.
+
+        What to say of those that are overwritten; empty where there are none.
+        """
+        lost = []
+        for name in ("serial", "operator", "notes"):
+            value = getattr(measurement.header, name)
+            if getattr(self, name) not in ("", value):
+                lost.append(name)
+            setattr(self, name, value)
+        if not lost:
+            return ""
+        return (
+            f"measurement {measurement.id} keeps its own {' and '.join(lost)}; yours were left out"
+        )
+
+    def choose_unit_of(self, measurement: Measurement) -> None:
+        """Put the unit of a stored measurement on the desk, as its file was then.
+
+        Raises
+        ------
+        ConfigurationError
+            As `tui.measurements.reports.unit_as_measured`; the one before stays.
+        """
+        from daq.configs import config_names
+        from sim.unit import load_unit
+        from tui.measurements.reports import unit_as_measured
+
+        header, unit = measurement.header, unit_as_measured(measurement)
+        name = header.unit.lower()
+        if name in config_names("units") and unit == load_unit(name):
+            self._put(name, unit, None)
+        else:
+            # Another file of that name may have other numbers: they are this measurement's.
+            text = header.configurations["unit"]
+            self._put(f"unit of measurement {measurement.id}", unit, text)
+        self.serial = header.serial
+
+    def _put(self, name: str, unit: Unit, text: str | None) -> None:
+        """Another unit has a sweep of its own."""
+        from daq.configs import config_names
+        from tui.measurements.unit_differences import origin_words
+
+        if name != self.unit_name:
+            self.options, self.given_plan, self.resume = PlanOptions(), None, None
+        self.unit_name, self.unit, self.unit_text = name, unit, text
+        shipped = text is None and name in config_names("units")
+        self.unit_origin = "" if shipped else origin_words(unit, name)
+
+    @property
+    def recipe(self) -> str | None:
+        """The recipe that comes with lashbench for this unit, if there is one."""
+        from daq.configs import config_names
+
+        return self.unit_name if self.unit_name in config_names("recipes") else None
+
+    def request(self, remeasure_hz: tuple[float, float] | None = None) -> SessionRequest:
+        """What the next session is to do, checked against all limits.
+
+        Raises
+        ------
+        InputError, LimitError
+            As `tui.measure_options.session_request`; nothing was sent.
+        """
+        from daq.drivers import check_sweep
+        from daq.limits import check_plan
+        from tui.measure_options import session_request
+
+        if self.unit is None:
+            raise InputError("no unit is chosen; choose one in step 1")
+        fresh = self.resume is None
+        # A plan that came whole is no recipe's, so a recipe's limits are not its limits.
+        recipe = self.recipe if fresh and self.given_plan is None else None
+        options = self._options() if fresh else PlanOptions()
+        request = session_request(
+            options, self.unit_name, self.unit, self.url, self.db,
+            recipe=recipe, bench="default",
+            resume=self.resume, remeasure=remeasure_hz, run_in=None,
+            remarks={"serial": self.serial, "operator": self.operator, "notes": self.notes},
+            unit_text=self.unit_text,
+        )  # fmt: skip
+        if fresh and self.given_plan is not None and request.header is not None:
+            check_plan(self.given_plan, request.limits)
+            slew, ranges = request.slew_vpk_per_s, request.input_range_vpk
+            check_sweep(self.url, self.given_plan, slew, ranges)
+            header = replace(request.header, plan=self.given_plan)
+            if self.follows is not None:
+                header = following(header, self.follows)
+            request = replace(request, header=header)
+        return request
+
+    def plan(self) -> SweepPlan:
+        """The sweep that the next session would make.
+
+        Raises
+        ------
+        InputError, LimitError
+            If there is none that may be driven.
+        """
+        if self.given_plan is not None:
+            return self.given_plan
+        header = self.request().header
+        if header is None:
+            raise InputError("no plan; choose a unit in step 1")
+        return header.plan
+
+    def _options(self) -> PlanOptions:
+        if self.given_plan is not None:
+            plan = self.given_plan
+            lowest, highest = min(plan.frequencies_hz), max(plan.frequencies_hz)
+            return PlanOptions(plan.levels_vpk, lowest, highest, len(plan.frequencies_hz))
+        if self.options.given or self.recipe is not None:
+            return self.options
+        return _WITHOUT_RECIPE
+
+
+def plan_of_document(document: Mapping[str, Any]) -> SweepPlan:
+    """The sweep plan in a diagnosis' ``next_measurement``.
+
+    Takes the fields of `daq.plan.SweepPlan`, or a band by ``start_hz``,
+    ``stop_hz``, ``points`` and ``spacing`` in place of the frequencies.
+
+    Raises
+    ------
+    InputError
+        If it is no plan.
+    """
+    from daq.plan import SweepPlan, spaced_frequencies
+
+    values = dict(document)
+    try:
+        if "frequencies_hz" not in values:
+            values["frequencies_hz"] = spaced_frequencies(
+                values.pop("start_hz"), values.pop("stop_hz"), values.pop("points"),
+                values.pop("spacing", "lin"),
+            )  # fmt: skip
+        for name in ("frequencies_hz", "levels_vpk"):
+            values[name] = tuple(float(value) for value in values[name])
+        known = set(SweepPlan.__dataclass_fields__)
+        return SweepPlan(**{key: value for key, value in values.items() if key in known})
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"the proposed measurement is no sweep plan ({error!r})") from error

@@ -1,0 +1,111 @@
+"""What the screens read of a bench's history, as functions that run beside them.
+
+Owns which sessions a screen lists, how one is read, and how its remarks are corrected. It draws
+nothing.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from daq.frf import FrequencyResponse
+    from daq.store_records import HistoryLine, Measurement
+
+__all__ = [
+    "audit_trail",
+    "correct_session",
+    "latest_complete",
+    "one_session",
+    "recent_sessions",
+    "responses_of",
+]
+
+_RECENT = 20
+
+
+def recent_sessions(db: Path) -> list[HistoryLine]:
+    """The latest sessions with points, interrupted ones first; none where there is no history.
+
+    One more than a screen lists, which may leave out the one that is under way.
+
+    Raises
+    ------
+    LashbenchError
+        As `daq.store.Store`.
+    """
+    from daq.store import Store
+
+    if not os.path.exists(db):
+        return []
+    with Store(db, read_only=True) as store:
+        lines = store.lines(last=_RECENT + 1, with_points=True)
+    return sorted(lines, key=lambda line: (line.state != "interrupted", -line.id))
+
+
+def one_session(db: Path, measurement: int) -> Measurement:
+    """A stored measurement; raises as `daq.store.Store`."""
+    from daq.store import Store
+
+    with Store(db, read_only=True) as store:
+        return store.measurement(measurement)
+
+
+def latest_complete(
+    db: Path, unit: str, serial: str, but: int | None
+) -> tuple[int, FrequencyResponse] | None:
+    """The latest complete session of a unit, of the same serial number before others.
+
+    Raises
+    ------
+    LashbenchError
+        As `daq.store.Store`.
+    """
+    from daq.store import Store
+
+    if not os.path.exists(db):
+        return None
+    with Store(db, read_only=True) as store:
+        for of in (serial, None):
+            lines = store.lines(unit, of, with_points=True)
+            found = [one.id for one in lines if one.state == "complete" and one.id != but]
+            if found:
+                return found[-1], store.response(found[-1])
+    return None
+
+
+def responses_of(db: Path, measurements: list[int]) -> list[FrequencyResponse]:
+    """The responses of stored measurements, in that order; raises as `daq.store.Store`."""
+    from daq.store import Store
+
+    with Store(db, read_only=True) as store:
+        return [store.response(measurement) for measurement in measurements]
+
+
+def audit_trail(db: Path, measurement: int) -> list[str]:
+    """What was corrected of a measurement, a line each; raises as `daq.store.Store`."""
+    from daq.store import Store
+    from tui.measurements.history_rows import correction_words
+
+    with Store(db, read_only=True) as store:
+        trail = store.corrections(measurement)
+    return [f"#{measurement}: {correction_words(one)}" for one in trail]
+
+
+def correct_session(
+    db: Path, measurement: int, person: str, changes: Mapping[str, str]
+) -> list[str]:
+    """Correct serial number, operator or notes; names of what was, once it is committed.
+
+    Raises
+    ------
+    LashbenchError
+        As `daq.store.Store.correct`; nothing was corrected.
+    """
+    from daq.store import Store
+
+    with Store(db) as store:
+        return [one.field for one in store.correct(measurement, person, changes)]

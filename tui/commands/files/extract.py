@@ -1,0 +1,41 @@
+"""``lashbench extract``: ARF, RF and damping of a response.
+
+Owns the options of the verb only. What a feature is, and how sure it is, is
+the analysis's.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tui.options import Json
+from tui.reading_options import NO_OPTIONS, ReadingOptions, read_file
+from tui.text.output import Injected
+
+__all__ = ["extract"]
+
+
+def extract(
+    file: Path,
+    /,
+    *,
+    given: ReadingOptions = NO_OPTIONS,
+    json: Json = False,
+    console: Injected,
+) -> None:
+    """Read anti-resonance, resonance and damping out of a response, per source level.
+
+    Parameters
+    ----------
+    file
+        Response as csv, h5, uff, mat or the analyser's own sdf.
+    """
+    response = read_file(file, given, console)
+    from analysis.resonance import extract as features_of
+    from analysis.resonance import summary, to_json
+
+    features = features_of(response, console.progress)
+    if json:
+        console.document(to_json(features))
+    else:
+        console.data("\n".join(summary(features)))
