@@ -32,7 +32,7 @@ BEGIN, END = "<!-- table begins -->", "<!-- table ends -->"
 WIRES = ("tcp", "prologix_tcp")
 POINTS = 6
 
-DEADLINES_S = {"silence": 60, "stuck-measuring-bit": 60, "stuck-parser": 45}
+DEADLINES_S = {"silence": 75, "stuck-measuring-bit": 60, "stuck-parser": 45}
 """Bound of the whole session with the driver's own limits, s; 30 s for all others."""
 DEADLINE_S = 30
 

@@ -178,9 +178,12 @@ class Verdict:
         )
 
     def holds(self, one: Judged) -> bool:
-        """Whether a set has all the causes of the best set, and more, and does no better."""
+        """Whether a set has all the causes of the best set, and more, and does no better.
+
+        One that does better by chance only does no better, whatever its score.
+        """
         more = bool(self.best.effects) and set(one.effects) > set(self.best.effects)
-        return more and one.score <= self.best.score
+        return more and (one.score <= self.best.score or one.objection == NO_GAIN)
 
     def remark(self, one: Judged) -> str:
         """What speaks against a set, or makes it no rival; empty where nothing does."""

@@ -51,7 +51,7 @@ def test_every_end_is_one_of_those_that_are_documented(outcomes):
         assert (outcome.code == 0) == (outcome.said == ""), (name, wire)
         # Only an instrument that says nothing any more leaves the source unproven.
         assert (outcome.source == "confirmed-off") == (name != "silence"), (name, wire)
-        assert outcome.elapsed_s < 40.0, (name, wire)
+        assert outcome.elapsed_s < 50.0, (name, wire)
 
 
 @pytest.mark.parametrize("name", ["faults.md", "reliability.md"])

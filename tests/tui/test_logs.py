@@ -89,7 +89,7 @@ def test_what_libraries_warn_of_is_for_the_log_alone(tmp_path):
         [
             "import warnings",
             "from tui import cli",
-            "from tui.commands import extract",
+            "from tui.commands.files import extract",
             "def warn(**_): warnings.warn('overflow encountered', RuntimeWarning)",
             "extract.extract = warn",
             "import sys; sys.exit(cli.main(sys.argv[1:]))",

@@ -81,7 +81,7 @@ def test_an_sr785_is_served_beside_its_own_serial_port():
     [
         ([], 2, "--tcp"),
         (["--tcp", "70000"], 2, "70000"),
-        (["--tcp", "0", "--model", "SR786"], 2, "35670A, SR785"),
+        (["--tcp", "0", "--model", "SR786"], 2, "35670A, SAMPLED, SR785"),
         (["--tcp", "0", "--model", "SR785", "--options", "1D2"], 2, "lists no options"),
         (["--tcp", "0", "--model", "sr785", "--fault", "hardware-error"], 2, "outx-elsewhere"),
         (["--tcp", "0", "--fault", "nonsense"], 2, "nonsense"),

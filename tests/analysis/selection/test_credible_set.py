@@ -66,6 +66,17 @@ def test_a_further_cause_that_does_no_better_is_no_rival():
     assert held.probability == pytest.approx(1.0)
 
 
+def test_what_is_believed_of_a_set_that_gains_by_chance_counts_for_its_part():
+    """It has the causes that are named, and a higher score that its part would give it, too."""
+    verdict = told(standing((LOAD,), 0.1), standing((LOAD, SHAFT), 0.9, NO_GAIN))
+    assert verdict.probability == pytest.approx(1.0)
+    other = told(standing((LOAD,), 0.1), standing((BRAKE, SHAFT), 0.9, NO_GAIN))
+    assert other.probability == pytest.approx(0.1)
+    better = told(standing((LOAD,), 0.1), standing((LOAD, SHAFT), 0.9))
+    assert better.probability == pytest.approx(0.1)
+    assert require_credible_set(better).word == "ambiguous"
+
+
 def test_what_leads_though_it_is_refused_is_a_rival():
     verdict = told(standing((LOAD,), 0.4), standing((BRAKE, LOAD), 0.6, "leaves structure"))
     held = require_credible_set(verdict)
