@@ -12,6 +12,8 @@ from known_device import known_answer
 from sim.analyser35670a import Analyser35670A, Choices, LinearPlant, TalkState
 from sim.faults import FaultBoard, parse_fault
 
+pytest.register_assert_rewrite("simulated_sr785")
+
 SWEPT_SINE = (
     "INST:SEL SINE",
     "INIT:CONT OFF",
