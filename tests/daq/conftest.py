@@ -4,7 +4,7 @@ import pytest
 
 from daq.store import Store
 
-pytest.register_assert_rewrite("session_runs")
+pytest.register_assert_rewrite("session_runs", "driven_sr785")
 
 
 @pytest.fixture
