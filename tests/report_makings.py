@@ -14,6 +14,7 @@ from daq.frf import FrequencyResponse
 from sim.unit import load_unit
 
 LEVELS, FREQUENCIES = synthetic.LEVELS, synthetic.FREQUENCIES
+ADSS = load_unit("adss")
 NASTY = "</script><script>alert(1)</script>\"'><img src=x onerror=alert(2)> & $\\frac$ \x00 ünd\n2"
 
 ESTIMATE = {
@@ -93,4 +94,4 @@ def diagnosis(
     monkeypatch.setattr(diagnosis_module, "refine", lambda *_, **__: refined)
     monkeypatch.setattr(diagnosis_module, "propose_measurement", lambda *_, **__: None)
     monkeypatch.setattr(diagnosis_module, "refine_parameters", sharpened)
-    return diagnosis_module.diagnose_response(response(), load_unit("adss"))
+    return diagnosis_module.diagnose_response(response(), ADSS)

@@ -3,6 +3,8 @@
 import pytest
 import synthetic_runs
 
+pytest.register_assert_rewrite("report_pages")
+
 
 @pytest.fixture
 def runs(monkeypatch):
