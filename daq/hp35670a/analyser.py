@@ -9,16 +9,16 @@ there first.
 
 from __future__ import annotations
 
-import contextlib
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Literal
 
 from daq.analyser import Identity, PointSettings, SourceState, SweepPoint
+from daq.driving.driven import DrivenAnalyser, Guard
 from daq.driving.replies import parse_string
 from daq.driving.scpi_connection import Dialogue
-from daq.errors import LashbenchError, LimitError, MeasurementError
+from daq.errors import LimitError, MeasurementError
 from daq.hp35670a.identity import identify
 from daq.hp35670a.safe import SafeOff, make_safe, read_source
 from daq.hp35670a.settings import DC_OFFSET, LEVEL, MANUAL_FREQUENCY, MODE
@@ -34,7 +34,7 @@ from daq.hp35670a.setup import (
     select_traces,
 )
 from daq.hp35670a.status import arm_events
-from daq.hp35670a.sweeps import Guard, check_grid, on_box, point_by_point
+from daq.hp35670a.sweeps import check_grid, on_box, point_by_point
 from daq.transports.base import Transport
 
 __all__ = ["HP35670A", "Method"]
@@ -43,11 +43,9 @@ Method = Literal["point-by-point", "on-box"]
 
 _CALIBRATION_HOLDS_S = 7200.0
 _NARROWEST_HZ = 1.0
-_LOCK_PATIENCE_S = 6.0
-"""How long going safe waits for an exchange of another thread to end before it goes on anyway."""
 
 
-class HP35670A:
+class HP35670A(DrivenAnalyser[Dialogue, SetUp]):
     """The `Analyser` protocol over any `Transport`.
 
     Parameters
@@ -72,42 +70,12 @@ class HP35670A:
         timing: Timing | None = None,
         calibrate: bool = True,
     ) -> None:
-        self.safe_off: SafeOff | None = None
-        """What the last run of the safe-off recipe did, step by step."""
         self._timing = timing or Timing()
-        self._transport = transport
-        self._dialogue = Dialogue(transport, self._timing.reply_s, self._timing.block_s)
+        dialogue = Dialogue(transport, self._timing.reply_s, self._timing.block_s)
+        super().__init__(transport, dialogue)
         self._method = method
         self._calibrates = calibrate
         self._calibrated_s = -math.inf
-        self._setup: SetUp | None = None
-        self._times_made_safe = 0
-
-    @property
-    def on_wait(self) -> Callable[[], None] | None:
-        """Called at least five times a second while an operation is waited for; may raise.
-
-        A reply that does not come is not interrupted: it has a bound of its own.
-        """
-        return self._dialogue.on_wait
-
-    @on_wait.setter
-    def on_wait(self, look: Callable[[], None] | None) -> None:
-        self._dialogue.on_wait = look
-
-    @property
-    def on_exchange(self) -> Callable[[float], None] | None:
-        """Told before each exchange how long it may take at most, s; must not raise."""
-        return self._dialogue.on_exchange
-
-    @on_exchange.setter
-    def on_exchange(self, told: Callable[[float], None] | None) -> None:
-        self._dialogue.on_exchange = told
-
-    @property
-    def wire_lacks(self) -> tuple[str, ...]:
-        """What the way to the instrument turned out not to have, such as a serial poll."""
-        return tuple(getattr(self._transport, "lacks", ()))
 
     def identify(self) -> Identity:
         """Ask who is there, and refuse anything but a 35670A with swept sine."""
@@ -182,27 +150,11 @@ class HP35670A:
         with self._dialogue.lock:
             return read_source(self._dialogue)
 
-    def make_safe(self) -> SourceState:
-        """Run the safe-off recipe and say what could be proven; see `safe_off` for the steps.
+    def _switch_off(self) -> SafeOff:
+        return make_safe(self._transport, self.on_exchange)
 
-        May be called twice and from any thread, and never raises.
-        """
-        self._times_made_safe += 1
-        self._setup = None
-        # An exchange of another thread is let finish, so that its reply is not taken for
-        # ours; one that hangs longer than its own bound is not waited for.
-        held = self._dialogue.lock.acquire(timeout=_LOCK_PATIENCE_S)
-        try:
-            self._dialogue.trusted = False
-            self.safe_off = make_safe(self._transport, self.on_exchange)
-        finally:
-            if held:
-                self._dialogue.lock.release()
-        return self.safe_off.state
-
-    def close(self) -> None:
-        """Let go of the connection; does not touch the source."""
-        self._transport.close()
+    def _resynchronise(self) -> None:
+        self._dialogue.clear()
 
     def _run(
         self,
@@ -210,28 +162,12 @@ class HP35670A:
         frequencies: Sequence[float],
         measure: Callable[[Dialogue, SetUp, Timing, Sequence[float], Guard], Iterator[SweepPoint]],
     ) -> Iterator[SweepPoint]:
-        dialogue, times = self._dialogue, self._times_made_safe
-
-        def guard() -> None:
-            if self._times_made_safe != times:
-                raise MeasurementError("the source was made safe while the sweep ran; it ends here")
-            if self.on_wait is not None:
-                self.on_wait()
-
-        try:
+        dialogue = self._dialogue
+        with self._driving() as guard:
             with dialogue.lock:
                 guard()
                 self._drive(setup, frequencies, guard)
             yield from measure(dialogue, setup, self._timing, frequencies, guard)
-        except BaseException as error:
-            # The first fault is the one to report; the session makes safe in any case.
-            with contextlib.suppress(LashbenchError):
-                if not isinstance(error, LashbenchError):
-                    dialogue.clear()  # an interrupt may have come between question and answer
-                self._quiet()
-            dialogue.trusted = False
-            raise
-        self._quiet()
         dialogue.check("end of the sweep", harmless=parks_at_zero)
 
     def _drive(self, setup: SetUp, frequencies: Sequence[float], guard: Callable[[], None]) -> None:

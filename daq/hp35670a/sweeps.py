@@ -7,7 +7,7 @@ quieting the source is the driver's matter.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.analyser import SweepPoint
+from daq.driving.driven import Guard
 from daq.driving.scpi_connection import Dialogue
 from daq.driving.settings import Setting
 from daq.driving.variance import gain_standard_error
@@ -37,10 +38,7 @@ from daq.hp35670a.status import DeviceState, Voltage, polled
 from daq.hp35670a.trace import Picture, nearest_row, read_picture
 from daq.transports.base import Deadline
 
-__all__ = ["Guard", "check_grid", "on_box", "point_by_point"]
-
-Guard = Callable[[], None]
-"""Raises if the measurement was stopped from elsewhere."""
+__all__ = ["check_grid", "on_box", "point_by_point"]
 
 _FULL_DISPLAYS = (401, 801)
 """Numbers of points for which every displayed point is a measured one (table 18-3)."""

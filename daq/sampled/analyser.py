@@ -7,15 +7,15 @@ samples mean in `lockin`.
 
 from __future__ import annotations
 
-import contextlib
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from daq.analyser import Identity, PointSettings, SourceState, SweepPoint
+from daq.driving.driven import DrivenAnalyser, Guard
 from daq.driving.replies import parse_number
 from daq.driving.safe_off import SafeOff
 from daq.driving.scpi_connection import Dialogue
@@ -45,7 +45,6 @@ _LEVEL_SHARE = 0.05
 _MARGIN_S = 10.0
 _RAMP_S = 30.0
 _POWER_ON, _ERRORS = 128, 32 | 16
-_LOCK_PATIENCE_S = 6.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +54,7 @@ class _SetUp:
     stop_hz: float
 
 
-class SampledBench:
+class SampledBench(DrivenAnalyser[Dialogue, _SetUp]):
     """The `Analyser` protocol over a converter.
 
     Parameters
@@ -65,37 +64,9 @@ class SampledBench:
     """
 
     def __init__(self, transport: Transport) -> None:
-        self.safe_off: SafeOff | None = None
-        """What the last run of the safe-off recipe did, step by step."""
-        self._transport = transport
-        self._dialogue = Dialogue(transport)
-        self._setup: _SetUp | None = None
+        super().__init__(transport, Dialogue(transport))
         self._rate_hz = 0.0
         self._delay_s: float | None = None
-        self._times_made_safe = 0
-
-    @property
-    def on_wait(self) -> Callable[[], None] | None:
-        """Called at least five times a second while a recording is waited for; may raise."""
-        return self._dialogue.on_wait
-
-    @on_wait.setter
-    def on_wait(self, look: Callable[[], None] | None) -> None:
-        self._dialogue.on_wait = look
-
-    @property
-    def on_exchange(self) -> Callable[[float], None] | None:
-        """Told before each exchange how long it may take at most, s; must not raise."""
-        return self._dialogue.on_exchange
-
-    @on_exchange.setter
-    def on_exchange(self, told: Callable[[float], None] | None) -> None:
-        self._dialogue.on_exchange = told
-
-    @property
-    def wire_lacks(self) -> tuple[str, ...]:
-        """What the way to the converter turned out not to have, such as a device clear."""
-        return tuple(getattr(self._transport, "lacks", ()))
 
     def identify(self) -> Identity:
         """Ask who is there, and refuse anything but a converter."""
@@ -195,51 +166,23 @@ class SampledBench:
         is_off = level == offset == aimed == away == 0
         return SourceState.CONFIRMED_OFF if is_off else SourceState.ON
 
-    def make_safe(self) -> SourceState:
-        """Run the safe-off recipe and say what could be proven; never raises."""
-        self._times_made_safe += 1
-        self._setup = None
-        held = self._dialogue.lock.acquire(timeout=_LOCK_PATIENCE_S)
-        try:
-            self._dialogue.trusted = False
-            self.safe_off = make_safe(self._transport, self.on_exchange)
-        finally:
-            if held:
-                self._dialogue.lock.release()
-        return self.safe_off.state
+    def _switch_off(self) -> SafeOff:
+        return make_safe(self._transport, self.on_exchange)
 
-    def close(self) -> None:
-        """Let go of the connection; does not touch the source."""
-        self._transport.close()
+    def _resynchronise(self) -> None:
+        self._dialogue.clear()
 
     # ------------------------------------------------------------ measuring
 
     def _run(self, setup: _SetUp, frequencies: Sequence[float]) -> Iterator[SweepPoint]:
-        dialogue, times = self._dialogue, self._times_made_safe
-
-        def guard() -> None:
-            if self._times_made_safe != times:
-                raise MeasurementError("the source was made safe while the sweep ran; it ends here")
-            if self.on_wait is not None:
-                self.on_wait()
-
-        try:
+        with self._driving() as guard:
             if frequencies:
                 self._drive(setup, frequencies[0], guard)
             for frequency_hz in frequencies:
                 yield self._point(setup, frequency_hz, guard)
-        except BaseException as error:
-            # The first fault is the one to report; the session makes safe in any case.
-            with contextlib.suppress(LashbenchError):
-                if not isinstance(error, LashbenchError):
-                    dialogue.clear()  # an interrupt may have come between question and answer
-                self._quiet()
-            dialogue.trusted = False
-            raise
-        self._quiet()
         self._check_events("end of the sweep")
 
-    def _drive(self, setup: _SetUp, first_hz: float, guard: Callable[[], None]) -> None:
+    def _drive(self, setup: _SetUp, first_hz: float, guard: Guard) -> None:
         """Step to the first frequency at level 0, ramp the level, and learn the delay."""
         settings, dialogue = setup.settings, self._dialogue
         self._record(first_hz, 1, guard)
@@ -251,7 +194,7 @@ class SampledBench:
         if self._delay_s is None:
             self._delay_s = self._measured_delay(setup, first_hz, guard)
 
-    def _wait_for_level(self, level: float, offset: float, guard: Callable[[], None]) -> None:
+    def _wait_for_level(self, level: float, offset: float, guard: Guard) -> None:
         deadline = Deadline.after(_RAMP_S + self._dialogue.reply_s)
         while True:
             guard()
@@ -267,7 +210,7 @@ class SampledBench:
                 )
             self._dialogue.pause(0.05)
 
-    def _measured_delay(self, setup: _SetUp, first_hz: float, guard: Callable[[], None]) -> float:
+    def _measured_delay(self, setup: _SetUp, first_hz: float, guard: Guard) -> float:
         """From the loop-back at two neighbouring frequencies; what comes back is the level, too."""
         step = min(_DELAY_STEP_HZ, 0.1 * first_hz)
         up = first_hz + step <= self._rate_hz / LEAST_SAMPLES
@@ -287,7 +230,7 @@ class SampledBench:
             )
         return delay_of((found[0], found[1]), pair)
 
-    def _point(self, setup: _SetUp, frequency_hz: float, guard: Callable[[], None]) -> SweepPoint:
+    def _point(self, setup: _SetUp, frequency_hz: float, guard: Guard) -> SweepPoint:
         settings, rate = setup.settings, self._rate_hz
         delay = math.ceil((self._delay_s or 0.0) * rate) + 1
         first = delay + settings.settle_cycles * rate / frequency_hz
@@ -324,9 +267,7 @@ class SampledBench:
             detail={"source_vpk": float(abs(means[0])), "delay_s": self._delay_s or 0.0},
         )
 
-    def _record(
-        self, frequency_hz: float, count: int, guard: Callable[[], None]
-    ) -> NDArray[np.float64]:
+    def _record(self, frequency_hz: float, count: int, guard: Guard) -> NDArray[np.float64]:
         """Step to a frequency and record from there, shape (count, 2)."""
         dialogue = self._dialogue
         guard()

@@ -7,12 +7,12 @@ this one. Nothing here was watched on a real instrument; docs/sr785.md lists wha
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from daq.analyser import Identity, PointSettings, SourceState, SweepPoint
+from daq.driving.driven import DrivenAnalyser
 from daq.driving.safe_off import SafeOff
-from daq.errors import LashbenchError, LimitError, MeasurementError
+from daq.errors import LimitError, MeasurementError
 from daq.sr785.dialogue import Dialogue
 from daq.sr785.identity import identify
 from daq.sr785.plan import Grid, grids_of, repeats_at
@@ -24,11 +24,8 @@ from daq.transports.base import Transport
 
 __all__ = ["SR785"]
 
-_LOCK_PATIENCE_S = 6.0
-"""How long going safe waits for an exchange of another thread to end before it goes on anyway."""
 
-
-class SR785:
+class SR785(DrivenAnalyser[Dialogue, SetUp]):
     """The `Analyser` protocol over any `Transport`.
 
     Parameters
@@ -46,41 +43,11 @@ class SR785:
     """
 
     def __init__(self, transport: Transport, *, timing: Timing | None = None) -> None:
-        self.safe_off: SafeOff | None = None
-        """What the last run of the safe-off recipe did, step by step."""
         self._timing = timing or Timing()
-        self._transport = transport
-        self._dialogue = Dialogue(transport, self._timing.reply_s, self._timing.block_s)
+        dialogue = Dialogue(transport, self._timing.reply_s, self._timing.block_s)
+        super().__init__(transport, dialogue)
         self._model: str | None = None
         self._knowledge = Knowledge()
-        self._setup: SetUp | None = None
-        self._times_made_safe = 0
-
-    @property
-    def on_wait(self) -> Callable[[], None] | None:
-        """Called at least five times a second while an operation is waited for; may raise.
-
-        A reply that does not come is not interrupted: it has a bound of its own.
-        """
-        return self._dialogue.on_wait
-
-    @on_wait.setter
-    def on_wait(self, look: Callable[[], None] | None) -> None:
-        self._dialogue.on_wait = look
-
-    @property
-    def on_exchange(self) -> Callable[[float], None] | None:
-        """Told before each exchange how long it may take at most, s; must not raise."""
-        return self._dialogue.on_exchange
-
-    @on_exchange.setter
-    def on_exchange(self, told: Callable[[float], None] | None) -> None:
-        self._dialogue.on_exchange = told
-
-    @property
-    def wire_lacks(self) -> tuple[str, ...]:
-        """What the way to the instrument turned out not to have, such as a serial poll."""
-        return tuple(getattr(self._transport, "lacks", ()))
 
     def identify(self) -> Identity:
         """Ask who is there, and refuse anything but an SR785 or SR780."""
@@ -151,28 +118,14 @@ class SR785:
         with self._dialogue.lock:
             return read_source(self._dialogue)
 
-    def make_safe(self) -> SourceState:
-        """Run the safe-off recipe and say what could be proven; see `safe_off` for the steps.
+    def _switch_off(self) -> SafeOff:
+        return make_safe(self._transport, self.on_exchange, self._dialogue.interface)
 
-        May be called twice and from any thread, and never raises.
-        """
-        self._times_made_safe += 1
-        self._setup = None
-        # An exchange of another thread is let finish, so that its reply is not taken for
-        # ours; one that hangs longer than its own bound is not waited for.
-        held = self._dialogue.lock.acquire(timeout=_LOCK_PATIENCE_S)
-        try:
-            self._dialogue.trusted = False
-            interface = self._dialogue.interface
-            self.safe_off = make_safe(self._transport, self.on_exchange, interface)
-        finally:
-            if held:
-                self._dialogue.lock.release()
-        return self.safe_off.state
+    def _resynchronise(self) -> None:
+        self._dialogue.recover()
 
-    def close(self) -> None:
-        """Let go of the connection; does not touch the source."""
-        self._transport.close()
+    def _quiet(self) -> None:
+        quiet(self._dialogue)
 
     def _sweeps(self, setup: SetUp, frequencies: Sequence[float]) -> list[Grid]:
         band_hz = setup.start_hz, setup.stop_hz
@@ -183,25 +136,8 @@ class SR785:
         return [repeats_at(hz, band_hz, setup.settings) for hz in frequencies]
 
     def _run(self, setup: SetUp, frequencies: Sequence[float]) -> Iterator[SweepPoint]:
-        dialogue, times = self._dialogue, self._times_made_safe
-
-        def guard() -> None:
-            if self._times_made_safe != times:
-                raise MeasurementError("the source was made safe while the sweep ran; it ends here")
-            if self.on_wait is not None:
-                self.on_wait()
-
-        sweeps = self._sweeps(setup, frequencies)
-        try:
+        dialogue, sweeps = self._dialogue, self._sweeps(setup, frequencies)
+        with self._driving() as guard:
             guard()
             yield from measure(dialogue, setup, self._timing, self._knowledge, sweeps, guard)
-        except BaseException as error:
-            # The first fault is the one to report; the session makes safe in any case.
-            with contextlib.suppress(LashbenchError):
-                if not isinstance(error, LashbenchError):
-                    dialogue.recover()  # an interrupt may have come between question and answer
-                quiet(dialogue)
-            dialogue.trusted = False
-            raise
-        quiet(dialogue)
         dialogue.check("end of the sweep")

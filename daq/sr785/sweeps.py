@@ -7,13 +7,14 @@ is set up; level and switch are set here, last of all. What sweeps there are is 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from daq.analyser import SweepPoint
+from daq.driving.driven import Guard
 from daq.driving.variance import gain_standard_error
 from daq.errors import BenchTimeout, InstrumentError, MeasurementError
 from daq.frf import DB_PER_NEPER, PointFlag
@@ -37,10 +38,7 @@ from daq.sr785.traces import read_axis, read_bin, read_length, read_trace, respo
 from daq.sr785.watching import Watching
 from daq.transports.base import Deadline
 
-__all__ = ["Guard", "Knowledge", "measure", "quiet"]
-
-Guard = Callable[[], None]
-"""Raises if the measurement was stopped from elsewhere."""
+__all__ = ["Knowledge", "measure", "quiet"]
 
 _FIRST_PAUSE_S = 0.0005
 _LONGEST_PAUSE_S = 0.25
