@@ -11,8 +11,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from urllib.parse import parse_qsl
 
-from daq.errors import BenchTimeout, ConfigurationError, LinkError, ProtocolError
-from daq.transports.base import Deadline, block_of, checked_line
+from daq.errors import BenchTimeout, ConfigurationError, LinkError
+from daq.transports.base import Deadline, checked_line
+from daq.transports.messages import MessageReader
 from sim.effects import EffectSetting, parse_effect
 from sim.faults import Fault
 from sim.instrument.bus import Instrument, TalkState
@@ -27,7 +28,7 @@ _WAIT_S = 0.002
 _RATIO = 0.25
 
 
-class Loopback:
+class Loopback(MessageReader):
     """Messages straight onto the bus of a simulated analyser; see `daq.transports.base.Transport`.
 
     In fast operation each exchange lets one point of a running sweep be
@@ -37,10 +38,9 @@ class Loopback:
     def __init__(
         self, instrument: Instrument, pace: Pace | None = None, address: str = "sim:"
     ) -> None:
-        self.address = address
+        super().__init__(address)
         self.instrument = instrument
         self._pace = pace or Fast(instrument)
-        self._waiting = "nothing"
         self._closed = False
 
     def write(self, line: str, deadline: Deadline) -> None:
@@ -53,31 +53,6 @@ class Loopback:
             if data:
                 self._let_time_pass(deadline, f"{line!r} was not taken")
         self._check_link()
-
-    def read(self, deadline: Deadline) -> str:
-        """One text reply, without terminator."""
-        message = self._message(deadline)
-        try:
-            return message.decode("ascii").rstrip("\n")
-        except UnicodeDecodeError as error:
-            raise ProtocolError(
-                f"{self.address}: the reply to {self._waiting!r} is not text: {message[:60]!r}"
-            ) from error
-
-    def read_block(self, deadline: Deadline) -> bytes:
-        """The payload of one definite-length block."""
-        message = self._message(deadline)
-        return block_of(message, f"{self.address}: the block that answers {self._waiting!r}")
-
-    def read_bytes(self, count: int, deadline: Deadline) -> bytes:
-        """A reply of so many bytes without header or line end."""
-        message = self._message(deadline)
-        if len(message) != count:
-            raise ProtocolError(
-                f"{self.address}: the reply to {self._waiting!r} has {len(message)} bytes, "
-                f"{count} were due"
-            )
-        return message
 
     def serial_poll(self, deadline: Deadline) -> int | None:
         """The status byte."""

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from daq.errors import BenchTimeout, LashbenchError, LinkError, ProtocolError
-from daq.transports.base import KEPT_LIMIT_BYTES, Deadline, block_of, checked_line
+from daq.transports.base import KEPT_LIMIT_BYTES, Deadline, checked_line
 from daq.transports.inbox import Inbox
 from daq.transports.links import Link, TcpLink
+from daq.transports.messages import MessageReader
 
 __all__ = ["HEADER", "PORT", "HislipTransport", "Kind", "open_hislip", "packed"]
 
@@ -144,12 +145,13 @@ def open_hislip(resource: str, deadline: Deadline) -> HislipTransport:
         size = struct.pack(">Q", KEPT_LIMIT_BYTES)
         aside.send(packed(Kind.ASYNC_MAXIMUM_MESSAGE_SIZE, 0, 0, size), deadline)
         _answer(aside, Kind.ASYNC_MAXIMUM_MESSAGE_SIZE_RESPONSE, deadline)
-    except LashbenchError as error:
+    except BaseException as error:
+        # A key press must not leave a connection open either.
         for link in opened:
             link.close()
-        if isinstance(error, LinkError):
-            raise
-        raise LinkError(f"{resource}: no HiSLIP server answers there ({error})") from error
+        if isinstance(error, LashbenchError) and not isinstance(error, LinkError):
+            raise LinkError(f"{resource}: no HiSLIP server answers there ({error})") from error
+        raise
     return HislipTransport(sync, aside, resource)
 
 
@@ -160,7 +162,7 @@ def _answer(channel: _Channel, kind: Kind, deadline: Deadline) -> _Message:
     raise channel.lost(f"no {kind.name} within {deadline.span_s:g} s; check address and power")
 
 
-class HislipTransport:
+class HislipTransport(MessageReader):
     """Messages to one instrument over HiSLIP, synchronised mode; see `Transport`.
 
     Parameters
@@ -172,13 +174,12 @@ class HislipTransport:
     """
 
     def __init__(self, sync: _Channel, aside: _Channel, address: str) -> None:
-        self.address = address
+        super().__init__(address)
         self._sync, self._aside = sync, aside
         self._next_id = _FIRST_ID
         self._last_id = _FIRST_ID
         self._delivered = 0
         self._requests: list[int] = []
-        self._waiting = "nothing"
         self._part = bytearray()
 
     def write(self, line: str, deadline: Deadline) -> None:
@@ -189,31 +190,6 @@ class HislipTransport:
         self._sync.send(packed(Kind.DATA_END, self._delivered, self._next_id, data), deadline)
         self._delivered = 0
         self._last_id, self._next_id = self._next_id, (self._next_id + 2) & 0xFFFF_FFFF
-
-    def read(self, deadline: Deadline) -> str:
-        """One text reply, without terminator."""
-        message = self._message(deadline)
-        try:
-            return message.decode("ascii").strip()
-        except UnicodeDecodeError as error:
-            raise ProtocolError(
-                f"{self.address}: the reply to {self._waiting!r} is not text: {message[:60]!r}"
-            ) from error
-
-    def read_block(self, deadline: Deadline) -> bytes:
-        """The payload of one definite-length block."""
-        message = self._message(deadline)
-        return block_of(message, f"{self.address}: the block that answers {self._waiting!r}")
-
-    def read_bytes(self, count: int, deadline: Deadline) -> bytes:
-        """A reply of so many bytes, which is a whole message."""
-        message = self._message(deadline)
-        if len(message) != count:
-            raise ProtocolError(
-                f"{self.address}: the reply to {self._waiting!r} has {len(message)} bytes, "
-                f"{count} were due"
-            )
-        return message
 
     def serial_poll(self, deadline: Deadline) -> int:
         """The status byte."""

@@ -13,7 +13,8 @@ from contextlib import suppress
 from typing import Any, TypeVar
 
 from daq.errors import BenchTimeout, LinkError, ProtocolError
-from daq.transports.base import KEPT_LIMIT_BYTES, Deadline, block_of, checked_line
+from daq.transports.base import KEPT_LIMIT_BYTES, Deadline, checked_line
+from daq.transports.messages import MessageReader
 
 __all__ = ["VisaTransport", "load_backend", "open_visa"]
 
@@ -76,15 +77,14 @@ def _backend_of(resource_name: str) -> str:
     return "@py" if resource_name.upper().startswith("TCPIP") else ""
 
 
-class VisaTransport:
+class VisaTransport(MessageReader):
     """Messages over an open PyVISA resource; see `Transport`."""
 
     def __init__(self, resource: Any, address: str) -> None:
         from pyvisa import constants, errors
 
-        self.address = address
+        super().__init__(address)
         self._resource = resource
-        self._waiting = "nothing"
         self._timed_out = constants.StatusCode.error_timeout
         self._refused = (
             constants.StatusCode.error_nonsupported_operation,
@@ -114,31 +114,6 @@ class VisaTransport:
             self._resource.write_raw(data)
         except self._faults as error:
             raise self._fault(error, deadline) from error
-
-    def read(self, deadline: Deadline) -> str:
-        """One text reply, without terminator."""
-        message = self._message(deadline)
-        try:
-            return message.decode("ascii").strip()
-        except UnicodeDecodeError as error:
-            raise ProtocolError(
-                f"{self.address}: the reply to {self._waiting!r} is not text: {message[:60]!r}"
-            ) from error
-
-    def read_block(self, deadline: Deadline) -> bytes:
-        """The payload of one definite-length block."""
-        message = self._message(deadline)
-        return block_of(message, f"{self.address}: the block that answers {self._waiting!r}")
-
-    def read_bytes(self, count: int, deadline: Deadline) -> bytes:
-        """A reply of so many bytes, which is a whole message."""
-        message = self._message(deadline)
-        if len(message) != count:
-            raise ProtocolError(
-                f"{self.address}: the reply to {self._waiting!r} has {len(message)} bytes, "
-                f"{count} were due"
-            )
-        return message
 
     def serial_poll(self, deadline: Deadline) -> int | None:
         """The status byte; None where the gateway or adapter has no serial poll."""
