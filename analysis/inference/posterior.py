@@ -134,15 +134,6 @@ class Posterior:
         weight = np.exp(logits - logits.max())
         return np.asarray(weight / weight.sum())
 
-    def likeliest(
-        self, summary: NDArray[np.float32], share: float = 0.99, without: Sequence[str] = ()
-    ) -> list[SetPosterior]:
-        """The fewest sets that hold a share of the probability, likeliest first."""
-        probability = self.set_probabilities(summary, without)
-        order = np.argsort(-probability)
-        count = int(np.searchsorted(np.cumsum(probability[order]), share)) + 1
-        return [self.given(summary, int(n), float(probability[n])) for n in order[:count]]
-
     def given(
         self, summary: NDArray[np.float32], number: int, probability: float = 1.0
     ) -> SetPosterior:

@@ -111,7 +111,9 @@ def _unsure(hypothesis: Hypothesis, found: ParameterPosterior) -> set[str]:
     # What the datasheet says nothing of is no number, and not near to it.
     near = np.abs(found.mean[1:] - hypothesis.datasheet) <= _SURELY * std
     sure = {effect for (effect, _), one in zip(hypothesis.parameters, near, strict=True) if not one}
-    return set(hypothesis.effects) - (sure - _may_be_none(hypothesis, found.mean[1:], std) or sure)
+    surely_there = sure - _may_be_none(hypothesis, found.mean[1:], std)
+    # One of them is there: where each may be none, none is dropped for that.
+    return set(hypothesis.effects) - (surely_there or sure)
 
 
 def _may_be_none(hypothesis: Hypothesis, sizes: Vector, std: Vector) -> set[str]:

@@ -29,6 +29,7 @@ from daq.preflight import (
 )
 from daq.session.agenda import Pace
 from daq.session.history import HeldHistory
+from daq.session.points import end_early, next_point
 from daq.session.recorder import Journal, Place
 from daq.session.repeatability import compare
 from daq.session.safe_instrument import HeldInstrument
@@ -241,14 +242,14 @@ class Session:
                 return
             for requested_hz in run:
                 self._in_hand = source_vpk, requested_hz
-                yield self._commit(self._in_hand, _next(points, requested_hz))
+                yield self._commit(self._in_hand, next_point(points, requested_hz))
                 yield from self._remarks()
                 if self.control.paused or self.control.cut is not None:
                     return
             if next(points, None) is not None:
                 raise MeasurementError("the instrument gave more points than were asked for")
         finally:
-            _close(points)
+            end_early(points)
 
     def _commit(self, place: Place, point: SweepPoint) -> PointStored:
         if place in self._journal.retake:
@@ -277,7 +278,7 @@ class Session:
     ) -> Iterator[SessionEvent]:
         pairs = []
         for requested_hz in lead:
-            point = _next(points, requested_hz)
+            point = next_point(points, requested_hz)
             pairs.append((point, self._agenda.stored(source_vpk, requested_hz).point))
             yield RunIn(source_vpk, *pairs[-1])
             if self.control.cut is not None:
@@ -389,19 +390,3 @@ class Session:
             with suppress(LashbenchError):
                 self._journal.note("reconnected", f"over a new connection: source {state.value}")
         return state
-
-
-def _next(points: Iterator[SweepPoint], requested_hz: float) -> SweepPoint:
-    point = next(points, None)
-    if point is None:
-        raise MeasurementError(
-            f"the instrument ended its sweep before the point at {requested_hz:g} Hz"
-        )
-    return point
-
-
-def _close(points: Iterator[SweepPoint]) -> None:
-    """End a sweep early, where it is a generator; one that ended takes no notice."""
-    close = getattr(points, "close", None)
-    if close is not None:
-        close()

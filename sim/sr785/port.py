@@ -31,11 +31,6 @@ class Port:
         self.transfer: bytearray | None = None
         """A trace on its way out, which no buffer holds."""
 
-    @property
-    def in_line(self) -> bool:
-        """Whether a line has begun and not ended."""
-        return bool(self._line)
-
     def take(self, data: bytes, end: bool) -> bool:
         """Take bytes; whether the buffer has overflowed, by which both are empty."""
         for index, byte in enumerate(data):
