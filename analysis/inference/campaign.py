@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -23,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.execution.executor import Executor, LocalExecutor
+from analysis.execution.pace import Pace, duration
 from analysis.inference.checkpoint import (
     Checkpoint,
     posterior_name,
@@ -154,14 +154,14 @@ def train_unit(
     known = state or start
     scales = Scales.of(unit) if state is None else Scales.from_facts(unit, state)
     to_train_s = _STEP_S * recipe.epochs * machines / 192
-    pace = _Pace(machines)
-    files = simulate_runs(
-        scales, runs, machines, recipe, executor,
-        lambda held: told(
-            f"{held} of {machines} machines simulated; about {_minutes(pace.left_s(held))} left, "
-            f"then {_minutes(to_train_s)} of training"
-        ),
-    )  # fmt: skip
+    pace = Pace()
+
+    def simulated(held: int) -> None:
+        left = _left(pace.remaining_s(held / machines))
+        of = f"{held} of {max(held, machines)} machines simulated"
+        told(f"{of}{left}; training follows, about {duration(to_train_s)}")
+
+    files = simulate_runs(scales, runs, machines, recipe, executor, simulated)
     batches = [load_batch(one) for one in files]
     apart = set(range(HELD_OUT - 1, len(batches), HELD_OUT)) or {len(batches) - 1}
     held_out = [batches[number] for number in sorted(apart)]
@@ -180,7 +180,8 @@ def train_unit(
             recipe.seed, len(files), count,
         )  # fmt: skip
     trainer, trained = Trainer(scales, state.shape, schedule), state.steps < steps
-    pace = _Pace(steps, state.steps)
+    pace = Pace()
+    pace.remaining_s(state.steps / steps)
     while state.steps < steps:
         more = min(_AT_ONCE, steps - state.steps)
         weights, progress = trainer.train(state.weights, seen, state.steps, more)
@@ -188,9 +189,9 @@ def train_unit(
         state = replace(state, figures=measure(scales, state, held_out))
         write_checkpoint(runs / _STANDS, state)
         figures = ", ".join(f"{name} {value:.3f}" for name, value in state.figures.items())
-        left = _minutes(pace.left_s(state.steps))
+        left = _left(pace.remaining_s(state.steps / steps))
         loss = ", ".join(f"{name} {value:.3f}" for name, value in progress.loss.items())
-        told(f"step {state.steps} of {steps}, about {left} left: loss {loss}; unseen {figures}")
+        told(f"step {state.steps} of {steps}{left}: loss {loss}; unseen {figures}")
     if start is not None and trained:
         before = replace(state, weights=start.weights)
         figures_before = measure(scales, before, held_out)
@@ -202,26 +203,8 @@ def train_unit(
     return state
 
 
-class _Pace:
-    """How long work of so many pieces still takes, from what was done since it began.
-
-    What was there at the first call took no time.
-    """
-
-    def __init__(self, pieces: int, done: int | None = None) -> None:
-        self._pieces, self._first, self._began_s = pieces, done, time.monotonic()
-
-    def left_s(self, done: int) -> float:
-        """Seconds; NaN while nothing was done yet."""
-        if self._first is None:
-            self._first, self._began_s = done, time.monotonic()
-        made = done - self._first
-        spent_s = time.monotonic() - self._began_s
-        return spent_s * max(self._pieces - done, 0) / made if made > 0 else float("nan")
-
-
-def _minutes(seconds: float) -> str:
-    return "an unknown time" if np.isnan(seconds) else f"{np.ceil(seconds / 60.0):.0f} min"
+def _left(seconds: float | None) -> str:
+    return "" if seconds is None else f", about {duration(seconds)} left"
 
 
 def measure(scales: Scales, state: Checkpoint, batches: list[Batch]) -> dict[str, float]:

@@ -20,10 +20,10 @@ from typing import Annotated, Any, TextIO
 
 from cyclopts import Parameter
 
+from analysis.execution.pace import Pace, duration
 from daq.errors import LashbenchError
 from daq.untrusted.visible_text import visible, visible_line
 from tui.text.narrator import Narrator
-from tui.text.pace import Pace, duration
 
 __all__ = ["Console", "Injected", "as_json", "hush", "readers_may_leave"]
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tui.text.pace import Pace, duration
+from analysis.execution.pace import Pace, duration
 
 
 class Clock:
