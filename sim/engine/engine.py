@@ -254,14 +254,16 @@ def _dwell(
     turn[0] = 1.0
     # The last forces push the coordinates in the step that is not made any more.
     end = stepped.q + _times(propagator.push, stepped.force)
-    # The kernel counts the phase from the start of the stretch; results count
-    # it from the drive.
-    return Motion(
-        _coefficients(stepped.sums, propagator.steps_per_cycle) * turn,
-        stepped.peak,
-        _times(modes.shapes, end) + forced.imag,
-        propagator.step_s,
-    )
+    # Motion that grew without bound is not finite: `carry` says so.
+    with np.errstate(invalid="ignore"):
+        # The kernel counts the phase from the start of the stretch; results count
+        # it from the drive.
+        return Motion(
+            _coefficients(stepped.sums, propagator.steps_per_cycle) * turn,
+            stepped.peak,
+            _times(modes.shapes, end) + forced.imag,
+            propagator.step_s,
+        )
 
 
 def _program(

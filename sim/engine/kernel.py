@@ -3,10 +3,11 @@
 Owns the order of work in a step and the layout in memory; the numbers it is
 given are the propagator's, the laws those of `sim.engine.laws`. For every structure
 that occurs (which laws, how many coordinates, in which order they are solved)
-it writes a program without branches in which every coefficient has its place.
+it writes a program in which every coefficient has its place.
 
-What takes time in a step is that laws wait for each other: several vectors of
+What takes time in a step is that laws wait for each other. Several vectors of
 lanes at once, and laws that hardly feel each other side by side, fill these waits.
+A single vector in double precision branches around what is seldom needed.
 """
 
 from __future__ import annotations
@@ -119,7 +120,9 @@ class Program:
             self._function.args
         )
         self._emit = ir.IRBuilder(self._function.append_basic_block())
-        self._code = Code(self._module, self._emit, layout.structure.single, fused)
+        # A few lanes of double precision wait for each other, and hardly ever cross an end at once.
+        branches = vectors == 1 and not layout.structure.single
+        self._code = Code(self._module, self._emit, layout.structure.single, fused, branches)
         self._sweeps = self._emit.alloca(_INT)
         # Aligns the stack with it: a vector that lies across two lines of the cache costs twice.
         self._sweeps.align = VECTOR_BYTES

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import reduce
 from typing import Any
 
 from llvmlite import ir
@@ -40,10 +41,20 @@ class Code:
         Single precision, and twice as many numbers in a vector.
     fused
         Whether the machine multiplies and adds in one; where it cannot, both are rounded.
+    branches
+        Whether `short_cut` takes the shorter way.
     """
 
-    def __init__(self, module: ir.Module, builder: ir.IRBuilder, single: bool, fused: bool) -> None:
+    def __init__(
+        self,
+        module: ir.Module,
+        builder: ir.IRBuilder,
+        single: bool,
+        fused: bool,
+        branches: bool = False,
+    ) -> None:
         self.builder, self._module = builder, module
+        self.branches = branches
         self.scalar = ir.FloatType() if single else ir.DoubleType()
         self.bytes = 4 if single else 8
         self.width = VECTOR_BYTES // self.bytes
@@ -127,6 +138,33 @@ class Code:
         kind = ir.FunctionType(ir.VoidType(), [word])
         write = ir.Function(self._module, kind, "llvm.aarch64.set.fpcr")
         return lambda: self.builder.call(read, []), lambda it: self.builder.call(write, [it])
+
+    def short_cut(
+        self, short: Callable[[], tuple[Choice, Lanes]], full: Callable[[], Lanes]
+    ) -> Lanes:
+        """What `full` gives, by a shorter way where all lanes may take it.
+
+        `short` gives where it is as good as `full`, to the last bit, and its numbers. Only a
+        program that branches takes it: the processor predicts it and goes on meanwhile. Where many
+        lanes are stepped one of them always needs `full`.
+        """
+        if not self.branches:
+            return full()
+        emit, bits = self.builder, ir.IntType(self.width)
+        good, quick = short()
+        every = reduce(emit.and_, good.vectors)
+        needed = emit.icmp_unsigned("!=", emit.bitcast(every, bits), bits((1 << self.width) - 1))
+        before = emit.block
+        with emit.if_then(needed, likely=False):
+            slow = full()
+            after = emit.block
+        found = []
+        for one, two in zip(quick.vectors, slow.vectors, strict=True):
+            chosen = emit.phi(self.vector)
+            chosen.add_incoming(one, before)
+            chosen.add_incoming(two, after)
+            found.append(chosen)
+        return Lanes(self, found)
 
     def constant(self, value: float, count: int) -> Lanes:
         """The same number in all lanes of so many vectors."""
@@ -281,6 +319,17 @@ class Choice:
 
     def __init__(self, code: Code, vectors: Sequence[Any]) -> None:
         self.code, self.vectors = code, tuple(vectors)
+
+    def __and__(self, other: Choice) -> Choice:
+        pairs = zip(self.vectors, other.vectors, strict=True)
+        return Choice(self.code, [self.code.builder.and_(one, two) for one, two in pairs])
+
+    def __or__(self, other: Choice) -> Choice:
+        pairs = zip(self.vectors, other.vectors, strict=True)
+        return Choice(self.code, [self.code.builder.or_(one, two) for one, two in pairs])
+
+    def __invert__(self) -> Choice:
+        return Choice(self.code, [self.code.builder.not_(one) for one in self.vectors])
 
     def choose(self, yes: Number, no: Number) -> Lanes:
         """One number where it is yes, and another where it is no."""

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sim.engine.lanes import Lanes, between, greatest, least
+from sim.engine.lanes import Choice, Lanes, Number, between, greatest, least
 
 __all__ = [
     "PlayOverStep",
@@ -61,26 +61,39 @@ def play_force(y0: Lanes, ahead: Lanes, d: Lanes, low: Lanes, play: PlayOverStep
     c0 = between(y0, low, d)
     e0 = y0 - c0
     known = play.within * c0 + ahead
-    guess = e0.is_zero().choose(known * play.inverse, play.outside * c0 + known)
-    moved = guess - y0
-    per_moved = 1.0 / moved.is_zero().choose(1.0, moved)
-    q = ((between(guess, low, d) - c0) * per_moved).lanes()
-    c1, e1 = c0, e0
-    for _ in range(_CORRECTIONS):
-        share = (play.half * q).lanes()
-        pulled = share * e0 + known
-        inside = (pulled * play.inverse).lanes()
-        c1 = between(inside, low, d)
-        # (1 - share) e1 = pulled + ..., by the series of 1/(1 - share): share is 0.1 at most.
-        series = share * (share * (share + 1.0) + 1.0) + 1.0
-        outside = (play.beyond * c1 + pulled) * series
-        e1 = c1.equals(inside).choose(0.0, outside)
-        # One Newton step carries the reciprocal over to the corrected motion.
-        moved = c1 + e1 - y0
-        per_moved = (per_moved * (2.0 - moved * per_moved)).lanes()
-        q = least(greatest(((c1 - c0) * per_moved).lanes(), 0.0), 1.0)
-    spring = play.half_k * (q * (e0 + e1) + (c0 + c1))
-    return play.per_step * (c1 - c0) + spring.lanes()
+    direct = (known * play.inverse).lanes()
+    guess = e0.is_zero().choose(direct, play.outside * c0 + known)
+
+    def force(c1: Lanes, twice: Number) -> Lanes:
+        return play.per_step * (c1 - c0) + (play.half_k * twice).lanes()
+
+    def staying() -> tuple[Choice, Lanes]:
+        """Inside, or beyond one end, for the whole step."""
+        c1, free = between(direct, low, d), e0.is_zero()
+        closed = c1.equals(c0) & between(guess, low, d).equals(c0)
+        return (free & c1.equals(direct)) | (closed & ~free), force(c1, c0 + c1)
+
+    def crossing() -> Lanes:
+        moved = guess - y0
+        per_moved = 1.0 / moved.is_zero().choose(1.0, moved)
+        q = ((between(guess, low, d) - c0) * per_moved).lanes()
+        c1, e1 = c0, e0
+        for _ in range(_CORRECTIONS):
+            share = (play.half * q).lanes()
+            pulled = share * e0 + known
+            inside = (pulled * play.inverse).lanes()
+            c1 = between(inside, low, d)
+            # (1 - share) e1 = pulled + ..., by the series of 1/(1 - share): share is at most 0.1.
+            series = share * (share * (share + 1.0) + 1.0) + 1.0
+            outside = (play.beyond * c1 + pulled) * series
+            e1 = c1.equals(inside).choose(0.0, outside)
+            # One Newton step carries the reciprocal over to the corrected motion.
+            moved = c1 + e1 - y0
+            per_moved = (per_moved * (2.0 - moved * per_moved)).lanes()
+            q = least(greatest(((c1 - c0) * per_moved).lanes(), 0.0), 1.0)
+        return force(c1, q * (e0 + e1) + (c0 + c1))
+
+    return y0.code.short_cut(staying, crossing)
 
 
 def friction_force(w0: Lanes, ahead: Lanes, most: Lanes, holds: Lanes, per_beta: Lanes) -> Lanes:
@@ -93,11 +106,19 @@ def friction_force(w0: Lanes, ahead: Lanes, most: Lanes, holds: Lanes, per_beta:
     start = w0.is_zero().choose(ahead, w0)
     sliding = most.signed_as(-start)
     slid = ahead.signed_by(start) - holds
-    before = abs(w0)
-    share = before / (before - least(slid, -_TINY))
-    turned = sliding * (2.0 * share - 1.0)
-    crossing = (abs(ahead - w0) <= holds).choose(ahead * per_beta, turned)
-    return (slid >= 0.0).choose(sliding, crossing)
+    slides = slid >= 0.0
+    stops = abs(ahead - w0) <= holds
+
+    def not_turning() -> tuple[Choice, Lanes]:
+        return slides | stops, slides.choose(sliding, ahead * per_beta)
+
+    def any_way() -> Lanes:
+        before = abs(w0)
+        share = before / (before - least(slid, -_TINY))
+        turned = sliding * (2.0 * share - 1.0)
+        return slides.choose(sliding, stops.choose(ahead * per_beta, turned))
+
+    return w0.code.short_cut(not_turning, any_way)
 
 
 def peaked_friction(w: Lanes, T: Lanes, T_s: Lanes, w_s: Lanes) -> Lanes:

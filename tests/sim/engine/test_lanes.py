@@ -15,13 +15,13 @@ from llvmlite import ir
 
 from sim.engine import machine_code
 from sim.engine.lanes import VECTOR_BYTES, Code, Lanes, between, greatest, least
-from sim.engine.laws import peaked_friction
+from sim.engine.laws import PlayOverStep, friction_force, peaked_friction, play_force
 
 ALIVE = []
 
 
-def computed(expression, columns, single, fused=None):
-    """What an expression of lanes gives for columns (k, lanes) of numbers."""
+def machine(expression, inputs, single, fused=None, branches=False):
+    """A function that gives what an expression of lanes makes of `inputs` columns of numbers."""
     dtype = np.float32 if single else np.float64
     module, integer = ir.Module(), ir.IntType(64)
     scalar = ir.FloatType() if single else ir.DoubleType()
@@ -29,12 +29,8 @@ def computed(expression, columns, single, fused=None):
     function = ir.Function(module, ir.FunctionType(ir.VoidType(), [pointer, pointer]), "run")
     emit = ir.IRBuilder(function.append_basic_block())
     fused = machine_code.multiplies_and_adds() if fused is None else fused
-    code = Code(module, emit, single, fused)
+    code = Code(module, emit, single, fused, branches)
     width, vectors = code.width, 2
-    given_numbers = np.zeros((len(columns), vectors * width), dtype)
-    count = len(columns[0])
-    given_numbers[:, :count] = columns
-    given_numbers[:, count:] = given_numbers[:, :1]
 
     def at(base, place):
         start = emit.gep(base, [integer(place)])
@@ -43,20 +39,33 @@ def computed(expression, columns, single, fused=None):
     numbers = [
         Lanes(code, [emit.load(at(function.args[0], (k * vectors + v) * width), align=4)
                      for v in range(vectors)])
-        for k in range(len(columns))
+        for k in range(inputs)
     ]  # fmt: skip
     result = expression(*numbers).lanes()
     for v, vector in enumerate(result.vectors):
         emit.store(vector, at(function.args[1], v * width), align=4)
     emit.ret_void()
-    machine = machine_code._target_machine()
-    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(str(module)), machine)
+    target = machine_code._target_machine()
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(str(module)), target)
     engine.finalize_object()
     ALIVE.append(engine)
-    found = np.zeros(vectors * width, dtype)
     kind = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
-    kind(engine.get_function_address("run"))(given_numbers.ctypes.data, found.ctypes.data)
-    return found[:count]
+    call = kind(engine.get_function_address("run"))
+
+    def run(columns):
+        given_numbers, count = np.zeros((inputs, vectors * width), dtype), np.shape(columns)[1]
+        given_numbers[:, :count] = columns
+        given_numbers[:, count:] = given_numbers[:, :1]
+        found = np.zeros(vectors * width, dtype)
+        call(given_numbers.ctypes.data, found.ctypes.data)
+        return found[:count]
+
+    return run
+
+
+def computed(expression, columns, single, fused=None):
+    """What an expression of lanes gives for columns (k, lanes) of numbers."""
+    return machine(expression, len(columns), single, fused)(columns)
 
 
 A = np.array([1.5, -2.0, 0.0, 1e-3, 7.0, -0.25, 3.0])
@@ -183,3 +192,46 @@ def test_stribecks_curve_is_as_good_as_it_says():
         found = computed(peaked_friction, [w[part], one[part], 2.0 * one[part], 0.5 * one[part]],
                          single=False)  # fmt: skip
         assert found == pytest.approx(1.0 + 2.0 * np.exp(-((w[part] / 0.5) ** 2)), abs=2e-5)
+
+
+D, HALF, DAMP = 1e-3, -0.05, -0.01
+"""A play, and half k beta and (c/h) beta of a step, as those of the paper's units."""
+EDGES = D * np.array([-3.0, -1.0 - 1e-9, -1.0, -1.0 + 1e-9, 0.0, 0.4, 1.0 - 1e-9, 1.0, 1.5])
+
+
+def play(y0, ahead):
+    """The force of a play of that size."""
+    away = HALF + DAMP
+    fixed = 0.5e4, 1e3, HALF, HALF - DAMP, away, away - 1.0, 1.0 / (1.0 - away)
+    return play_force(y0, ahead, y0.like(D), y0.like(-D), PlayOverStep(*map(y0.like, fixed)))
+
+
+def friction(w0, ahead):
+    """The force of a friction that slows motion down by `D` a step at most."""
+    return friction_force(w0, ahead, w0.like(0.1), w0.like(D), w0.like(0.1 / D))
+
+
+@pytest.mark.parametrize("law", [play, friction])
+def test_a_short_cut_gives_the_same_to_the_last_bit(law):
+    plain, branching = (machine(law, 2, single=False, branches=b) for b in (False, True))
+    rng = np.random.default_rng(0)
+    random = D * rng.normal(scale=2.0, size=(2, 400))
+    cases = np.hstack([[np.repeat(EDGES, len(EDGES)), np.tile(EDGES, len(EDGES))], random,
+                       [[np.nan, 0.0, D, np.inf], [0.0, np.nan, -np.inf, D]]])  # fmt: skip
+    # Alone a case goes its own way; among others all lanes go the long way as soon as one must.
+    for case in cases.T[:, :, None]:
+        np.testing.assert_array_equal(branching(case), plain(case))
+    for first in range(0, cases.shape[1], 5):
+        some = cases[:, first : first + 5]
+        np.testing.assert_array_equal(branching(some), plain(some))
+
+
+def test_a_short_cut_is_taken_only_where_all_lanes_may():
+    def expression(a):
+        return a.code.short_cut(lambda: (a > 0.0, a.like(1.0)), lambda: a.like(2.0))
+
+    plain, branching = (machine(expression, 1, single=False, branches=b) for b in (False, True))
+    assert list(branching([[1.0, 2.0]])) == [1.0, 1.0]
+    assert list(branching([[1.0, -2.0]])) == [2.0, 2.0]
+    assert list(branching([[1.0, np.nan]])) == [2.0, 2.0]
+    assert list(plain([[1.0, 2.0]])) == [2.0, 2.0]
