@@ -1,7 +1,7 @@
 """What the driver of the 35670A assumes, as checks on a real instrument.
 
-Owns the list of `docs/instrument.md` as far as a program can look at it. Each check leaves the
-source off or is followed by the safe-off recipe.
+Owns the list of `docs/instrument.md` as far as a program can look at it. A check that sets a
+level says that it drives, and is followed by the safe-off recipe.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ import time
 
 import numpy as np
 
-from daq.analyser import PointSettings, SourceState
-from daq.driving.first_day import Check, FirstDay
+from daq.analyser import PointSettings
+from daq.driving.first_day import WORDS, Check, FirstDay, at_rest
 from daq.driving.replies import parse_string
 from daq.driving.scpi_connection import Dialogue
 from daq.driving.variance import normalised_variance
@@ -26,6 +26,7 @@ _BAND_HZ = (100.0, 200.0)
 _MIDDLE_HZ = 150.0
 _READINGS = 20
 _WAIT_S = 60.0
+_BARE_V = 0.01
 _NOISY = 0.1
 """Normalised variance above which its scale cannot be told."""
 _SETTINGS = "daq/hp35670a/settings.py"
@@ -33,7 +34,7 @@ _SETTINGS = "daq/hp35670a/settings.py"
 
 def _talk(day: FirstDay) -> Dialogue:
     dialogue = Dialogue(day.transport)
-    dialogue.on_exchange = day.on_exchange
+    dialogue.on_exchange, dialogue.on_wait = day.analyser.on_exchange, day.analyser.on_wait
     return dialogue
 
 
@@ -52,16 +53,10 @@ def _refusal(dialogue: Dialogue, line: str) -> str:
 
 def _identity(day: FirstDay) -> tuple[bool | None, str]:
     found = day.analyser.identify()
-    day.kept["identity"] = found
-    return "1D2" in found.options, f"{found.maker} {found.model}, options {found.options}"
-
-
-def _safe_off(day: FirstDay) -> tuple[bool | None, str]:
-    state = day.analyser.make_safe()
-    steps = getattr(day.analyser, "safe_off", None)
-    seen = day.look("oscilloscope on the source: is it at rest?")
-    proven = state is SourceState.CONFIRMED_OFF
-    return (proven and seen) if seen is not None else None, f"read back: {steps}; watched: {seen}"
+    return (
+        "1D2" in found.options,
+        f"{found.maker} {found.model}, options {', '.join(found.options) or 'none'}",
+    )
 
 
 def _reset_zeroes(day: FirstDay) -> tuple[bool | None, str]:
@@ -80,11 +75,13 @@ def _reset_zeroes(day: FirstDay) -> tuple[bool | None, str]:
 
 def _bare_level(day: FirstDay) -> tuple[bool | None, str]:
     dialogue = _swept(day)
-    dialogue.send("SOUR:VOLT 0.01")
+    # Half, for the instrument may take it as a root mean square.
+    sent = f"{min(_BARE_V, day.level_vpk / 2):.4g}"
+    dialogue.send(f"SOUR:VOLT {sent}")
     value, unit = dialogue.ask("SOUR:VOLT?"), dialogue.ask("SOUR:VOLT? UNIT")
     dialogue.send("SOUR:VOLT 0 VPK")
     dialogue.drain()
-    return parse_string(unit).upper() == "VPK", f"0.01 reads back {value} {unit}"
+    return parse_string(unit).upper() == "VPK", f"{sent} reads back {value} {unit}"
 
 
 def _units(day: FirstDay) -> tuple[bool | None, str]:
@@ -208,21 +205,24 @@ def _after_the_last(day: FirstDay) -> tuple[bool | None, str]:
         dialogue.send(line)
     dialogue.send("ABOR;:INIT;*OPC")
     wait_until_done(dialogue, "sweep of five points", Deadline.after(_WAIT_S))
-    done = day.look("the sweep is over: does the source still drive?")
+    done = day.drives("after the last point of a sweep")
+    if done is None:
+        return None, "not watched"
     dialogue.send("ABOR")
-    aborted = day.look("ABOR was sent: does the source still drive?")
-    if done is None or aborted is None:
-        return None, "nobody watched"
-    return done and aborted, f"after the last point: {done}; after ABOR: {aborted}"
+    aborted = day.drives("after ABOR")
+    if aborted is None:
+        return None, f"drives after the last point: {WORDS[done]}; after ABOR: not watched"
+    seen = f"drives after the last point: {WORDS[done]}; after ABOR: {WORDS[aborted]}"
+    return done and aborted, seen
 
 
 CHECKS = (
     Check("identity", "a 35670A with option 1D2", "daq/hp35670a/identity.py", _identity),
-    Check("safe-off", "the source is at rest after the recipe", "daq/hp35670a/safe.py", _safe_off),
+    Check("safe-off", "the source is at rest after the recipe", "daq/hp35670a/safe.py", at_rest),
     Check("reset", "*RST zeroes the level that swept sine keeps", "daq/hp35670a/setup.py",
-          _reset_zeroes),
+          _reset_zeroes, drives=True),
     Check("bare level", "a level without unit is V peak; the driver always sends one", _SETTINGS,
-          _bare_level),
+          _bare_level, drives=True),
     Check("units", "? UNIT answers for every setting in doubt", "daq/driving/settings.py", _units),
     Check("output switch", "OUTP? is refused in swept sine; the driver never asks there",
           "daq/hp35670a/safe.py", _output_in_sine),
@@ -239,5 +239,7 @@ CHECKS = (
           "daq/hp35670a/sweeps.py", _both_ends, drives=True),
     Check("after the last point", "the source goes on driving", "daq/hp35670a/safe.py",
           _after_the_last, drives=True),
+    Check("safe-off in the end", "the source is at rest after all that drove",
+          "daq/hp35670a/safe.py", at_rest),
 )  # fmt: skip
-"""In the order in which they are made; those that drive come last."""
+"""In the order in which they are made; those that measure come last."""

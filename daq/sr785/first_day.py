@@ -1,17 +1,18 @@
 """What the driver of the SR785 assumes, as checks on a real instrument.
 
-Owns the list of `docs/sr785.md` as far as a program can look at it. Each check leaves the source
-off or is followed by the safe-off recipe.
+Owns the list of `docs/sr785.md` as far as a program can look at it. A check that sets a level says
+that it drives, and is followed by the safe-off recipe.
 """
 
 from __future__ import annotations
 
+import math
 import time
 
 import numpy as np
 
-from daq.analyser import PointSettings, SourceState
-from daq.driving.first_day import Check, FirstDay
+from daq.analyser import PointSettings
+from daq.driving.first_day import WORDS, Check, FirstDay, NotAtRest, at_rest
 from daq.driving.variance import normalised_variance
 from daq.errors import BenchTimeout, LashbenchError
 from daq.plan import spaced_frequencies
@@ -30,7 +31,7 @@ _NOISY = 0.1
 
 def _talk(day: FirstDay) -> Dialogue:
     dialogue = Dialogue(day.transport)
-    dialogue.on_exchange = day.on_exchange
+    dialogue.on_exchange, dialogue.on_wait = day.analyser.on_exchange, day.analyser.on_wait
     return dialogue
 
 
@@ -62,22 +63,16 @@ def _drive(day: FirstDay, dialogue: Dialogue) -> None:
 
 def _identity(day: FirstDay) -> tuple[bool | None, str]:
     found = day.analyser.identify()
-    day.kept["identity"], day.kept["model"] = found, found.model
+    day.kept["model"] = found.model
     return found.model == "SR785", f"{found.maker} {found.model}, serial {found.serial}"
-
-
-def _safe_off(day: FirstDay) -> tuple[bool | None, str]:
-    state = day.analyser.make_safe()
-    seen = day.look("oscilloscope on the source: is it at rest?")
-    proven = state is SourceState.CONFIRMED_OFF
-    steps = getattr(day.analyser, "safe_off", None)
-    return (proven and seen) if seen is not None else None, f"read back: {steps}; watched: {seen}"
 
 
 def _levels(day: FirstDay) -> tuple[bool | None, str]:
     dialogue = _swept(day, *_BAND_HZ, _POINTS)
     found = []
-    for sent in ("100 mV", "0.1 V", "-20 dBVpk"):
+    # Rounded down: none is above the highest level of the day.
+    decibels = math.floor(200 * math.log10(day.level_vpk)) / 10
+    for sent in (f"{1000 * day.level_vpk:g} mV", f"{day.level_vpk:g} V", f"{decibels:g} dBVpk"):
         try:
             dialogue.command(f"SSAM {sent}")
             found.append(f"{sent} reads back {dialogue.ask('SSAM?')}")
@@ -93,16 +88,23 @@ def _switch(day: FirstDay) -> tuple[bool | None, str]:
     dialogue.command(f"SSAM {1000 * day.level_vpk:g} mV")
     dialogue.command("SRCO 0")
     dialogue.command("STRT")
-    off = day.look("a sweep runs with SRCO 0: does the source drive?")
+    off = day.drives("a sweep runs with SRCO 0")
+    if off:
+        raise NotAtRest(
+            "instrument and person disagree: SRCO 0 switches it off, the person at the bench sees "
+            "the source drive in a sweep"
+        )
     dialogue.command("PAUS")
+    if off is None:
+        return None, "not watched"
     dialogue.command("SRCO 1")
     dialogue.command("STRT")
-    on = day.look("a sweep runs with SRCO 1: does the source drive?")
+    on = day.drives("a sweep runs with SRCO 1")
     dialogue.command("SRCO 0")
     dialogue.command("PAUS")
-    if off is None or on is None:
-        return None, "nobody watched"
-    return on and not off, f"SRCO 0: {off}; SRCO 1: {on}"
+    if on is None:
+        return None, f"drives with SRCO 0: {WORDS[off]}; with SRCO 1: not watched"
+    return on, f"drives with SRCO 0: {WORDS[off]}; with SRCO 1: {WORDS[on]}"
 
 
 def _order_of_bins(day: FirstDay) -> tuple[bool | None, str]:
@@ -181,9 +183,9 @@ def _variance(day: FirstDay) -> tuple[bool | None, str]:
 
 CHECKS = (
     Check("identity", "an SR785; an SR780 has other numbers", "daq/sr785/settings.py", _identity),
-    Check("safe-off", "the source is at rest after the recipe", "daq/sr785/safe.py", _safe_off),
-    Check("levels", "100 mV, 0.1 V and -20 dBVpk are taken, and answered with a unit",
-          "daq/sr785/levels.py", _levels),
+    Check("safe-off", "the source is at rest after the recipe", "daq/sr785/safe.py", at_rest),
+    Check("levels", "mV, V and dBVpk are taken, and answered with a unit",
+          "daq/sr785/levels.py", _levels, drives=True),
     Check("output switch", "a swept sine obeys SRCO", "daq/sr785/safe.py", _switch, drives=True),
     Check("order of bins", "nothing: each bin's frequency is read", "daq/sr785/traces.py",
           _order_of_bins, drives=True),
@@ -196,5 +198,7 @@ CHECKS = (
           drives=True),
     Check("normalised variance", "scatter of single cycles, whatever their number",
           "daq/driving/variance.py", _variance, drives=True),
+    Check("safe-off in the end", "the source is at rest after all that drove",
+          "daq/sr785/safe.py", at_rest),
 )  # fmt: skip
 """In the order in which they are made."""

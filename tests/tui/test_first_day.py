@@ -1,6 +1,8 @@
 """The first day, on simulated instruments, whole and broken: report, transcript, source off."""
 
 import json
+import re
+import socket
 
 import pytest
 from bench_server import served, simulated
@@ -50,12 +52,46 @@ def test_what_differs_is_told_with_where_to_change_it(tmp_path, capsys):
     assert "differs         change of MEAS" in said
 
 
-def test_a_dead_instrument_ends_it_with_a_report_and_the_loud_words(tmp_path, capsys):
+def test_a_connection_that_breaks_ends_it_with_the_source_off_over_a_new_one(tmp_path, capsys):
     box = simulated("", LinearPlant(known_gain), ["dropped-connection:phase=prepare,skip=30"])
     with served(box) as url:
+        assert first_day(url, tmp_path, "--yes") == 3
+    assert "connection was lost" in capsys.readouterr().err
+    assert box.driven_v == 0
+    report = (tmp_path / "report.md").read_text()
+    assert "- source in the end: confirmed-off" in report
+    assert "- ended: early" in report
+
+
+@pytest.mark.parametrize("made", ["", "in/two/"])
+def test_what_is_not_there_leaves_no_folder(tmp_path, capsys, made):
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        url = f"TCPIP::127.0.0.1::{free.getsockname()[1]}::SOCKET"
+        assert first_day(url, tmp_path / f"{made}out", "--yes") == 3
+    assert "no connection" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_the_driver_cannot_drive_is_driven_by_no_check(tmp_path, capsys):
+    box = simulated("", LinearPlant(known_gain), ["missing-option"])
+    with served(box) as url:
         assert first_day(url, tmp_path, "--yes") == 1
-    assert "switch it off by hand" in capsys.readouterr().err
-    assert "source in the end: un" in (tmp_path / "report.md").read_text()
+    assert "1D2" in capsys.readouterr().err
+    assert box.points_begun == 0
+    report = (tmp_path / "report.md").read_text()
+    assert "0 holds" in report
+    assert "- ended: early" in report
+
+
+def test_no_check_drives_more_than_the_level_that_was_given(tmp_path):
+    assert first_day("sim:?noise=0.00001", tmp_path, "--level", "0.004") == 0
+    acts = (tmp_path / "transcript.jsonl").read_text().splitlines()
+    lines = [json.loads(act).get("line", "") for act in acts]
+    found = [re.fullmatch(r"SOUR:VOLT (\S+)( VPK)?", line) for line in lines]
+    # A bare number may be taken as a root mean square.
+    levels = [float(one[1]) * (1 if one[2] else 2**0.5) for one in found if one]
+    assert 0.0 < max(levels) <= 0.004
 
 
 @pytest.mark.parametrize(("words", "code"), [(("--level", "0"), 5), (("--level", "3"), 5), ((), 2)])

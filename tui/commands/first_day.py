@@ -1,25 +1,24 @@
 """``lashbench first-day``: what a driver assumes, looked at on a real instrument.
 
-Owns the options of the verb, the questions to the person at the bench and the two files that it
-writes. The checks are the drivers'; that the source ends off is `daq.driving.first_day`'s.
+Owns the options of the verb, the leave to drive, how the result is told, and the exit code. The
+run is that of `tui.first_day`, the checks are the drivers'.
 """
 
 from __future__ import annotations
 
 import sys
-from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from daq.errors import InputError, LimitError, MeasurementError
+from tui.entry import INTERRUPTED
 from tui.options import Json, Real, UnitName
-from tui.text.output import Console, Injected
+from tui.text.output import Console, Injected, readers_may_leave
 
 if TYPE_CHECKING:
-    from daq.analyser import Identity
-    from daq.driving.first_day import Finding, FirstDay
+    from tui.first_day.run import FirstDayRun
 
 __all__ = ["first_day"]
 
@@ -39,13 +38,16 @@ def first_day(
     """Check on a real instrument what its driver assumes; write a transcript and a report.
 
     With the amplifier disconnected and an oscilloscope on the source. It asks what only you can
-    see; without a terminal those questions stay open. The report can be sent to the maintainers:
-    it holds the instrument's identity, address and answers, and nothing else.
+    see; without a terminal those questions stay open. If you see the source drive when it should
+    be at rest, it ends at once. Ctrl-C ends it with the source off. The report is written as it
+    goes and can be sent to the maintainers: it holds the instrument's identity, address and
+    answers, and nothing else.
 
     Parameters
     ----------
     out
-        Folder for transcript.jsonl and report.md; made if it is not there.
+        Folder for transcript.jsonl and report.md; made if it is not there. One that holds an
+        earlier report is refused.
     level
         Highest level driven, V peak; 1 at most.
     unit
@@ -54,6 +56,9 @@ def first_day(
         Drive hardware without asking; needed where there is no terminal.
     """
     from daq.drivers import driver_at, is_simulated, parse_instrument
+    from sim.unit import load_unit
+    from tui.first_day.folder import Folder
+    from tui.first_day.run import FirstDayRun
 
     if not 0.0 < level <= _HIGHEST_VPK:
         raise LimitError(f"--level {level:g} V peak must be above 0 and at most {_HIGHEST_VPK:g}")
@@ -61,29 +66,62 @@ def first_day(
     driver, _ = driver_at(instrument)
     if driver.first_day is None:
         raise InputError(f"{instrument}: there are no first-day checks for {driver.name}")
-    transcript, report = out / "transcript.jsonl", out / "report.md"
-    for file in (transcript, report):
-        if file.exists():
-            raise InputError(f"{file} is there already; give another folder with --out")
-    is_real = not is_simulated(instrument)
-    if is_real:
-        _confirm(instrument, level, yes)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{out}: cannot be made ({error.strerror})") from error
-    with ExitStack() as stack:
-        findings, document = _looked_at(
-            instrument, unit, level, out, transcript, report, is_real, console, stack
-        )
-    for finding in findings:
-        if not json:
-            console.data(f"{finding.verdict:14}  {finding.name}: {finding.seen}")
+    subject = load_unit(unit)
+    with Folder(out) as folder:
+        is_real = not is_simulated(instrument)
+        if is_real:
+            _confirm(instrument, level, yes)
+        run = FirstDayRun(instrument, subject, level, folder, is_real, console)
+        run.run()
+    with readers_may_leave():
+        _tell(run, json, console)
+    return _exit_code(run)
+
+
+def _tell(run: FirstDayRun, json: bool, console: Console) -> None:
+    """What came of it, also where it ended early."""
+    folder = run.folder
     if json:
-        console.document(document)
-    else:
-        console.data(f"\n{report} and {transcript} are written")
-    return 1 if any(finding.verdict == "failed" for finding in findings) else 0
+        from dataclasses import asdict
+
+        console.document(
+            {
+                "report": str(folder.report),
+                "transcript": str(folder.transcript),
+                "ended": run.ended,
+                "reason": run.reason,
+                "source_state": run.source_state,
+                "contradiction": run.contradiction,
+                "findings": [asdict(finding) for finding in run.findings],
+            }
+        )
+        return
+    for finding in run.findings:
+        console.data(f"{finding.verdict:14}  {finding.name}: {finding.seen}")
+    console.data(
+        f"\n{run.ended}; source {run.source}\nreport {folder.report}, transcript "
+        f"{folder.transcript}"
+    )
+
+
+def _exit_code(run: FirstDayRun) -> int:
+    """0, 1 or that of an interruption.
+
+    Raises
+    ------
+    LashbenchError
+        With the fault that ended it, and loud where the source is not surely off.
+    """
+    is_off = run.source_state == "confirmed-off"
+    loud = "" if is_off else f"SOURCE OFF {run.source_state.upper()}: switch it off by hand"
+    if run.error is not None:
+        end = loud or "source confirmed off"
+        raise type(run.error)(f"{run.error}; {end}; report {run.folder.report}")
+    if loud:
+        raise MeasurementError(f"{loud}; report {run.folder.report}")
+    if run.ended == "interrupted":
+        return INTERRUPTED
+    return 1 if any(finding.verdict == "failed" for finding in run.findings) else 0
 
 
 def _confirm(instrument: str, level: float, yes: bool) -> None:
@@ -100,85 +138,3 @@ def _confirm(instrument: str, level: float, yes: bool) -> None:
     print(question, end="", file=sys.stderr, flush=True)  # noqa: T201
     if sys.stdin.readline().strip().lower() not in ("y", "yes"):
         raise InputError("not confirmed; nothing was sent")
-
-
-def _look(question: str) -> bool | None:
-    """Ask the person at the bench; None without a terminal, or without an answer."""
-    if not (sys.stdin.isatty() and sys.stderr.isatty()):
-        return None
-    print(f"{question} [y/n, Enter: not seen] ", end="", file=sys.stderr, flush=True)  # noqa: T201
-    answer = sys.stdin.readline().strip().lower()
-    return {"y": True, "yes": True, "n": False, "no": False}.get(answer)
-
-
-def _looked_at(
-    url: str,
-    unit: str,
-    level: float,
-    out: Path,
-    transcript: Path,
-    report: Path,
-    is_real: bool,
-    console: Console,
-    stack: ExitStack,
-) -> tuple[list[Finding], dict[str, object]]:
-    from dataclasses import asdict
-
-    from daq.analyser import SourceState
-    from daq.driving import first_day as checks
-    from daq.driving.first_day import FirstDay
-    from daq.formats.atomic import write_text
-    from daq.session.bench_lock import BenchLock
-    from daq.session.watchdog import Watchdog
-    from sim.unit import load_unit
-    from tui.bench import connect_wire
-
-    watchdog: Watchdog | None = None
-    history = out / "first-day.db"
-    if is_real:
-        lock = stack.enter_context(BenchLock(history, instrument=url))
-        watchdog = Watchdog(url, history, lock.descriptor)
-    driver, transport = connect_wire(url, load_unit(unit), transcript)
-    analyser = driver.drive(transport)
-    stack.callback(analyser.close)
-    day = FirstDay(analyser, transport, level, _look)
-    findings: list[Finding] = []
-    state = SourceState.UNKNOWN
-    fault: BaseException | None = None
-    try:
-        if watchdog is not None:
-            watchdog.stand_by(lambda: None)
-            day.on_exchange = analyser.on_exchange = watchdog.beat
-        assert driver.first_day is not None
-        for finding in checks.run(day, driver.first_day()):
-            console.note(f"  {finding.verdict}: {finding.name}")
-            findings.append(finding)
-    except BaseException as error:
-        fault = error
-        raise
-    finally:
-        state = analyser.make_safe()
-        if watchdog is not None:
-            if state is SourceState.CONFIRMED_OFF:
-                watchdog.dismiss()
-            else:
-                watchdog.leave()
-        text = checks.report(_identity(day), url, findings, state, transcript.name)
-        if fault is not None:
-            text += f"\nIt ended early: {' '.join(str(fault).split())}\n"
-        write_text(report, text)
-    if state is not SourceState.CONFIRMED_OFF:
-        raise MeasurementError(f"SOURCE OFF {state.value.upper()}: switch it off by hand")
-    return findings, {
-        "report": str(report),
-        "transcript": str(transcript),
-        "source_state": state.value,
-        "findings": [asdict(finding) for finding in findings],
-    }
-
-
-def _identity(day: FirstDay) -> Identity | None:
-    from daq.analyser import Identity as Known
-
-    found = day.kept.get("identity")
-    return found if isinstance(found, Known) else None

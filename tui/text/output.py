@@ -178,6 +178,11 @@ class Console:
         self._narrate(visible(question))
         return sys.stdin.readline().strip()
 
+    def prompt(self, text: str) -> None:
+        """Print a question to stderr, also where quiet, and leave its line open for the answer."""
+        self._clear()
+        self._narrate(visible(text))
+
     def _height(self) -> int:
         """Lines of the terminal; the usual 24 where it does not say."""
         try:
