@@ -15,7 +15,7 @@ def seen(effects, seed, size=0.5):
     return observation(read(effects, np.array([0.5, size]), np.random.default_rng(seed)))
 
 
-def judge(observed, sets=SETS, seed=0):
+def judge(observed, sets=SETS, seed=0, log_prior=None):
     found = [candidate(observed, effects, seed + i) for i, effects in enumerate(sets)]
     found.sort(key=lambda c: -c.best.log_likelihood)
-    return judge_candidates(found, observed, np.random.default_rng(seed))
+    return judge_candidates(found, observed, np.random.default_rng(seed), log_prior)

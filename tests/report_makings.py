@@ -88,7 +88,9 @@ def diagnosis(
     seen = synthetic.observation(synthetic.read(hidden, place, rng))
     candidates = [synthetic.candidate(seen, effects) for effects in [(), *judged]]
     posterior = Untrained()
-    refined = Refined(candidates, posterior.summary(seen, {}), ())
+    # The network knows whether anything is hidden, and not what.
+    log_prior = {(): -5.0 if hidden else 5.0}
+    refined = Refined(candidates, posterior.summary(seen, {}), log_prior)
     monkeypatch.setattr(diagnosis_module, "observe", lambda response: seen)
     monkeypatch.setattr(diagnosis_module, "Posterior", SimpleNamespace(find=lambda *_: posterior))
     monkeypatch.setattr(diagnosis_module, "refine", lambda *_, **__: refined)

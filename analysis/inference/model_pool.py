@@ -61,12 +61,6 @@ class ModelPool:
         """The most likely candidate."""
         return max(self.found.values(), key=lambda c: c.best.log_likelihood)
 
-    def leading(self, most: int, behind: float = np.inf) -> list[Effects]:
-        """The most likely hypotheses, none too far behind the first."""
-        likelihood = {key: c.best.log_likelihood for key, c in self.found.items()}
-        ranked = sorted(likelihood, key=lambda key: -likelihood[key])
-        return [k for k in ranked[:most] if likelihood[k] >= likelihood[ranked[0]] - behind]
-
     def simulate_about(self, starts: Mapping[Effects, tuple[Place, Reach]], groups: int) -> None:
         """Simulate hypotheses about places, each within its reach, in so many groups each."""
         wanted: list[Group] = []

@@ -7,9 +7,9 @@ verdict.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
-from itertools import combinations, islice
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from analysis.ensemble.model import Hypothesis
 from analysis.execution.executor import Executor
 from analysis.execution.progress import Progress, part_of
 from analysis.inference.model_pool import ModelPool
+from analysis.inference.odds import log_odds
 from analysis.inference.posterior import Posterior, SetPosterior
 from analysis.inference.run_design import Reach
 from analysis.inference.sets import CauseSets
@@ -28,12 +29,8 @@ Vector = NDArray[np.float64]
 
 __all__ = ["Refined", "refine"]
 
-_SHARE, _MOST = 0.99, 24
-"""Sets that are refined first hold this share of the probability; at most so many."""
-
-_BESIDE, _STEPS = 6, 2
-"""Likeliest sets that hold the best one and one cause more, which follow together with every part
-of the best one; and how often."""
+_SHARE, _MOST = 0.99, 12
+"""Sets that are refined hold this share of the probability; at most so many."""
 
 _FREQUENCIES = 20
 """Frequencies of each level that the first look takes, or more."""
@@ -41,12 +38,13 @@ _FREQUENCIES = 20
 _FIRST_GROUPS = 4
 """Groups of five runs that a set gets at first, and again where it is kept."""
 
-_KEPT, _NEAR = 8, 600.0
-"""Sets that are kept after the first look: so many, no further behind in log-likelihood."""
+_ROUNDS = ((8, 8.0, 4), (4, 8.0, 6), (4, 4.0, 8))
+"""Rounds on all frequencies: sets that take part at most, how far behind the first in log odds they
+may lie, and groups that each gets. Parts of the first take part, too: they have fewer sizes to fit
+with, and may be all that there is."""
 
-_ROUNDS = ((4, 200.0, 6), (4, 60.0, 8))
-"""Rounds on all frequencies: sets that take part at most, how far behind the first they may lie,
-and groups that each gets."""
+_LEAST = 1e-12
+"""Probability of a set that the network rules out."""
 
 _WIDE, _LEAST_REACH, _MOST_REACH = 2.0, (0.06, 0.03), (0.35, 0.3)
 """Runs lie within so many standard deviations of the network's answer; least and most in ratio and
@@ -57,12 +55,12 @@ in sizes as shares of their range."""
 class Refined:
     """Candidates, the likeliest first, and what the network said.
 
-    `summary` (1, hidden) of the observation; `proposed`: what it said of each candidate.
+    `summary` (1, hidden) of the observation; `log_prior`: logarithm of the probability of each set.
     """
 
     candidates: list[FittedModel]
     summary: NDArray[np.float32]
-    proposed: tuple[SetPosterior, ...]
+    log_prior: dict[Effects, float]
 
 
 def refine(
@@ -82,65 +80,62 @@ def refine(
         If a motion grew without bound.
     """
     unit = posterior.scales.prior.unit
+    sets = posterior.scales.sets
     summary = posterior.summary(observation, unit.tolerances)
     probability = posterior.set_probabilities(summary, tuple(without))
     order = np.argsort(-probability)
     held = np.cumsum(probability[order])
-    first = order[: min(int(np.searchsorted(held, _SHARE)) + 1, _MOST)]
+    first = order[: min(int(np.searchsorted(held, _SHARE)) + 1, _MOST)].tolist()
     rng = np.random.default_rng(seed)
     longest = max(block.stop - block.start for block in observation.blocks)
     few = observation.thinned(max(longest // _FREQUENCIES, 1))
     report = part_of(progress, 0.0, 0.4, "simulating the likeliest causes")
     coarse = ModelPool(unit, few, rng, executor, report)
-    found: dict[Effects, SetPosterior] = {}
+    log_prior: dict[Effects, float] = {}
     reaches: dict[Effects, Reach] = {}
 
     def look_at(numbers: Iterable[int]) -> None:
-        names = [tuple(sorted(posterior.scales.sets.names(int(n)))) for n in numbers]
-        new = {k: n for k, n in zip(names, numbers, strict=True) if k not in found}
-        for key, number in new.items():
-            found[key] = posterior.given(summary, int(number), float(probability[number]))
-        starts = {key: _placed(Hypothesis(unit, key), found[key], coarse) for key in new}
+        starts = {}
+        for number in dict.fromkeys(numbers):
+            key = tuple(sorted(sets.names(number)))
+            if key not in log_prior:
+                one = posterior.given(summary, number, float(probability[number]))
+                log_prior[key] = float(np.log(max(one.probability, _LEAST)))
+                starts[key] = _placed(Hypothesis(unit, key), one)
         reaches.update({key: reach for key, (_, reach) in starts.items()})
-        coarse.simulate_about(starts, _FIRST_GROUPS)
+        if starts:
+            coarse.simulate_about(starts, _FIRST_GROUPS)
 
-    sets = posterior.scales.sets
-    look_at([*first, *_parts(sets, int(first[0]))])
+    look_at([*first, *_parts(sets, first[0]), sets.index[()]])
     coarse.re_estimate_noise()
-    for _ in range(_STEPS):
-        leader = coarse.best.hypothesis.effects
-        number = sets.index[tuple(sorted(sets.effects.index(effect) for effect in leader))]
-        look_at([*_supersets(posterior, leader, probability), *_parts(sets, number)])
-    coarse.simulate_around_estimate(_kept(coarse), _FIRST_GROUPS)
+    leader = _leading(coarse, log_prior, 1, 0.0)[0]
+    look_at(_parts(sets, sets.index[tuple(sorted(map(sets.effects.index, leader)))]))
+    (most, behind, groups), *rounds = _ROUNDS
+    kept = _leading(coarse, log_prior, most, behind)
+    coarse.simulate_around_estimate(kept, _FIRST_GROUPS)
     report = part_of(progress, 0.4, 1.0, "comparing the likeliest causes")
     fine = ModelPool(unit, observation, rng, executor, report)
-    kept = dict.fromkeys([*_kept(coarse), ()])
+    places = dict.fromkeys([*_leading(coarse, log_prior, most, behind), ()])
     fine.simulate_about(
-        {k: (coarse.found[k].best.place, _nearer(reaches[k])) for k in kept}, _FIRST_GROUPS
+        {k: (coarse.found[k].best.place, _nearer(reaches[k])) for k in places}, groups
     )
     fine.re_estimate_noise()
-    for most, behind, groups in _ROUNDS:
-        near = fine.leading(most, behind)
-        fine.simulate_around_estimate(
-            list(dict.fromkeys([*near, *_parts_of(near[0], fine)])), groups
-        )
+    for most, behind, groups in rounds:
+        fine.simulate_around_estimate(_leading(fine, log_prior, most, behind), groups)
     fine.re_estimate_noise()
-    candidates = sorted(fine.found.values(), key=lambda c: -c.best.log_likelihood)
-    return Refined(candidates, summary, tuple(found.values()))
+    candidates = sorted(fine.found.values(), key=lambda c: -log_odds(c, log_prior))
+    return Refined(candidates, summary, log_prior)
 
 
-def _kept(coarse: ModelPool) -> list[Effects]:
-    """Sets that the first look leaves, and parts of the first of them.
-
-    A part has fewer sizes to fit with, and may be all that there is.
-    """
-    near = coarse.leading(_KEPT, _NEAR)
-    return list(dict.fromkeys([*near, *_parts_of(near[0], coarse)]))
-
-
-def _parts_of(whole: Effects, fine: ModelPool) -> list[Effects]:
-    """Parts of a set that are not out of the question."""
-    return [key for key in fine.leading(len(fine.found), _NEAR) if set(key) < set(whole)]
+def _leading(
+    pool: ModelPool, log_prior: Mapping[Effects, float], most: int, behind: float
+) -> list[Effects]:
+    """The sets with the largest odds, none too far behind, and every part of the first."""
+    odds = {key: log_odds(candidate, log_prior) for key, candidate in pool.found.items()}
+    ranked = sorted(odds, key=lambda key: -odds[key])
+    near = [key for key in ranked[:most] if odds[key] >= odds[ranked[0]] - behind]
+    parts = (key for key in ranked if set(key) < set(ranked[0]))
+    return list(dict.fromkeys([*near, *parts]))
 
 
 def _nearer(reach: Reach) -> Reach:
@@ -154,30 +149,12 @@ def _parts(sets: CauseSets, number: int) -> list[int]:
     return [sets.index[one] for k in range(len(whole)) for one in combinations(whole, k)]
 
 
-def _supersets(
-    posterior: Posterior, leader: Effects, probability: NDArray[np.float64]
-) -> list[int]:
-    """The likeliest sets that hold a leader and one more cause."""
-    sets = posterior.scales.sets
-    members = {sets.effects.index(effect) for effect in leader}
-    order = np.argsort(-probability)
-    holding = (n for n in order if members < set(sets.places[n]))
-    one_more = (int(n) for n in holding if sets.sizes[n] == len(members) + 1 and probability[n])
-    return list(islice(one_more, _BESIDE if leader else 0))
-
-
-def _placed(hypothesis: Hypothesis, one: SetPosterior, fine: ModelPool) -> tuple[Vector, Reach]:
-    """Where the runs of a set lie (d,), and how far about it.
-
-    By the network, and where a part of it leads, by that for what it holds.
-    """
+def _placed(hypothesis: Hypothesis, one: SetPosterior) -> tuple[Vector, Reach]:
+    """Where the runs of a set lie (d,), and how far about it, as the network says."""
     low, high = hypothesis.logs[:, 0], hypothesis.logs[:, 1]
     known = np.array([one.sizes[e, p.name] for e, p in hypothesis.parameters]).reshape(-1, 2)
     at = np.append(one.ratio_mean, (known[:, 0] - low) / (high - low))
     std = np.append(one.ratio_std, known[:, 1] / (high - low))
     least, most = (np.array([a, *[b] * (len(at) - 1)]) for a, b in (_LEAST_REACH, _MOST_REACH))
     reach = np.clip(_WIDE * std, least, most)
-    if fine.found and set(part := fine.best.hypothesis.effects) < set(hypothesis.effects):
-        shared = [True, *(effect in part for effect, _ in hypothesis.parameters)]
-        at[shared], reach[shared] = fine.best.best.place, np.minimum(reach, 4.0 * least)[shared]
     return np.clip(at, 0.02, 0.98), (float(reach[0]), reach[1:])

@@ -1,14 +1,13 @@
 """From candidates to a verdict: consistent, explained, ambiguous or unexplained.
 
-Owns how sets are compared: the score of each, the best one, the lead that it needs, and its rivals.
-Thresholds were fixed on simulated sets before any practice set was judged, except how near a rare
-rival is (docs/decisions/archive.md, 39). `analysis.checking.rejection` owns what speaks against one
+Owns how sets are compared: the posterior odds of each, the best one, the lead that it needs, and
+its rivals. `analysis.checking.rejection` owns what speaks against one
 set. It simulates nothing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -17,10 +16,10 @@ import numpy as np
 from analysis.checking.cross_validation import HeldOut, hold_out
 from analysis.checking.equivalence import is_equivalent_at_load
 from analysis.checking.goodness_of_fit import judge_adequacy, judge_chance, judge_gain
-from analysis.checking.plausibility import EDGE, may_be_within_tolerance
 from analysis.checking.rejection import FEW, OUT_OF_SIGHT, UNLIKE, find_rejection
-from analysis.emulation.fitted_model import FittedModel
+from analysis.emulation.fitted_model import Effects, FittedModel
 from analysis.emulation.likelihood import TEMPERATURE
+from analysis.inference.odds import log_odds
 from analysis.observation.observation import Observation
 
 __all__ = [
@@ -37,25 +36,10 @@ __all__ = [
 
 Word = Literal["consistent", "explained", "ambiguous", "unexplained"]
 
-_HELD_OUT = 0.25
-"""Weight of what is predicted of levels not fitted beside what fits; alone it is too rough."""
-
-_PER_PARAMETER = 8.0
-"""Log-likelihood that every further parameter must bring: it can always fit something."""
-
-_PER_CAUSE = 10.0
-"""The same for every further cause: there are twenty-odd of them to choose from."""
-
-_AT_BOUND = 10.0
-"""Cost of a parameter at the end of its plausible range: a sign that the cause is another."""
-
-_WITHIN_TOLERANCE = 40.0
-"""Cost of a datasheet value so little off that its tolerance covers it: that is no cause."""
-
 _RARE = TEMPERATURE * float(np.log(10.0))
-"""Cost of a cause that nobody would suspect first: it is taken for ten times less likely. That says
-which of two that do alike is named first; no belief about benches rules the other out as a rival.
-"""
+"""Lead of a common cause over a rare one: it is taken for ten times less likely. That
+says which of two that do alike is named first; no belief about benches rules the other out as a
+rival."""
 
 FALSE_ALARM = 20.0
 """By so much must a cause beat the baseline beyond its costs."""
@@ -231,15 +215,27 @@ class Verdict:
 
 
 def judge_candidates(
-    candidates: Sequence[FittedModel], observation: Observation, rng: np.random.Generator
+    candidates: Sequence[FittedModel],
+    observation: Observation,
+    rng: np.random.Generator,
+    log_prior: Mapping[Effects, float] | None = None,
 ) -> Verdict:
     """Judge the leading candidates and the baseline.
 
-    The score weighs the log-likelihood of all rows with that of every level
-    predicted from the others: the first uses all that was measured, the second
-    pays for nothing that does not carry over.
+    Parameters
+    ----------
+    log_prior
+        What the network says of each set, as the logarithm of its probability. Sets without one
+        are held for equally likely.
+
+    Notes
+    -----
+    The score is the logarithm of the posterior odds: the network's probability times a power of
+    the likelihood. The network pays for further causes, as it has learned how many there are.
     """
-    judged = _ranked([_unasked(c, observation) for c in _worth_judging(candidates)])
+    prior = log_prior or {}
+    chosen = _worth_judging(candidates, prior)
+    judged = _ranked([_unasked(c, observation, prior) for c in chosen])
     while True:
         judged = _ask(judged, rng)
         best = _leader(judged)
@@ -284,14 +280,16 @@ def _exceeds_chance_gain(whole: FittedModel, part: FittedModel, rng: np.random.G
     return share <= _BY_CHANCE and beyond >= _BEYOND
 
 
-def _worth_judging(candidates: Sequence[FittedModel]) -> list[FittedModel]:
-    """Those that fit best by what they cost; what they may be held against; the baseline.
+def _worth_judging(
+    candidates: Sequence[FittedModel], log_prior: Mapping[Effects, float]
+) -> list[FittedModel]:
+    """Those that score best; what they may be held against; the baseline.
 
     That is every part of theirs, and what says the same with fewer sizes.
     """
-    by_fit = sorted(candidates, key=lambda c: _cost(c) - c.best.log_likelihood)
-    chosen = by_fit[:_JUDGED]
-    for other in by_fit[_JUDGED:]:
+    by_score = sorted(candidates, key=lambda c: -log_odds(c, log_prior))
+    chosen = by_score[:_JUDGED]
+    for other in by_score[_JUDGED:]:
         effects = set(other.hypothesis.effects)
         part = any(effects < set(one.hypothesis.effects) for one in chosen)
         if part or any(is_equivalent_at_load(one, other) for one in chosen[:_JUDGED]):
@@ -368,32 +366,16 @@ def _ranked(judged: Sequence[Judged]) -> tuple[Judged, ...]:
     return tuple(sorted(believed, key=lambda one: -one.score))
 
 
-def _unasked(candidate: FittedModel, observation: Observation) -> Judged:
+def _unasked(
+    candidate: FittedModel, observation: Observation, log_prior: Mapping[Effects, float]
+) -> Judged:
     """A candidate with its score; what speaks against it is still to be asked."""
     held_out = hold_out(candidate, observation)
-    score = _score(candidate, held_out)
+    score = TEMPERATURE * log_odds(candidate, log_prior)
     return Judged(candidate, held_out, score, np.nan, np.nan, 0.0, _NOT_ASKED)
-
-
-def _score(candidate: FittedModel, held_out: HeldOut) -> float:
-    agreed = (1.0 - _HELD_OUT) * candidate.best.log_likelihood + _HELD_OUT * held_out.score
-    return float(agreed - _cost(candidate))
 
 
 def is_within_tolerance(candidate: FittedModel) -> bool:
     """Whether it is the plain model, or that within the tolerance of its datasheet."""
     hypothesis = candidate.hypothesis
     return not hypothesis.effects or hypothesis.is_tolerance(candidate.best.place)
-
-
-def _cost(candidate: FittedModel) -> float:
-    if is_within_tolerance(candidate):
-        return 0.0
-    sizes = candidate.best.place[1:]
-    bound = np.count_nonzero((sizes < EDGE) | (sizes > 1.0 - EDGE))
-    causes = len(candidate.hypothesis.effects)
-    cost = _PER_CAUSE * causes + _PER_PARAMETER * len(sizes) + _AT_BOUND * bound
-    cost += _RARE * candidate.hypothesis.rare
-    if may_be_within_tolerance(candidate):
-        cost += _WITHIN_TOLERANCE
-    return float(cost)

@@ -8,6 +8,7 @@ from judging import TRUE, WRONG, judge, seen
 from synthetic import candidate
 
 import analysis.selection.verdict as rules
+from analysis.emulation.likelihood import TEMPERATURE
 
 RARE, TEN_TIMES = ("motor-inertia",), 34.5
 """A rare cause, and what it takes to lead one that is not."""
@@ -78,7 +79,7 @@ def test_what_stands_in_for_a_refused_leader_is_not_named_alone(
     observed = seen(TRUE, 1)
     found = [candidate(observed, effects, 1 + i) for i, effects in enumerate(((), TRUE, WRONG))]
     scores = {(): 0.0, TRUE: 500.0, WRONG: 500.0 + lead}
-    monkeypatch.setattr(rules, "_score", lambda c, _: scores[c.hypothesis.effects])
+    monkeypatch.setattr(rules, "log_odds", lambda c, _: scores[c.hypothesis.effects] / TEMPERATURE)
     monkeypatch.setattr(rules, "judge_chance", lambda *_: 0.0)
     monkeypatch.setattr(
         rules, "find_rejection", lambda c, *_: objection if c.hypothesis.effects == WRONG else ""
