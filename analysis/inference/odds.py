@@ -10,14 +10,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from analysis.emulation.fitted_model import Effects, FittedModel
+from analysis.emulation.likelihood import TEMPERATURE
 
 __all__ = ["log_odds"]
-
-_EVIDENCE = 30.0
-"""Log-likelihood that counts as one unit of log odds beside what the network says. Sets of the same
-causes differ by as much and more where their runs happen to lie elsewhere. Of 29 sets, 15 and 30
-name all 12 single causes alone, 60 names 11 and 100 names 8; of 12 pairs, 15 names 2 wrongly, 30
-and 60 one, 100 none."""
 
 _LEAST_PROBABILITY = 1e-6
 """What the network holds for less likely than this it has not learned."""
@@ -33,4 +28,4 @@ def log_odds(candidate: FittedModel, log_prior: Mapping[Effects, float]) -> floa
     """
     least = float(np.log(_LEAST_PROBABILITY))
     prior = max(log_prior.get(candidate.hypothesis.effects, 0.0), least)
-    return float(candidate.best.log_likelihood / _EVIDENCE + prior)
+    return float(candidate.best.log_likelihood / TEMPERATURE + prior)
