@@ -13,11 +13,10 @@ from daq.errors import InputError
 from daq.frf import FrequencyResponse, PointFlag
 from daq.plan import SweepPlan
 from daq.store_records import StoredPoint
+from tui.app.plot.traces import legend, traces_of_points, traces_of_response
 from tui.app.run_view import RunView, source_words
 from tui.app.screens.diagnosis_screen import diagnosis_lines
 from tui.app.state.desk import plan_of_document
-from tui.app.widgets.axes import DegreeAxis, LogHertzAxis
-from tui.app.widgets.traces import legend, traces_of_points, traces_of_response
 
 PLAN = SweepPlan((100.0, 110.0, 120.0), (1.5, 2.5))
 
@@ -117,11 +116,11 @@ def test_traces_never_bridge_a_spoilt_point_and_mark_flags_by_shape():
         stored(100.0, 2.5),
     ]  # fmt: skip
     low, high = traces_of_points(points, (1.5, 2.5))
-    assert low.marks == ["o", "!", "?", "~", "o"]
+    assert low.marks == ["\u25cf", "!", "?", "~", "\u25cf"]
     assert [(run.start, run.stop) for run in low.runs] == [(0, 2), (3, 5)]
     assert high.mark != low.mark
     words = legend([low, high])
-    for word in ("o 1.5 V", "x 2.5 V", "! overload", "? spoilt", "~ not periodic"):
+    for word in ("\u25cf 1.5 V", "\u25a0 2.5 V", "! overload", "? spoilt", "~ not periodic"):
         assert word in words
     assert "coarse" not in words
 
@@ -135,26 +134,6 @@ def test_a_response_is_drawn_with_its_levels_and_as_a_reference():
     assert (one.name, two.name) == ("1 V", "2 V")
     assert all(trace.reference for trace in traces_of_response(response, "#3"))
     assert "line #3 1 V" in legend(traces_of_response(response, "#3"))
-
-
-@pytest.mark.parametrize(
-    ("band", "ticks"),
-    [
-        ((10.0, 1000.0), ["10", "20", "50", "100", "200", "500", "1000"]),
-        ((100.0, 180.0), ["100", "120", "140", "160", "180"]),
-        ((130.0, 131.0), ["130", "130.2", "130.4", "130.6", "130.8", "131"]),
-    ],
-)
-def test_frequency_ticks_are_round(band, ticks):
-    axis = LogHertzAxis()
-    low, high = np.log10(band)
-    places = axis.get_ticks(low - 1e-9, high + 1e-9, 8)
-    assert axis.get_labels_for_ticks(places) == ticks
-
-
-def test_phase_ticks_are_parts_of_a_turn():
-    assert DegreeAxis().get_ticks(-190, 190, 5) == [-180.0, -90.0, 0.0, 90.0, 180.0]
-    assert DegreeAxis(rows=6).get_ticks(-190, 190, 8) == [-180.0, 0.0, 180.0]
 
 
 def test_a_proposed_plan_is_read_in_both_forms_and_refused_in_others():

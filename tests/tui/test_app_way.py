@@ -31,7 +31,7 @@ def test_all_seven_steps(tmp_path, monkeypatch, size):
             assert "done about" in screen
             await op.press("s")
             screen = await op.sees("16 of 16 points stored; complete")
-            assert screen.count("o") >= 12
+            assert screen.count("\u25cf") >= 12
             assert "SIMULATED" in screen
             await op.press("ctrl+n")
             screen = await op.sees("[5 Result]", "Adjust stage 2 first", "b2 = 0.0455")

@@ -63,6 +63,8 @@ class BenchApp(TerminalApp):
         Lists instruments; the real search if left out.
     log
         Where the log goes, for messages that point to it.
+    bench
+        Name or path of the bench file.
     """
 
     TITLE = "lashbench"
@@ -85,9 +87,10 @@ class BenchApp(TerminalApp):
         analyses: Analyses | None = None,
         find: Callable[[bench_owner.Post], None] = bench_owner.find_instruments,
         log: Path | None = None,
+        bench: str = "default",
     ) -> None:
         super().__init__()
-        self.desk = Desk(db)
+        self.desk = Desk(db, bench=bench)
         self.keeper = SessionKeeper(self)
         self.analyses = AnalysisKeeper(self, analyses or Analyses())
         self.beside = Beside(self)
@@ -116,7 +119,10 @@ class BenchApp(TerminalApp):
         """Put a step on top, if what it needs is there; else say what is missing."""
         if not 1 <= step <= len(STEPS) or isinstance(self.screen, ModalScreen):
             return
-        missing = self._missing(step)
+        screen = self.screen
+        on = isinstance(screen, StepScreen) and step > screen.STEP and step != 7
+        unread = screen.unread() if isinstance(screen, StepScreen) and on else ""
+        missing = unread or self._missing(step)
         if missing:
             self.notify(missing, severity="warning")
         elif self.screen is not self.get_screen(STEPS[step - 1]):

@@ -30,7 +30,7 @@ Dialog > #dialog {
     border: round $accent; background: $surface; padding: 0 1;
 }
 Dialog #title { text-style: bold; }
-Dialog TextArea { height: auto; max-height: 12; min-height: 3; border: none; }
+Dialog TextArea { height: auto; max-height: 16; min-height: 3; border: none; }
 Dialog #keys { height: 1; color: $text-accent; }
 ToastRack { dock: top; align: right top; margin-top: 2; }
 #info { height: auto; max-height: 4; }

@@ -19,8 +19,10 @@ from analysis.inference.exclusion import head_unseen, list_unseen
 from analysis.observation.joint import sweep_lines
 from analysis.selection.wording import verdict_words
 from daq.errors import LashbenchError
+from tui.app.dialogs.dialogs import HelpDialog
 from tui.app.screens.result_screen import answer_lines
 from tui.app.state.desk import plan_of_document
+from tui.app.state.sessions import one_session
 from tui.app.step_screen import StepScreen
 from tui.app.widgets.plain import Words
 from tui.app.words import plan_words
@@ -44,11 +46,14 @@ on source levels that were held out, in standard errors and dB, before and after
 added. N starts the measurement that would tell rivals apart: checks first, as always, then the
 sweep itself. D then diagnoses both measurements together. A response that looks like a mistake
 is not diagnosed; A takes it as it stands.
+
+H tells what a simulated bench hid, where the measurement is of one that hides something.
 """
     BINDINGS = [
         Binding("d", "diagnose", "Diagnose", id="diagnosis.run"),
         Binding("a", "as_is", "As it is", id="diagnosis.as-is", show=False),
         Binding("n", "measure_next", "Measure this next", id="diagnosis.next"),
+        Binding("h", "reveal", "What was hidden", id="diagnosis.reveal", show=False),
     ]
 
     def body(self) -> ComposeResult:
@@ -116,6 +121,32 @@ is not diagnosed; A takes it as it stands.
             return
         if self.bench.keeper.start(hold=False):
             self.bench.go(4)
+
+    def action_reveal(self) -> None:
+        """Tell what the simulated bench hid, beside what was diagnosed."""
+        desk = self.desk
+        if desk.measurement is None or desk.unit is None or desk.results.diagnosis is None:
+            self.notify("diagnose first: D", severity="warning")
+            return
+        unit, document = desk.unit, desk.results.diagnosis.to_json()
+
+        def work() -> list[str]:
+            from tui.demonstration.hidden import behind_address, compare, worded
+
+            address = one_session(desk.db, number).header.address
+            hidden = behind_address(address, unit)
+            if hidden is None:
+                return []
+            return list(worded(hidden, compare(hidden, document), document, None))
+
+        def tell(lines: list[str]) -> None:
+            if lines:
+                self.app.push_screen(HelpDialog("What was hidden", "\n\n".join(lines)))
+            else:
+                self.notify("the bench of this measurement hides nothing")
+
+        number = desk.measurement
+        self.bench.beside.do("reveal", work, tell, "It cannot be told")
 
     def _next_plan(self) -> Mapping[str, Any] | None:
         diagnosis = self.desk.results.diagnosis

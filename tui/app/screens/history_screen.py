@@ -11,18 +11,18 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
 
 from tui.app.dialogs.correction import CorrectionDialog
+from tui.app.plot.bode import BodePlot
+from tui.app.plot.chart import Chart
+from tui.app.plot.curves import trend_drawing
+from tui.app.plot.traces import traces_of_response
 from tui.app.state.sessions import audit_trail, correct_session, responses_of
 from tui.app.step_screen import StepScreen
-from tui.app.widgets.bode import BodePlot
-from tui.app.widgets.panel import Panel
 from tui.app.widgets.plain import Table, Words
-from tui.app.widgets.traces import traces_of_response
 from tui.measurements.history_rows import Trends, answer_words, measurement_row, trend_lines
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ before stays in its audit trail, which A shows.
         """Table, plot, words."""
         with Vertical(classes="pane"):
             yield Table(id="sessions", cursor_type="row", zebra_stripes=True)
-            yield Panel("trend")
+            yield Chart("trend")
             yield BodePlot()
             yield Words("", id="text")
 
@@ -274,18 +274,9 @@ before stays in its audit trail, which A shows.
         return None
 
     def _draw_trend(self) -> None:
-        panel = self.query_one("#trend", Panel)
-        panel.clear()
-        rows = [row for row in self._rows if row["contribution_ratio"]]
-        panel.set_ylimits(-0.05, 1.05)
-        if not rows:
-            return
-        place = np.arange(len(rows), dtype=float) + 1.0
-        value = np.array([row["contribution_ratio"]["value"] for row in rows], float)
-        std = np.array([row["contribution_ratio"]["std"] or 0.0 for row in rows], float)
-        panel.set_xlimits(0.5, len(rows) + 0.5)
-        panel.set_xticks([float(p) for p in place[:: max(1, len(rows) // 12)]])
-        panel.errorbar(place, value, None, std, marker="o", marker_style="bright_blue")
+        chart = self.query_one("#trend", Chart)
+        ratios = [row["contribution_ratio"] for row in self._rows if row["contribution_ratio"]]
+        chart.show(trend_drawing(chart, ratios))
 
     def _lines(self) -> list[str]:
         results, lines = self.desk.results, []

@@ -9,17 +9,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical, VerticalScroll
-from textual_plot import HiResMode
 
+from tui.app.plot.bode import BodePlot
+from tui.app.plot.chart import Chart
+from tui.app.plot.curves import index_drawing
+from tui.app.plot.traces import traces_of_response
 from tui.app.step_screen import StepScreen
-from tui.app.widgets.bode import BodePlot
-from tui.app.widgets.panel import Panel
 from tui.app.widgets.plain import Words
-from tui.app.widgets.traces import traces_of_response
 
 if TYPE_CHECKING:
     from analysis.resonance.records import LevelFeatures
@@ -67,7 +66,7 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
         """Plot above, words below."""
         with Vertical(id="plots", classes="pane"):
             yield BodePlot()
-            yield Panel("index")
+            yield Chart("index")
             yield Words(_INDEX_WORDS, id="index-words")
         with VerticalScroll(id="words", classes="pane"):
             yield Words("", id="text")
@@ -97,7 +96,8 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
         ]
         plot.draw(traces, None, features)
         if results.estimate is not None:
-            _draw_index(self.query_one("#index", Panel), results.estimate)
+            index = self.query_one("#index", Chart)
+            index.show(index_drawing(index, results.estimate.get("error_index")))
         self.query_one("#text", Words).update("\n".join(self._lines()))
 
     def hint(self) -> str:
@@ -201,21 +201,3 @@ def ratio_words(ratio: Mapping[str, Any]) -> str:
         low, high = ratio["interval95"]
         words += f"  (95 %: {low:.3f} to {high:.3f})"
     return words
-
-
-def _draw_index(panel: Panel, document: Any) -> None:
-    panel.clear()
-    curve = document.get("error_index")
-    if not curve:
-        return
-    ratio, hertz = np.array(curve["ratio"], float), np.array(curve["hz"], float)
-    std = np.array([np.nan if v is None else v for v in curve["std_hz"]], float)
-    panel.plot(ratio, hertz, "bright_blue", HiResMode.BRAILLE, "error index")
-    every = slice(0, None, max(1, len(ratio) // 20))
-    shown = np.isfinite(hertz[every])
-    bars = np.where(np.isfinite(std[every]), std[every], 0.0)
-    panel.errorbar(
-        ratio[every][shown], hertz[every][shown], None, bars[shown], marker="o",
-        marker_style="bright_blue",
-    )  # fmt: skip
-    panel.add_v_line(float(curve["minimum_ratio"]), "green")

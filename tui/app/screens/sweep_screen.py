@@ -15,11 +15,11 @@ from textual.containers import Vertical
 from textual.widgets import ProgressBar
 
 from tui.app.dialogs.dialogs import QuestionDialog
+from tui.app.plot.bode import BodePlot
+from tui.app.plot.traces import traces_of_points, traces_of_response
 from tui.app.state.sessions import latest_complete, one_session
 from tui.app.step_screen import StepScreen
-from tui.app.widgets.bode import BodePlot
 from tui.app.widgets.plain import Words
-from tui.app.widgets.traces import traces_of_points, traces_of_response
 from tui.app.words import clock_in, plan_words, point_words, span_words
 
 if TYPE_CHECKING:
