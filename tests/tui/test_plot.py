@@ -161,7 +161,8 @@ def test_units_stand_at_the_axes_and_the_cursor_reads_values():
         assert plot.reading == ""
         await pilot.press("right")
         gain_db = response().at_level(1.5).gain_db[np.argmin(np.abs(HERTZ - plot.cursor_hz))]
-        assert f"{plot.cursor_hz:.2f} Hz {gain_db:.2f} +-0.50 dB" in plot.reading
+        assert f"{plot.cursor_hz:.2f} Hz 1.5 V: {gain_db:.2f} +-0.50 dB" in plot.reading
+        assert plot.reading.count("Hz") == 1
         await pilot.click("#gain", offset=(20, 5))
         assert plot.cursor_hz < 120.0
 

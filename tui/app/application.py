@@ -25,6 +25,7 @@ from daq.untrusted.visible_text import visible, visible_line
 from tui.app import messages
 from tui.app.copied import keep_copy
 from tui.app.dialogs.dialogs import KEYS, ErrorDialog, HelpDialog, QuestionDialog
+from tui.app.plot.bode import BodePlot
 from tui.app.run_view import RunView
 from tui.app.screens import SCREENS
 from tui.app.screens.instrument_screen import InstrumentScreen
@@ -37,6 +38,7 @@ from tui.app.state.session_keeper import SessionKeeper
 from tui.app.state.sessions import one_session
 from tui.app.step_screen import STEPS, StepScreen
 from tui.app.style import STYLE
+from tui.app.system_commands import system_commands
 from tui.app.terminal_app import TerminalApp
 from tui.entry import INTERRUPTED
 
@@ -168,7 +170,8 @@ class BenchApp(TerminalApp):
         screen = self.screen
         if isinstance(screen, StepScreen):
             title = f"Step {screen.STEP}: {STEPS[screen.STEP - 1]}"
-            self.push_screen(HelpDialog(title, f"{screen.HELP.strip()}\n\n{KEYS}"))
+            plots = f"{BodePlot.KEYS}\n\n" if screen.query(BodePlot) else ""
+            self.push_screen(HelpDialog(title, f"{screen.HELP.strip()}\n\n{plots}{KEYS}"))
 
     def action_copy(self) -> None:
         """Copy the step's result; it is written to a file too, for terminals that take none."""
@@ -208,15 +211,7 @@ class BenchApp(TerminalApp):
 
     def get_system_commands(self, screen: Screen) -> Iterable[SystemCommand]:
         """The palette: steps, keys of the step, and what Textual offers."""
-        yield SystemCommand("Source: stop", "End whatever drives", self.action_stop_source)
-        yield SystemCommand("Copy: what is shown", "To the clipboard", self.action_copy)
-        for number, name in enumerate(STEPS, start=1):
-            yield SystemCommand(f"Go to: {name}", f"Step {number}", partial(self.go, number))
-        for binding in screen.active_bindings.values():
-            if binding.node is screen and binding.binding.description:
-                action = partial(screen.run_action, binding.binding.action)
-                described = binding.binding.tooltip or f"key {binding.binding.key}"
-                yield SystemCommand(f"Step: {binding.binding.description}", described, action)
+        yield from system_commands(self, screen)
         for command in super().get_system_commands(screen):
             if command.title != "Screenshot":
                 yield command

@@ -30,6 +30,9 @@ STEPS = ("unit", "instrument", "check", "sweep", "result", "diagnosis", "history
 """The steps in order; `_TITLES` are their names for people."""
 _TITLES = ("Unit", "Instrument", "Check", "Sweep", "Result", "Diagnosis", "Report")
 _WIDE = 100
+_SIDE = 120
+"""Columns from which on master and detail stand side by side."""
+
 _TALL = 34
 
 
@@ -41,7 +44,7 @@ class StepScreen(Screen[None]):
 
     STEP: ClassVar[int] = 0
     HELP: ClassVar[str] = ""
-    HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (_WIDE, "-wide")]
+    HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (_WIDE, "-wide"), (_SIDE, "-side")]
     VERTICAL_BREAKPOINTS = [(0, "-short"), (_TALL, "-tall")]
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("ctrl+n", "next", "Next", id="step.next", tooltip="Go on to the next step"),

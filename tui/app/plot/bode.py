@@ -126,16 +126,20 @@ class BodePlot(Vertical, can_focus=True):
     @property
     def reading(self) -> str:
         """The points under the cursor in words; empty without a cursor or points."""
-        parts = []
+        parts: list[str] = []
+        before = np.nan
         for trace in self.traces:
             if self.cursor_hz is None or not len(trace.frequency_hz):
                 continue
             at = _nearest(trace.frequency_hz, self.cursor_hz)
-            error = trace.gain_std_db[at]
+            hertz, error = trace.frequency_hz[at], trace.gain_std_db[at]
             bar = f" +-{error:.2f}" if np.isfinite(error) else ""
+            # The frequency is told once where the levels share it.
+            where = "" if hertz == before else f"{hertz:.2f} Hz "
+            before = hertz
             parts.append(
-                f"{trace.name}: {trace.frequency_hz[at]:.2f} Hz "
-                f"{trace.gain_db[at]:.2f}{bar} dB {trace.phase_deg[at]:.0f} deg"
+                f"{where}{trace.name}: {trace.gain_db[at]:.2f}{bar} dB "
+                f"{trace.phase_deg[at]:.0f} deg"
             )
         return "; ".join(parts)
 

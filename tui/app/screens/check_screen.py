@@ -48,6 +48,11 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
         Binding("p", "plan", "Plan", id="check.plan", tooltip="Change the plan"),
     ]
     DEFAULT_CSS = """
+    CheckScreen #halves { height: 1fr; }
+    CheckScreen.-side #halves { layout: horizontal; }
+    CheckScreen #planned { height: auto; }
+    CheckScreen.-side #planned { width: 2fr; }
+    CheckScreen.-side #checked { width: 3fr; }
     CheckScreen #lines { height: 1fr; }
     """
 
@@ -62,14 +67,16 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
         self._is_fresh = False
 
     def body(self) -> ComposeResult:
-        """Plan above, checks below."""
-        with Vertical(classes="pane"):
-            yield Words("Plan", classes="heading")
-            yield Words("", id="plan")
-            yield Words("")
-            yield Words("Checks", classes="heading")
-            with VerticalScroll(id="lines"):
-                yield Words("", id="checks")
+        """Plan above, checks below; side by side where there is room."""
+        with Vertical(id="halves"):
+            with Vertical(id="planned", classes="pane"):
+                yield Words("Plan", classes="heading")
+                yield Words("", id="plan")
+                yield Words("")
+            with Vertical(id="checked", classes="pane"):
+                yield Words("Checks", classes="heading")
+                with VerticalScroll(id="lines"):
+                    yield Words("", id="checks")
 
     def show_body(self) -> None:
         """The plan, and every check told so far."""

@@ -72,7 +72,7 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
                 yield Choices(*self._units(), id="units", compact=True)
                 for name, label, hint in (
                     *((remark, _REMARKS[remark], "") for remark in _REMARKS),
-                    ("file", "unit file", "path of one that is not listed"),
+                    ("file", "unit file", "path, if not listed"),
                 ):
                     with Horizontal(classes="field"):
                         yield Caption(label)
