@@ -11,7 +11,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-__all__ = ["DEFAULT", "MOST", "USUAL", "Share", "believed_shares", "find_fault"]
+__all__ = ["DEFAULT", "MOST", "RESPONSE_SCALES", "USUAL", "Share", "believed_shares", "find_fault"]
 
 MOST = 0.5
 """Largest tolerance: a value that is known no better is not known."""
@@ -27,6 +27,9 @@ USUAL = 0.05
 
 _EXACT = ("filter_numerator", "N_1", "N")
 """Teeth are counted, and the filter's gain is the tachometer's: no tolerance if not by name."""
+
+RESPONSE_SCALES = ("k_ts", "filter_numerator")
+"""They scale the whole response and do nothing else."""
 
 _TOLERATED = (
     "L_a", "R_m", "k_b", "k_t", "J_m", "B_m", "T_f_m", "k_a", "k_ts", "filter_numerator",

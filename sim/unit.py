@@ -24,6 +24,10 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
+_SAID_OF_VALUES = ("tolerance", "commissioning")
+"""Sections that hold no values but what is known of them."""
+
+
 class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
@@ -115,6 +119,41 @@ class Limits(_Section):
     """Most backlash of stage 2 that is acceptable, degrees."""
 
 
+class CommissioningSweep(_Section):
+    """A sweep that a unit was commissioned by."""
+
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+    """Of its readings, see `analysis.commissioning`."""
+    levels_vpk: tuple[Positive, ...]
+    start_hz: Positive
+    stop_hz: Positive
+    points: Positive
+    serial: str | None = None
+
+
+class Commissioning(_Section):
+    """How the values of a unit were identified while it was known to be good."""
+
+    date: str
+    contribution_ratio: Annotated[float, Field(ge=0, le=1)] | None = None
+    contribution_ratio_std: NonNegative | None = None
+    datasheet: Mapping[str, Positive]
+    """Values before, by symbol."""
+    std: Mapping[str, NonNegative]
+    """One standard deviation of each value as a share, whatever the others are."""
+    order: tuple[str, ...]
+    covariance: tuple[tuple[Annotated[float, Field(allow_inf_nan=False)], ...], ...]
+    """Of the logarithms of the values in `order`; of the contribution ratio itself."""
+    sweeps: tuple[CommissioningSweep, ...]
+
+    @model_validator(mode="after")
+    def _has_a_square_covariance(self) -> Self:
+        sides = {len(self.covariance), *map(len, self.covariance)}
+        if sides != {len(self.order)}:
+            raise ValueError("covariance has not as many rows and columns as order has names")
+        return self
+
+
 class Unit(_Section):
     """A geared servo under test. Symbols are the paper's; SI units, degrees for backlash."""
 
@@ -131,6 +170,8 @@ class Unit(_Section):
     limits: Limits
     tolerance: Mapping[str, Share] | None = None
     """One standard deviation of datasheet values, as a share, by symbol or ``default``."""
+    commissioning: Commissioning | None = None
+    """Where the values and their tolerance come from, if not from a datasheet."""
     _override: dict[str, float] = PrivateAttr(default_factory=dict)
     """The same, as told on a command line in place of the file."""
 
@@ -227,11 +268,13 @@ class Unit(_Section):
 
     @property
     def physics(self) -> dict[str, Any]:
-        """What decides how it moves, as JSON: neither its name nor its limits, nor its tolerance.
+        """What decides how it moves, as JSON: not its name, limits, tolerance or commissioning.
 
         Whatever is stored of a unit, and every seed, depends on this alone.
         """
-        return self.model_dump(mode="json", exclude={"schema_", "name", "limits", "tolerance"})
+        return self.model_dump(
+            mode="json", exclude={"schema_", "name", "limits", "tolerance", "commissioning"}
+        )
 
     def with_parameters(self, **changes: float) -> Unit:
         """A copy with some parameters changed by symbol, checked like a file.
@@ -250,7 +293,11 @@ class Unit(_Section):
                     f"use one of: {', '.join(sorted(known))}"
                 )
             for name, section in document.items():
-                if name != "tolerance" and isinstance(section, dict) and symbol in section:
+                if (
+                    name not in ("tolerance", "commissioning")
+                    and isinstance(section, dict)
+                    and symbol in section
+                ):
                     section[symbol] = float(value)
         changed = unit_from_mapping(document, source=f"unit {self.name}")
         changed._override = dict(self._override)

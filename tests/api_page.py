@@ -90,9 +90,18 @@ def _entry(name: str, thing: object) -> Iterator[str]:
 
 
 def _members(thing: type) -> dict[str, object]:
-    """What a class has of its own and of those of the project that it is made of."""
+    """What a class has of its own; what a public base describes stands there alone."""
     bases = [base for base in thing.__mro__ if base.__module__.split(".")[0] in FLOORS]
-    return {name: value for base in reversed(bases) for name, value in vars(base).items()}
+    described = {name for base in bases[1:] if _is_public(base) for name in vars(base)}
+    every = {name: value for base in reversed(bases) for name, value in vars(base).items()}
+    return {name: value for name, value in every.items() if name not in described}
+
+
+def _is_public(thing: type) -> bool:
+    module = import_module(thing.__module__)
+    return thing.__name__ in getattr(module, "__all__", ()) and not any(
+        part.startswith("_") for part in thing.__module__.split(".")
+    )
 
 
 def _parameters(thing: object) -> str:

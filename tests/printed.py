@@ -23,7 +23,7 @@ from bench_server import gimbal_analyser, served, serving
 from markdown_it import MarkdownIt
 
 ROOT = Path(__file__).parents[1]
-SLOW = {"estimate", "diagnose", "prepare", "report", "reproduce", "demo"}
+SLOW = {"estimate", "diagnose", "prepare", "report", "reproduce", "demo", "plan", "commission"}
 SCREENS = {"bench", "replay"}
 _STORED = 6
 """Points that the interrupted measurement has."""

@@ -40,6 +40,11 @@ VERBS = {
     ),
     "estimate": ("tui.commands.estimate:estimate", "Tell the backlash of each gear stage."),
     "diagnose": ("tui.commands.diagnose:diagnose", "Tell what the simulation gets wrong, and why."),
+    "plan": ("tui.commands.plan:plan", "Choose the sweep that tells most of a unit."),
+    "commission": (
+        "tui.commands.commission:commission",
+        "Learn a good drive's parameters; write its unit file.",
+    ),
     "reproduce": ("tui.commands.reproduce:reproduce", "Compute the paper's tables and figures."),
     "measure": ("tui.commands.measure:measure", "Measure a unit on the bench."),
     "prepare": ("tui.commands.prepare:prepare", "Train a posterior, or simulate a sweep ahead."),

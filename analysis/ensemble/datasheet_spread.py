@@ -14,9 +14,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.ensemble.linear_response import linear_response
 from sim.effect import SOURCE_MOST_VPK
-from sim.effects import drivetrain_with
-from sim.engine.system import Law
+from sim.tolerance import RESPONSE_SCALES
 from sim.unit import Unit
 
 __all__ = ["Deviations", "Spread", "feature_spread", "spread_of"]
@@ -26,9 +26,6 @@ Deviations = tuple[tuple[str, float], ...]
 
 _FIRST = ("R_m", "k_t", "J_L", "k_s1", "k_a")
 """These come first, in this order: the stored runs of the shipped units deviate so."""
-
-_GAIN = ("k_ts", "filter_numerator")
-"""They scale the whole response: that is added to what was simulated."""
 
 _MOST = 7
 """Ways at most: as many as the signs of eight groups tell apart."""
@@ -45,12 +42,6 @@ _POINTS, _BAND = 24, (0.25, 1.6)
 """Frequencies at which responses are compared, between these multiples of the load's on shaft 1."""
 
 _LEVELS = (0.3 * SOURCE_MOST_VPK, 0.8 * SOURCE_MOST_VPK)
-_DAMPED = 0.06
-"""Damping added to every mode: play rounds off a resonance that a linear model has sharp."""
-
-_ROUNDS = 3
-"""Of the describing function of friction: speed decides damping, damping decides speed."""
-
 _DIGITS = 6
 """Of a way: libraries of linear algebra differ in the last ones."""
 
@@ -105,7 +96,9 @@ def feature_spread(unit: Unit) -> tuple[float, float]:
     """
     shares = unit.tolerances
     frequency = 0.5 * math.hypot(shares["J_L"], shares["k_s1"])
-    return frequency, math.hypot(*(shares[s] for s in ("k_a", "k_t", "R_m", "J_m", *_GAIN)))
+    return frequency, math.hypot(
+        *(shares[s] for s in ("k_a", "k_t", "R_m", "J_m", *RESPONSE_SCALES))
+    )
 
 
 class _Key:
@@ -126,10 +119,10 @@ class _Key:
 def _spread_of(key: _Key) -> Spread:
     unit, shares = key.unit, key.unit.tolerances
     symbols = [s for s in _FIRST if s in shares]
-    symbols += [s for s in shares if s not in (*_FIRST, *_GAIN)]
+    symbols += [s for s in shares if s not in (*_FIRST, *RESPONSE_SCALES)]
     symbols = [s for s in symbols if shares[s] > 0.0] or [_FIRST[0]]
     tolerance = np.array([max(shares[s], _LEAST) for s in symbols])
-    gain = max(math.hypot(*(shares[s] for s in _GAIN)), _LEAST)
+    gain = max(math.hypot(*(shares[s] for s in RESPONSE_SCALES)), _LEAST)
     if len(symbols) <= _MOST:
         every = np.eye(len(symbols))
         return Spread(tuple(symbols), every, every, tolerance, gain)
@@ -150,35 +143,12 @@ def _sensitivities(unit: Unit, symbols: list[str]) -> NDArray[np.float64]:
     stiffness = unit.stage1.k_s1 * unit.output_ratio**2
     load_hz = math.sqrt(stiffness / unit.load.J_L) / (2.0 * math.pi)
     frequency_hz = load_hz * np.geomspace(*_BAND, _POINTS)
-    plain = _response(unit, frequency_hz)
+    plain = linear_response(unit, frequency_hz, _LEVELS)
     columns = []
     for symbol in symbols:
-        off = _response(unit.with_parameters(**{symbol: (1.0 + _STEP) * known[symbol]}),
-                        frequency_hz)  # fmt: skip
+        off = linear_response(
+            unit.with_parameters(**{symbol: (1.0 + _STEP) * known[symbol]}), frequency_hz, _LEVELS
+        )
         change = np.log(off / plain) / _STEP
         columns.append(np.concatenate([change.real, change.imag]))
     return np.stack(columns, axis=1) / math.sqrt(len(plain))
-
-
-def _response(unit: Unit, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """Response (levels x frequencies,) with every mesh closed, friction as its describing function.
-
-    That of a friction T at a speed of amplitude w is a damper 4 T / (pi w): A. Gelb and W. E.
-    Vander Velde, "Multiple-Input Describing Functions and Nonlinear System Design", 1968, ch. 2.
-    """
-    system = drivetrain_with(unit, 0.5 if unit.stages == 2 else 1.0).system()
-    frictions = [law for law in system.nonlinearities if law.law is Law.FRICTION]
-    s = 2.0 * np.pi * frequency_hz * (1j + _DAMPED)
-    plain = s[:, None, None] * np.eye(len(system.b)) - system.A
-    found = []
-    for level_vpk in _LEVELS:
-        state = np.linalg.solve(plain, system.b[:, None].astype(complex))[..., 0]
-        for _ in range(_ROUNDS):
-            held = plain.copy()
-            for law in frictions:
-                speed = np.maximum(level_vpk * np.abs(state @ law.outlet), 1e-12)
-                damper = 4.0 * law.parameters[0] / (np.pi * speed)
-                held += damper[:, None, None] * np.outer(law.inlet, law.outlet)
-            state = np.linalg.solve(held, system.b[:, None].astype(complex))[..., 0]
-        found.append(state @ system.o)
-    return np.concatenate(found)

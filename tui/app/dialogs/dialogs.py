@@ -100,8 +100,7 @@ class HelpDialog(Dialog):
 
     def __init__(self, title: str, text: str) -> None:
         super().__init__(title)
-        # The dialog breaks the lines, at the width that it has.
-        self.text = "\n\n".join(" ".join(part.split()) for part in text.split("\n\n"))
+        self.text = text
 
     def content(self) -> ComposeResult:
         """The text."""

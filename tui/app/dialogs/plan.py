@@ -1,13 +1,10 @@
-"""The dialog in which the sweep is chosen: recipe, levels, band, points, cycles.
+"""The dialog in which the sweep is chosen: levels, band, points, cycles.
 
-Owns the reading of its fields, and stays open with what was typed until the sweep is accepted.
-Whether it is allowed is for the limits to say, which whoever opens the dialog asks.
+Owns the reading of its fields. Whether the plan is allowed is for the limits
+to say, when the application asks for the request.
 """
 
 from __future__ import annotations
-
-from collections.abc import Callable
-from dataclasses import dataclass
 
 from textual.app import ComposeResult
 from textual.binding import Binding
@@ -15,15 +12,13 @@ from textual.containers import Horizontal, Vertical
 from textual.screen import ModalScreen
 
 from daq.plan import SweepPlan
-from tui.app.state.desk import NO_RECIPE
 from tui.app.widgets.plain import Caption, Field, Words
 from tui.measure_options import PlanOptions
 from tui.options import real_number
 
-__all__ = ["PlanChoice", "PlanDialog"]
+__all__ = ["PlanDialog"]
 
 _FIELDS = (
-    ("recipe", "recipe", f"name, file or {NO_RECIPE}"),
     ("levels", "source levels", "V peak: 1 2.5"),
     ("start", "start", "Hz"),
     ("stop", "stop", "Hz"),
@@ -36,28 +31,8 @@ _FIELDS = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class PlanChoice:
-    """What was typed; `recipe` is a name, a path, or `NO_RECIPE`."""
-
-    recipe: str
-    options: PlanOptions
-
-
-class PlanDialog(ModalScreen[PlanChoice | None]):
-    """Asks for a plan; gives None where the old one is to stay.
-
-    Parameters
-    ----------
-    plan
-        The sweep that stands, if there is one.
-    options
-        What the operator said of it.
-    recipe
-        The recipe in force, or `NO_RECIPE`.
-    judge
-        Called with each choice; closes the dialog by `accept`, or has it say why by `refuse`.
-    """
+class PlanDialog(ModalScreen[PlanOptions | None]):
+    """Asks for a plan; gives None where the old one is to stay."""
 
     BINDINGS = [
         Binding("escape", "leave", "Keep the old plan", priority=True),
@@ -76,16 +51,9 @@ class PlanDialog(ModalScreen[PlanChoice | None]):
     PlanDialog #fault { color: $text-error; height: auto; }
     """
 
-    def __init__(
-        self,
-        plan: SweepPlan | None,
-        options: PlanOptions,
-        recipe: str,
-        judge: Callable[[PlanDialog, PlanChoice], None],
-    ) -> None:
+    def __init__(self, plan: SweepPlan | None, options: PlanOptions) -> None:
         super().__init__()
-        self._values = _texts(plan, options) | {"recipe": recipe}
-        self._judge = judge
+        self._values = _texts(plan, options)
 
     def compose(self) -> ComposeResult:
         """A line per field."""
@@ -106,40 +74,17 @@ class PlanDialog(ModalScreen[PlanChoice | None]):
     def action_take(self) -> None:
         """Read the fields; stay where one is wrong."""
         try:
-            choice = self._choice()
+            options = self._options()
         except ValueError as error:
-            self.refuse(str(error))
+            self.query_one("#fault", Words).update(str(error))
             return
-        self.query_one("#fault", Words).update("")
-        self._judge(self, choice)
-
-    def refuse(self, why: str) -> None:
-        """Stay open, with what was typed, and say why."""
-        self.query_one("#fault", Words).update(why)
-
-    def accept(self, choice: PlanChoice) -> None:
-        """Close with a choice, unless it was closed meanwhile."""
-        if self.is_current:
-            self.dismiss(choice)
-
-    def _choice(self) -> PlanChoice:
-        recipe = self._text("recipe") or NO_RECIPE
-        others = [name for name, _, _ in _FIELDS if name != "recipe"]
-        if recipe != self._values["recipe"] and all(
-            self._text(name) == self._values[name] for name in others
-        ):
-            # Another recipe alone: its own sweep is meant.
-            return PlanChoice(recipe, PlanOptions())
-        return PlanChoice(recipe, self._options())
+        self.dismiss(options)
 
     def _options(self) -> PlanOptions:
-        levels = tuple(real_number(w) for w in self._text("levels").replace(",", " ").split())
-        if not levels:
-            raise ValueError("levels: give one or more in V peak")
         return PlanOptions(
-            levels_vpk=levels,
-            start_hz=self._number("start"),
-            stop_hz=self._number("stop"),
+            levels_vpk=tuple(real_number(word) for word in self._text("levels").split()),
+            start_hz=real_number(self._text("start")),
+            stop_hz=real_number(self._text("stop")),
             points=self._count("points"),
             spacing=self._word("spacing", ("lin", "log")),
             direction=self._word("direction", ("up", "down")),
@@ -147,12 +92,6 @@ class PlanDialog(ModalScreen[PlanChoice | None]):
             integrate_cycles=self._count("integrate"),
             adaptive=self._word("adaptive", ("no", "yes")) == "yes",
         )
-
-    def _number(self, name: str) -> float:
-        try:
-            return real_number(self._text(name))
-        except ValueError as error:
-            raise ValueError(f"{name}: {error}") from error
 
     def _text(self, name: str) -> str:
         return self.query_one(f"#plan-{name}", Field).value.strip()

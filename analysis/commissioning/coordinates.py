@@ -1,0 +1,102 @@
+"""Coordinates of a drive's parameters in which the prior is standard normal.
+
+Owns which parameters are identified and the map between coordinates and values. A tolerance of
+zero means that a value is exact; it has no coordinate. It simulates nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from analysis.ensemble.machine import Machine
+from sim.tolerance import RESPONSE_SCALES
+from sim.unit import Unit
+
+Vector = NDArray[np.float64]
+
+__all__ = ["RATIO", "Coordinates"]
+
+RATIO = "contribution_ratio"
+"""Name of the contribution ratio among the coordinates."""
+
+_BACKLASH = "b_t_deg"
+_BACKLASH_SPREAD = 0.5
+"""Standard deviation of the logarithm of a total backlash that is unknown."""
+
+_FREE = ("T_f_m", "T_f_L", _BACKLASH, RATIO)
+"""Parameters that leave the linear part alone: drives that differ in them are stepped together."""
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """Names of the parameters of a unit that are identified, and their prior.
+
+    A value is the datasheet's times exp(share * z), the ratio is Phi(z); z is standard normal. So
+    every value stays positive, and every ratio is as likely as any other. `shares` (d,) is NaN
+    for the ratio.
+    """
+
+    unit: Unit
+    symbols: tuple[str, ...]
+    shares: tuple[float, ...]
+
+    @classmethod
+    def of(cls, unit: Unit, *, total_backlash_unknown: bool = False) -> Self:
+        """All parameters of a unit whose tolerance is not zero, and the ratio of two stages."""
+        held = {s: share for s, share in unit.tolerances.items() if share > 0.0}
+        if total_backlash_unknown:
+            held[_BACKLASH] = _BACKLASH_SPREAD
+        if unit.stages == 2:
+            held[RATIO] = float("nan")
+        return cls(unit, tuple(held), tuple(held.values()))
+
+    def __len__(self) -> int:
+        return len(self.symbols)
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """Which coordinates (d,) may differ among machines that are stepped together."""
+        return np.array([symbol in _FREE for symbol in self.symbols])
+
+    @property
+    def scales(self) -> NDArray[np.bool_]:
+        """Which coordinates (d,) do no more than scale the response."""
+        return np.array([symbol in RESPONSE_SCALES for symbol in self.symbols])
+
+    def factors(self, z: Vector) -> Vector:
+        """Values (..., d) as multiples of the datasheet's; the ratio itself in its place."""
+        shares = np.nan_to_num(np.array(self.shares))
+        ratio = np.array([symbol == RATIO for symbol in self.symbols])
+        return np.where(ratio, ndtr(z), np.exp(shares * z))
+
+    def slopes(self, z: Vector) -> Vector:
+        """Derivative (d,) of the logarithm of each value by its coordinate; of the ratio itself."""
+        shares = np.nan_to_num(np.array(self.shares))
+        ratio = np.array([symbol == RATIO for symbol in self.symbols])
+        return np.where(ratio, np.exp(-0.5 * z**2) / math.sqrt(2.0 * math.pi), shares)
+
+    def nominal(self) -> Vector:
+        """Coordinates (d,) of the datasheet, the ratio amid its range."""
+        return np.zeros(len(self))
+
+    def machine(self, z: Vector, seed: int) -> Machine:
+        """The machine at coordinates (d,)."""
+        factors = dict(zip(self.symbols, self.factors(z).tolist(), strict=True))
+        ratio = factors.pop(RATIO, 1.0)
+        b_t_deg = None
+        if _BACKLASH in factors:
+            b_t_deg = self.unit.backlash.b_t_deg * factors.pop(_BACKLASH)
+        deviations = tuple((symbol, factor - 1.0) for symbol, factor in factors.items())
+        return Machine(ratio, seed, b_t_deg, deviations)
+
+    def values(self, z: Vector) -> dict[str, float]:
+        """Physical values at coordinates (d,), by symbol, the ratio among them."""
+        known = self.unit.parameters
+        factors = zip(self.symbols, self.factors(z).tolist(), strict=True)
+        return {s: factor if s == RATIO else known[s] * factor for s, factor in factors}

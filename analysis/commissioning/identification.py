@@ -1,0 +1,142 @@
+"""Identification: rounds of simulated drives that close in on the one that was swept.
+
+Owns how drives are drawn and simulated in each round, and the reading that a bench would take of
+them. What they tell is worked out in `analysis.commissioning.regression`. It writes nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.commissioning.coordinates import Coordinates
+from analysis.commissioning.regression import Gaussian, Round, regress
+from analysis.ensemble.batch import Family, read_families
+from analysis.execution.executor import Executor
+from analysis.observation.observation import Observation, channels_of_readings
+
+Vector = NDArray[np.float64]
+
+__all__ = ["Identified", "identify", "simulate_drives"]
+
+_ROUNDS, _PER_COORDINATE, _LEAST = 6, 3, 12
+"""Rounds, and families of each for every coordinate, at least so many; the last one, which settles
+the covariance, has twice as many."""
+
+_LANES = 5
+"""Drives of a family: they share their linear part, so that five cost hardly more than one."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Identified:
+    """The posterior of the coordinates and how well the last round's drives describe the sweep.
+
+    `misfit`: root mean square of what the regression leaves of the measurement over that of the
+    simulated drives; 1 is usual. `misfit_rank`: share of the simulated drives that it leaves less
+    of. `stds`: standard deviations (rounds, d) after each round.
+    """
+
+    coordinates: Coordinates
+    posterior: Gaussian
+    misfit: float
+    misfit_rank: float
+    stds: Vector
+
+
+def identify(
+    coordinates: Coordinates,
+    observation: Observation,
+    *,
+    seed: int = 0,
+    executor: Executor | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Identified:
+    """Identify the parameters of the drive that was swept.
+
+    Parameters
+    ----------
+    coordinates
+        Which parameters, and their prior.
+    observation
+        One or several sweeps; the channels (3, rows) may hold NaN.
+    seed
+        Of the drives that are drawn.
+
+    Raises
+    ------
+    AnalysisError
+        If a motion grew without bound.
+    """
+    rng = np.random.default_rng(seed)
+    prior = Gaussian(coordinates.nominal(), np.eye(len(coordinates)))
+    at = proposal = prior
+    measured = observation.values.ravel()
+    stds = []
+    fit = None
+    families = max(_PER_COORDINATE * len(coordinates), _LEAST)
+    for number in range(_ROUNDS):
+        last = number == _ROUNDS - 1
+        proposal = at.proposal(proposal) if number else prior
+        drawn = simulate_drives(
+            coordinates, observation, proposal, (1 + last) * families, rng, executor
+        )
+        fit = regress(drawn, measured, proposal, prior)
+        at = fit.posterior
+        stds.append(at.std)
+        if progress is not None:
+            progress((number + 1) / _ROUNDS)
+    assert fit is not None
+    return Identified(coordinates, at, fit.misfit, fit.misfit_rank, np.array(stds))
+
+
+def simulate_drives(
+    coordinates: Coordinates,
+    observation: Observation,
+    proposal: Gaussian,
+    families: int,
+    rng: np.random.Generator,
+    executor: Executor | None,
+    progress: Callable[[float], None] | None = None,
+) -> Round:
+    """Drives drawn from a proposal, `_LANES` of each family differing in what is free alone."""
+    free = coordinates.free
+    common = np.repeat(proposal.draw(rng, families), _LANES, axis=0)
+    z = _with_free_redrawn(common, free, proposal, rng) if free.any() else common
+    seeds = rng.integers(2**30, size=len(z))
+    # What scales the response takes no part in the motion, and would tell families apart.
+    moved = np.where(coordinates.scales, 0.0, z)
+    machines = [coordinates.machine(m, int(s)) for m, s in zip(moved, seeds, strict=True)]
+    lots = [
+        Family(coordinates.unit, tuple(machines[i : i + _LANES]), observation.plans)
+        for i in range(0, len(z), _LANES)
+    ]
+    read = read_families(lots, executor, progress)
+    mean = np.concatenate([one for one, _ in read])
+    variance = np.concatenate([one for _, one in read])
+    only = coordinates.scales
+    gain = np.prod(coordinates.factors(np.where(only, z, 0.0))[:, only], axis=1)
+    noise = observation.noise
+    # What an analyser adds to each reading is drawn: it is part of what the regression leaves.
+    disturbed = mean * (gain[:, None] + noise * _complex_normal(rng, mean.shape))
+    y = channels_of_readings(disturbed, variance, noise, observation.floor)
+    return Round(z, np.repeat(np.arange(families), _LANES), y.reshape(len(z), -1))
+
+
+def _with_free_redrawn(
+    z: Vector, free: NDArray[np.bool_], proposal: Gaussian, rng: np.random.Generator
+) -> Vector:
+    """Coordinates (n, d) whose free ones are drawn anew, given the others."""
+    c = proposal.covariance
+    across = np.linalg.solve(c[np.ix_(~free, ~free)], c[np.ix_(~free, free)])
+    left = c[np.ix_(free, free)] - c[np.ix_(free, ~free)] @ across
+    drawn = Gaussian(np.zeros(int(free.sum())), left).draw(rng, len(z))
+    found = z.copy()
+    found[:, free] = proposal.mean[free] + (z - proposal.mean)[:, ~free] @ across + drawn
+    return found
+
+
+def _complex_normal(rng: np.random.Generator, shape: tuple[int, ...]) -> NDArray[np.complex128]:
+    return rng.standard_normal(shape) + 1j * rng.standard_normal(shape)

@@ -1,0 +1,307 @@
+"""The sweep that tells most of the contribution ratio in so many minutes.
+
+Owns one ensemble of drives as the datasheet allows, taken through a wide and dense sweep, and the
+comparison of shorter sweeps as parts of it: expected error of the ratio (Chaloner and Verdinelli
+1995). It measures nothing and knows no bench.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.commissioning.coordinates import RATIO, Coordinates
+from analysis.commissioning.identification import simulate_drives
+from analysis.commissioning.regression import Gaussian, Round, expected_std
+from analysis.execution.executor import Executor
+from analysis.execution.progress import Progress, part_of
+from analysis.inference.plans import landmarks
+from analysis.observation.observation import USUAL_NOISE_V, Observation, unread
+from daq.errors import InputError
+from daq.plan import SweepPlan, spaced_frequencies
+from sim.unit import Unit
+
+__all__ = ["Planned", "plan_sweep"]
+
+_POINTS = 61
+"""Frequencies of the ensemble's sweep; a shorter sweep takes some of them."""
+
+_BAND = (0.6, 1.6)
+"""Its ends, as multiples of the lowest anti-resonance and of the usual resonance."""
+
+_AROUND = (0.2, 5.0)
+"""Band in which the features are looked for, as multiples of the load's frequency on shaft 1."""
+
+_LEVELS = (0.15, 0.3, 0.5, 0.8)
+"""Source levels, as shares of the highest that the unit may be given."""
+
+_BANDS = ((0.0, 1.0), (0.1, 0.7), (0.2, 0.8), (0.3, 1.0))
+"""Bands of shorter sweeps, as shares of the ensemble's."""
+
+_PER_COORDINATE, _LEAST_FAMILIES = 3, 24
+"""Families of the ensemble for every coordinate, and at least."""
+
+_FEWEST = 11
+"""Points that a sweep has at least."""
+
+_SETTLE_CYCLES, _INTEGRATE_CYCLES = 20, 30
+_STILL = 0.5
+"""Gain at a level, over that at the highest, below which friction holds the drive still."""
+
+_ENOUGH = 1.05
+"""Of sweeps that are as good as the best but for this factor the shortest is taken."""
+
+
+@dataclass(frozen=True, slots=True)
+class Planned:
+    """A sweep, and what is expected of it.
+
+    `arf_hz`, `rf_hz`: 5 %, 50 % and 95 % quantiles over drives as the datasheet allows, at the
+    middle level; None where most show none. `ratio_std`: expected error of the contribution ratio
+    by a linear estimate, and `usual_std` that of a sweep of the middle level alone in the same
+    time. `still_vpk`: levels that friction holds. `limits`: what the unit's limits cut off.
+    """
+
+    unit: str
+    plan: SweepPlan
+    minutes: float
+    arf_hz: tuple[float, float, float] | None
+    rf_hz: tuple[float, float, float] | None
+    ratio_std: float
+    usual_std: float
+    still_vpk: tuple[float, ...]
+    limits: tuple[str, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """The document of ``plan --json``."""
+        f = self.plan.frequencies_hz
+        return {
+            "unit": self.unit,
+            "plan": {
+                "levels_vpk": list(self.plan.levels_vpk),
+                "start_hz": f[0],
+                "stop_hz": f[-1],
+                "points": len(f),
+                "spacing": "log",
+                "settle_cycles": self.plan.settle_cycles,
+                "integrate_cycles": self.plan.integrate_cycles,
+            },
+            "minutes": self.minutes,
+            "arf_hz": _quantiles(self.arf_hz),
+            "rf_hz": _quantiles(self.rf_hz),
+            "contribution_ratio": {"expected_std": self.ratio_std, "one_level": self.usual_std},
+            "held_by_friction_vpk": list(self.still_vpk),
+            "limits": list(self.limits),
+        }
+
+    def summary(self) -> list[str]:
+        """Lines of text for a person."""
+        f = self.plan.frequencies_hz
+        levels = ", ".join(f"{level:g}" for level in self.plan.levels_vpk)
+        lines = [f"{self.unit}:"]
+        for name, found in (("ARF", self.arf_hz), ("RF", self.rf_hz)):
+            lines.append(
+                f"  {name} expected at {found[1]:.4g} Hz, within {found[0]:.4g} to {found[2]:.4g} "
+                "Hz for 90 % of such drives" if found is not None
+                else f"  {name}: most such drives show none in this band"
+            )  # fmt: skip
+        lines += [
+            f"  sweep {len(f)} points, log spaced, from {f[0]:.4g} to {f[-1]:.4g} Hz at {levels} V",
+            f"  driving time {self.minutes:.2g} min",
+            f"  expected error of the contribution ratio {self.ratio_std:.2f} "
+            f"({self.usual_std:.2f} with one level in the same time)",
+        ]
+        if self.still_vpk:
+            still = ", ".join(f"{level:g}" for level in self.still_vpk)
+            lines.append(f"  friction holds the drive at {still} V: little motion there")
+        return lines + [f"  {text}" for text in self.limits]
+
+    def recipe(self) -> str:
+        """The text of a recipe file (TOML)."""
+        f = self.plan.frequencies_hz
+        return "\n".join([
+            f"# {self.unit}: sweep with an expected error of the contribution ratio of "
+            f"{self.ratio_std:.2f}.",
+            "",
+            "schema = 1",
+            f'name = "{self.unit}"',
+            "",
+            "[sweep]",
+            f"levels_vpk = [{', '.join(f'{level:g}' for level in self.plan.levels_vpk)}]",
+            f"start_hz = {f[0]:.6g}",
+            f"stop_hz = {f[-1]:.6g}",
+            f"points = {len(f)}",
+            'spacing = "log"',
+            f"settle_cycles = {self.plan.settle_cycles}",
+            f"integrate_cycles = {self.plan.integrate_cycles}",
+            "",
+        ])  # fmt: skip
+
+
+def plan_sweep(
+    unit: Unit,
+    minutes: float,
+    *,
+    seed: int = 0,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> Planned:
+    """The sweep of a unit that tells most of its contribution ratio in a time, minutes.
+
+    Raises
+    ------
+    AnalysisError
+        If a motion grew without bound.
+    InputError
+        If the unit has one stage, or the time is too short for any sweep.
+    """
+    if unit.stages == 1:
+        raise InputError(
+            f"unit {unit.name} has one gear stage: there is no ratio to plan for; sweep from below "
+            "the anti-resonance to above the resonance at two levels"
+        )
+    wide, cut = _wide_plan(unit)
+    observation = unread(wide, USUAL_NOISE_V)
+    parts = list(_parts(wide, observation, 60.0 * minutes))
+    if not parts:
+        shortest = _plan(wide.frequencies_hz[:: _POINTS // _FEWEST], wide.levels_vpk[-1:])
+        raise InputError(
+            f"{minutes:g} min: the shortest useful sweep of {unit.name} takes "
+            f"{shortest.duration_s / 60.0:.2g} min; give more"
+        )
+    coordinates = Coordinates.of(unit)
+    prior = Gaussian(coordinates.nominal(), np.eye(len(coordinates)))
+    report = part_of(progress, 0.0, 1.0, "simulating drives as the datasheet allows")
+    families = max(_PER_COORDINATE * len(coordinates), _LEAST_FAMILIES)
+    drawn = simulate_drives(
+        coordinates, observation, prior, families, np.random.default_rng(seed), executor, report
+    )
+    found = []
+    for rows, frequencies, levels in parts:
+        std = _ratio_std(coordinates, drawn, prior, rows, len(observation))
+        plan = _plan(frequencies, levels)
+        found.append((std, plan.duration_s, plan))
+    least = min(std for std, _, _ in found)
+    std, _, plan = min((one for one in found if one[0] <= _ENOUGH * least), key=lambda one: one[1])
+    single = [std for std, _, one in found if len(one.levels_vpk) == 1]
+    gain_db = drawn.y.reshape(len(drawn.z), 3, len(wide.levels_vpk), -1)[:, 0]
+    middle = gain_db[:, len(wide.levels_vpk) // 2]
+    arf, rf = _features(np.array(wide.frequencies_hz), middle)
+    return Planned(
+        unit.name, plan, plan.duration_s / 60.0, arf, rf, std, min(single, default=std),
+        _still(wide, gain_db), cut,
+    )  # fmt: skip
+
+
+def _wide_plan(unit: Unit) -> tuple[SweepPlan, tuple[str, ...]]:
+    """The ensemble's sweep within the unit's limits, and what these cut off."""
+    limits = unit.limits
+    load_hz = math.sqrt(unit.stage1.k_s1 * unit.output_ratio**2 / unit.load.J_L) / (2.0 * math.pi)
+    # Where features lie does not depend on where the unit may be driven.
+    around = {"start_hz": _AROUND[0] * load_hz, "stop_hz": _AROUND[1] * load_hz}
+    marks = landmarks(unit.model_copy(update={"limits": limits.model_copy(update=around)}))
+    low, high = _BAND[0] * marks.arf_hz, _BAND[1] * marks.rf_hz
+    start, stop = max(low, limits.start_hz), min(high, limits.stop_hz)
+    if start > marks.arf_hz or stop < marks.rf_hz:
+        raise InputError(
+            f"unit {unit.name}: its limits allow {limits.start_hz:g} to {limits.stop_hz:g} Hz, and "
+            f"its features lie near {marks.arf_hz:.4g} and {marks.rf_hz:.4g} Hz; see [limits]"
+        )
+    cut = []
+    if start > low:
+        cut.append(f"limits.start_hz = {limits.start_hz:g} cuts off what lies below")
+    if stop < high:
+        cut.append(f"limits.stop_hz = {limits.stop_hz:g} cuts off what lies above")
+    levels = tuple(float(f"{share * limits.source_vpk:.2g}") for share in _LEVELS)
+    return _plan(spaced_frequencies(start, stop, _POINTS, "log"), levels), tuple(cut)
+
+
+def _plan(frequencies: tuple[float, ...], levels: tuple[float, ...]) -> SweepPlan:
+    return SweepPlan(
+        frequencies, levels, settle_cycles=_SETTLE_CYCLES, integrate_cycles=_INTEGRATE_CYCLES
+    )
+
+
+def _parts(
+    wide: SweepPlan, observation: Observation, longest_s: float
+) -> Iterator[tuple[NDArray[np.bool_], tuple[float, ...], tuple[float, ...]]]:
+    """Rows (rows,) of shorter sweeps that fit into a time, their frequencies and levels."""
+    grid = np.array(wide.frequencies_hz)
+    for first, last in _BANDS:
+        band = np.arange(round(first * (len(grid) - 1)), round(last * (len(grid) - 1)) + 1)
+        for count in (1, 2, 3):
+            for levels in combinations(wide.levels_vpk, count):
+                kept = _densest(grid, band, levels, longest_s)
+                if kept is not None:
+                    rows = np.isin(observation.frequency_hz, grid[kept])
+                    rows &= np.isin(observation.source_vpk, levels)
+                    yield rows, tuple(grid[kept].tolist()), levels
+
+
+def _densest(
+    grid: NDArray[np.float64],
+    band: NDArray[np.int64],
+    levels: tuple[float, ...],
+    longest_s: float,
+) -> NDArray[np.int64] | None:
+    """As many points (n,) of a band, evenly spread, as fit into a time; None where too few do."""
+    for stride in range(1, (len(band) - 1) // (_FEWEST - 1) + 1):
+        kept = band[: (len(band) - 1) // stride * stride + 1 : stride]
+        if _plan(tuple(grid[kept].tolist()), levels).duration_s <= longest_s:
+            return np.asarray(kept)
+    return None
+
+
+def _ratio_std(
+    coordinates: Coordinates,
+    drawn: Round,
+    prior: Gaussian,
+    rows: NDArray[np.bool_],
+    count: int,
+) -> float:
+    """Expected error of the ratio by the rows (rows,) of a sweep, over all drives."""
+    ratio = coordinates.factors(drawn.z)[:, coordinates.symbols.index(RATIO)]
+    columns = np.tile(rows, drawn.y.shape[1] // count)
+    return expected_std(drawn, prior, columns, ratio)
+
+
+def _features(
+    frequency_hz: NDArray[np.float64], log_gain: NDArray[np.float64]
+) -> tuple[tuple[float, float, float] | None, tuple[float, float, float] | None]:
+    """Quantiles of the lowest point of the gain (drives, points) and of the highest above it."""
+    arf, rf = [], []
+    last = len(frequency_hz) - 1
+    for gain in log_gain:
+        # An anti-resonance has higher ground on both sides, and the resonance lies above it.
+        depth = np.minimum(np.maximum.accumulate(gain), np.maximum.accumulate(gain[::-1])[::-1])
+        low = int(np.argmax(depth - gain))
+        high = low + int(np.argmax(gain[low:]))
+        if 0 < low < last and depth[low] > gain[low]:
+            arf.append(frequency_hz[low])
+            if high < last:
+                rf.append(frequency_hz[high])
+    return _spread(arf, len(log_gain)), _spread(rf, len(log_gain))
+
+
+def _spread(found: list[float], drives: int) -> tuple[float, float, float] | None:
+    if len(found) < 0.5 * drives:
+        return None
+    low, middle, high = np.quantile(found, [0.05, 0.5, 0.95])
+    return float(low), float(middle), float(high)
+
+
+def _still(wide: SweepPlan, log_gain: NDArray[np.float64]) -> tuple[float, ...]:
+    """Levels at which the gain (drives, levels, points) is far below that at the highest."""
+    typical = np.median(log_gain, axis=(0, 2))
+    held = typical < typical[-1] + np.log(_STILL)
+    return tuple(level for level, one in zip(wide.levels_vpk, held, strict=True) if one)
+
+
+def _quantiles(found: tuple[float, float, float] | None) -> dict[str, float] | None:
+    return None if found is None else dict(zip(("low", "median", "high"), found, strict=True))

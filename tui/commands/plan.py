@@ -1,0 +1,66 @@
+"""``lashbench plan``: the sweep that tells most of a unit in a given time.
+
+Owns the options of the verb and that no file is overwritten. The choice is the analysis's.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from daq.errors import InputError
+from tui.executors import executor_at
+from tui.options import Cluster, Json, Real, Tolerance, UnitName, tolerance_shares
+from tui.text.output import Injected
+
+__all__ = ["plan"]
+
+_LONGEST_MIN = 24.0 * 60.0
+
+
+def plan(
+    *,
+    unit: UnitName,
+    minutes: Real = 5.0,
+    out: Path | None = None,
+    tolerance: Tolerance = None,
+    cluster: Cluster = None,
+    json: Json = False,
+    console: Injected,
+) -> None:
+    """Choose band, levels and points for a unit that was not measured yet.
+
+    Says where ARF and RF will be, how well the sweep will tell the contribution ratio, and which
+    levels are too low to move the drive.
+
+    Parameters
+    ----------
+    minutes
+        Time at the bench.
+    out
+        Recipe file (TOML) to write for ``measure --recipe``; one that exists is left alone.
+    """
+    from daq.formats.atomic import checked_target, write_text
+
+    if not 0.0 < minutes <= _LONGEST_MIN:
+        raise InputError(f"--minutes {minutes:g}: give more than 0 and at most {_LONGEST_MIN:g}")
+    if out is not None and checked_target(out).exists():
+        raise InputError(f"{out}: is there already and is left as it is; give another name")
+    from analysis.planning import plan_sweep
+    from sim.unit import load_unit
+
+    subject = load_unit(unit).with_tolerance(tolerance_shares(tolerance))
+    with executor_at(cluster) as executor:
+        found = plan_sweep(subject, minutes, executor=executor, progress=console.progress)
+    if out is not None:
+        from daq.recipe import load_recipe
+
+        write_text(out, found.recipe())
+        load_recipe(str(out))
+    if json:
+        console.document(found.to_json())
+    else:
+        console.data("\n".join(found.summary()))
+    if out is not None:
+        console.note(
+            f"wrote {out}; measure by it: lashbench measure --recipe {out} --unit {unit} ..."
+        )
