@@ -78,7 +78,7 @@ def prepare_unit(
     if unit.stages == 1:
         raise InputError(
             f"unit {unit.name} has one gear stage, and a diagnosis needs two: there is nothing to "
-            "train; estimate tells its backlash"
+            "train; estimate tells its backlash, extract its ARF and RF"
         )
     _check_usable(cache)
     name = posterior_name(unit)

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Annotated
@@ -25,6 +26,7 @@ __all__ = [
     "Tolerance",
     "UnitName",
     "Whole",
+    "directory_to_fill",
     "parameter_settings",
     "prepare_directory",
     "tolerance_shares",
@@ -147,6 +149,28 @@ def tolerance_shares(settings: Sequence[str] | None) -> dict[str, float]:
             raise InputError(f"--tolerance is given twice {of}; give it once")
         shares[name] = share
     return shares
+
+
+@contextmanager
+def directory_to_fill(path: Path | None) -> Iterator[None]:
+    """Make a directory for the results of the block; what was made and stays empty is removed.
+
+    Raises
+    ------
+    InputError
+        As `prepare_directory`.
+    """
+    if path is None:
+        yield
+        return
+    made = [one for one in (path, *path.parents) if not one.exists()]
+    try:
+        prepare_directory(path)
+        yield
+    finally:
+        with suppress(OSError):
+            for one in made:
+                one.rmdir()
 
 
 def prepare_directory(path: Path) -> Path:

@@ -42,7 +42,7 @@ from analysis.selection.cancellation import UNDOING, confirm_causes
 from analysis.selection.credible_set import require_credible_set
 from analysis.selection.datasheet_test import compare_with_datasheet
 from analysis.selection.verdict import Judged, Verdict, judge_candidates
-from daq.errors import AnalysisError
+from daq.errors import AnalysisError, InputError
 from daq.frf import FrequencyResponse
 from sim.engine.effort import counting
 from sim.unit import Unit
@@ -93,17 +93,18 @@ def diagnose_response(
     ------
     AnalysisError
         If a response has no usable point, all hold too few frequencies, a
-        motion grew without bound, or the unit has one stage.
+        motion grew without bound.
     InputError
-        If the responses are said to be of different units or specimens, or one is there twice.
+        If the unit has one stage, the responses are said to be of different units or specimens,
+        or one is there twice.
     """
     responses: tuple[FrequencyResponse, ...] = (response, *further)
     check_together(responses)
     responses, doubts = thin_responses(tuple(map(settled, responses)))
     if unit.stages == 1:
-        raise AnalysisError(
-            f"unit {unit.name} has one gear stage, and a diagnosis needs two; "
-            "estimate tells its backlash"
+        raise InputError(
+            f"unit {unit.name} has one gear stage, and a diagnosis needs two; estimate tells its "
+            "backlash, extract its ARF and RF"
         )
     observed = observe(*responses)
     _refuse_few(observed)

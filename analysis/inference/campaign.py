@@ -146,7 +146,8 @@ def train_unit(
         from analysis.inference.training import Schedule, Trainer
     except ImportError as error:
         raise InputError(
-            f"training needs JAX ({error}); install it: pip install 'lashbench[train]'"
+            f"training needs JAX ({error}); install it: in a clone pip install -e '.[train]', "
+            "else pip install 'lashbench[train]'"
         ) from error
 
     recipe = recipe or Recipe()

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.observation.excitation import excitation_doubt
 from analysis.observation.linear_family import Family, draw_machines, neighbours
 from analysis.observation.usual_mistakes import GAIN, MISTAKES, Curve
 from analysis.resonance.samples import refuse_levels
@@ -133,12 +134,18 @@ def check_inputs(
     Raises
     ------
     InputError
-        If one is likely written down wrongly; says what to change.
+        If one is likely written down wrongly; says what to change. If one was not measured with a
+        stepped sine.
     AnalysisError
         If one is no response of the unit.
     """
     said = []
     for one in responses:
+        if doubt := excitation_doubt(one):
+            if not as_is:
+                raise InputError(doubt)
+            said.append(doubt)
+            continue
         found = check_input(one, unit)
         if found.mistake is not None and not as_is:
             raise InputError(f"{found.words}{way_on}")

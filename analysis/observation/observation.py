@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.observation.excitation import excitation_doubt
 from analysis.observation.rounding import settled
 from analysis.observation.stated_error import stated_error
 from daq.errors import AnalysisError, InputError
@@ -153,8 +154,12 @@ def observe(*responses: FrequencyResponse) -> Observation:
         If one holds no usable point, or does not know a source level.
     InputError
         If one states a DC offset that is no voltage, a sweep that lasts too long, or voltages that
-        no bench has, or holds a frequency twice at one level.
+        no bench has, or holds a frequency twice at one level; if one was not measured with a
+        stepped sine.
     """
+    for one in responses:
+        if doubt := excitation_doubt(one):
+            raise InputError(doubt)
     swept = [level for number, one in enumerate(responses) for level in _levels(number, one)]
     # Levels that are alike keep their order: sweeps stay as they were given.
     swept.sort(key=lambda one: one.source_vpk)

@@ -40,3 +40,5 @@ class Points:
     notes: tuple[str, ...] = ()
     settle_cycles: int | None = None
     integrate_cycles: int | None = None
+    coherence: NDArray[np.float64] | None = None
+    """Of the input with the output at each frequency, 0 to 1, where it is known."""

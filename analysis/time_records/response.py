@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.time_records.cycles import Dwell, cycle_starts, find_dwells
 from analysis.time_records.local_lines import swept_response
@@ -30,6 +31,8 @@ EXCITATIONS: tuple[Excitation, ...] = get_args(Excitation)
 _DWELLING = 0.6
 """Share of a record that dwells of a stepped sine fill."""
 _LEAST_V = 1e-9
+_COHERENT, _KNOWN = 0.5, 0.3
+"""Coherence below which, and share of the gain above which a frequency is poorly known."""
 _BEND = 0.012
 """Median bend of dwells from which on they are parts of a sweep, periods."""
 _GLIDING = 0.1
@@ -123,7 +126,23 @@ def response_of_record(
             "gain_std_is": "error bar",
         },
     )
-    return response, (f"the input is {_words(kind)}; {points.method}", *points.notes)
+    told = (f"the input is {_words(kind)}; {points.method}", *points.notes, *_doubt(points, keep))
+    return response, told
+
+
+def _doubt(points: Points, keep: NDArray[np.bool_]) -> tuple[str, ...]:
+    """That most of the band tells little of the servo, in words."""
+    if points.coherence is not None:
+        poor, what = points.coherence[keep] < _COHERENT, f"the coherence is below {_COHERENT:g}"
+    else:
+        poor, what = points.along[keep] > _KNOWN, f"the error is above {_KNOWN:.0%} of the gain"
+    share = float(np.mean(poor))
+    if share <= 0.5:
+        return ()
+    return (
+        f"warning: {what} at {share:.0%} of the frequencies: little of the output comes from the "
+        "input; see to --input and --output, the level, and what else moves the servo",
+    )
 
 
 def _words(kind: Excitation) -> str:

@@ -77,6 +77,7 @@ def noise_response(
     return Points(
         frequency[keep], level[keep], gain[keep], share[keep], share[keep],
         f"{estimator} by averaged segments (Hann, half overlapped)", notes,
+        coherence=_coherence(whole)[keep],
     )  # fmt: skip
 
 

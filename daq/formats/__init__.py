@@ -157,19 +157,24 @@ def write_response(response: FrequencyResponse, path: str | Path) -> None:
     import_module(_module(path, WRITABLE, "write")).write(response, Path(path))
 
 
-def check_writable(path: str | Path) -> None:
+def check_writable(path: str | Path, *reads: str | Path) -> None:
     """Find out before long work whether a response could be written to a path.
+
+    Parameters
+    ----------
+    reads
+        What the same work reads; none of these files is written over.
 
     Raises
     ------
     InputError
         If the suffix is not that of a format that can be written, or the place
-        is not one where a file can be made.
+        is not one where a file can be made, or one of `reads`.
     """
     from daq.formats.atomic import checked_target
 
     _module(path, WRITABLE, "write")
-    checked_target(Path(path))
+    checked_target(Path(path), *reads)
 
 
 def _module(path: str | Path, known: dict[str, str], verb: str) -> str:

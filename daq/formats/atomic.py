@@ -87,14 +87,20 @@ def file_stem(name: str) -> str:
     return kept.strip("-").lower() or "unnamed"
 
 
-def checked_target(path: Path) -> Path:
+def checked_target(path: Path, *reads: str | Path) -> Path:
     """The file that `path` stands for, links followed, once a file can be made there.
+
+    Parameters
+    ----------
+    reads
+        What the same work reads, as files or as names of something else: none of these files is
+        written over.
 
     Raises
     ------
     InputError
-        If its directory does not exist, something that is not a file is there, or a link
-        that another user made, who would choose what is overwritten.
+        If its directory does not exist, something that is not a file is there, a link
+        that another user made, who would choose what is overwritten, or one of `reads`.
     """
     try:
         if path.is_symlink() and hasattr(os, "getuid") and not _is_own(path):
@@ -105,6 +111,9 @@ def checked_target(path: Path) -> Path:
             raise InputError(f"{path}: is {what}; give the name of a file")
         if not target.parent.is_dir():
             raise InputError(f"{path}: there is no directory {target.parent}; make it first")
+        for one in reads:
+            if target.exists() and os.path.exists(one) and os.path.samefile(one, target):
+                raise InputError(f"{path}: is the file that is read; give another name")
     except (OSError, RuntimeError, ValueError) as error:
         raise InputError(f"{path}: is not a usable file name ({error})") from error
     if not os.access(target.parent, os.W_OK):

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from daq.errors import FileFormatError, InputError
 from daq.formats.record import FILE_LIMIT_BYTES
 from daq.time_records.record import TimeRecord, rate_of_times, record_of
+from daq.time_records.times import refuse_other_times
 
 __all__ = ["read_record"]
 
@@ -49,7 +50,8 @@ def read_record(
     FileFormatError
         If the file cannot be read or holds no such columns; what is there is listed.
     InputError
-        If nothing says the rate, or two things say different ones.
+        If nothing says the rate, two things say different ones, or input and output are one
+        column.
     """
     if os.path.isdir(path) or not os.path.exists(path):
         raise FileFormatError(f"{path}: is no file; give a recording")
@@ -70,9 +72,18 @@ def read_record(
     rates = [] if rate_hz is None else [(rate_hz, "--rate")]
     if said is not None:
         rates.append((said, "the file"))
+    first, second = (_name(columns, one, path) for one in (input_column, output_column))
+    if first == second:
+        raise InputError(
+            f"{path}: --input {input_column} and --output {output_column} are the same column, "
+            f"{first!r}; give two"
+        )
     if time_column is not None:
-        times = _column(columns, time_column, path)
+        times = np.asarray(columns[_name(columns, time_column, path)])
         rates.append((rate_of_times(times, path), f"column {time_column}"))
+    elif rates:
+        others = {name: one for name, one in columns.items() if name not in (first, second)}
+        refuse_other_times(others, *rates[0], path)
     if not rates:
         raise InputError(f"{path}: says no sampling rate; give --rate HZ, or --time COLUMN")
     for rate, source in rates[1:]:
@@ -81,13 +92,11 @@ def read_record(
                 f"{path}: {rates[0][1]} says {rates[0][0]:g} Hz, {source} {rate:g} Hz; "
                 "give one of them"
             )
-    return record_of(
-        _column(columns, input_column, path), _column(columns, output_column, path),
-        rates[0][0], path,
-    )  # fmt: skip
+    return record_of(np.asarray(columns[first]), np.asarray(columns[second]), rates[0][0], path)
 
 
-def _column(columns: Mapping[str, NDArray[Any]], name: str, path: Path) -> NDArray[np.float64]:
+def _name(columns: Mapping[str, NDArray[Any]], name: str, path: Path) -> str:
+    """The full name of a column that is given by name or number."""
     wanted = name.strip().lower()
     alike = [key for key in columns if key.strip().lower() == wanted]
     if not alike:
@@ -101,7 +110,7 @@ def _column(columns: Mapping[str, NDArray[Any]], name: str, path: Path) -> NDArr
         listed = ", ".join(f"{k} {key!r}" for k, key in enumerate(list(columns)[:_LISTED], start=1))
         fault = "no column" if not alike else "more than one column"
         raise FileFormatError(f"{path}: has {fault} {name!r}; it has {listed or 'no numbers'}")
-    return np.asarray(columns[alike[0]])
+    return alike[0]
 
 
 def _text(path: Path) -> dict[str, NDArray[Any]]:

@@ -58,7 +58,8 @@ def record_of(
     Raises
     ------
     FileFormatError
-        If they are no record: of different lengths, too short, with gaps, or constant.
+        If they are no record: of different lengths, too short, with gaps, constant, or
+        monotonic.
     InputError
         If the rate is none.
     """
@@ -84,6 +85,14 @@ def record_of(
         raise FileFormatError(
             f"{path}: holds {input_v.size} samples; give from {_LEAST_SAMPLES} to {_MOST_SAMPLES}"
         )
+    for name, values in (("input", input_v), ("output", output_v)):
+        steps = np.diff(values)
+        if steps.size and (np.all(steps >= 0.0) or np.all(steps <= 0.0)):
+            way = "rises" if values[-1] > values[0] else "falls"
+            raise FileFormatError(
+                f"{path}: the {name} {way} from the first sample to the last, as times do and no "
+                f"signal does; give another column with --{name}"
+            )
     if np.max(np.abs([input_v.min(), input_v.max(), output_v.min(), output_v.max()])) > 1e12:
         raise FileFormatError(f"{path}: holds values beyond 1e12, which are no volts")
     return TimeRecord(float(rate_hz), input_v.astype(float), output_v.astype(float))

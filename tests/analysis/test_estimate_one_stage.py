@@ -7,7 +7,7 @@ from analysis.answer import accept_model
 from analysis.diagnosis import diagnose_response
 from analysis.estimate import estimate_features, estimate_response
 from daq.configs import config_path
-from daq.errors import AnalysisError, InputError
+from daq.errors import InputError
 from daq.plan import SweepPlan, spaced_frequencies
 from sim.response import simulate
 from sim.unit import load_unit
@@ -39,5 +39,5 @@ def test_the_play_is_found_though_the_file_says_another(measured):
 def test_what_needs_two_stages_says_so(measured):
     with pytest.raises(InputError, match="one gear stage"):
         estimate_features(62.0, 101.0, ONE)
-    with pytest.raises(AnalysisError, match="one gear stage"):
+    with pytest.raises(InputError, match="one gear stage"):
         diagnose_response(measured, ONE)

@@ -184,6 +184,62 @@ def test_what_does_not_fit_is_refused_in_one_line(change, said, tmp_path, capsys
 
 
 @pytest.mark.parametrize(
+    ("columns", "said"),
+    [
+        (["--input", "V_i", "--output", "v_i (V)"], "the same column"),
+        (["--input", "2", "--output", "V_i"], "the same column"),
+        (["--input", "time", "--output", "V_o"], "the input rises"),
+        (["--input", "V_i", "--output", "1"], "the output rises"),
+    ],
+)
+def test_columns_that_are_no_record_are_refused(columns, said, tmp_path, capsys):
+    path, _ = written(tmp_path, "csv", record("a periodic signal"))
+    out = tmp_path / "out.csv"
+    assert main(["frf", str(path), *columns, "--time", "time", "--out", str(out)]) == 2
+    assert said in capsys.readouterr().err
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("header", "scale", "rate", "refused"),
+    [
+        ("time (s),V_i,V_o", 1.0, "500", True),
+        ("t,V_i,V_o", 1.0, "1020", True),
+        ("Time_ms,V_i,V_o", 1e3, "2000", True),
+        (None, 1.0, "500", True),
+        # In milliseconds; a number of the sample; no column of times at all.
+        ("Time_ms,V_i,V_o", 1e3, "1000", False),
+        ("t,V_i,V_o", 1.0, "1000", False),
+        (None, 1e3, "500", False),
+        ("n,V_i,V_o", 1e3, "500", False),
+        ("angle,V_i,V_o", 0.3, "500", False),
+    ],
+)
+def test_a_rate_that_a_column_of_times_contradicts_is_refused(
+    header, scale, rate, refused, tmp_path, capsys
+):
+    one = record("a periodic signal")
+    path, out = tmp_path / "record.csv", tmp_path / "out.csv"
+    rows = np.column_stack([np.arange(len(one)) / one.rate_hz * scale, one.input_v, one.output_v])
+    np.savetxt(path, rows, delimiter=",", header=header or "", comments="")
+    words = ["frf", str(path), "--input", "2", "--output", "3", "--rate", rate, "--out", str(out)]
+    assert main(words) == (2 if refused else 0)
+    said = capsys.readouterr().err
+    assert out.exists() != refused
+    if refused:
+        assert f"--rate says {rate} Hz" in said
+        assert f"{1000 / scale:g} Hz" in said
+
+
+@pytest.mark.parametrize("words", SIGNALS)
+@pytest.mark.parametrize("noise", [0.02, 40.0])
+def test_an_output_that_has_little_to_do_with_the_input_is_warned_of(words, noise):
+    one = record(words, noise=noise)
+    _, notes = response_of_record(one, unit="X", start_hz=20.0, stop_hz=110.0)
+    assert any(note.startswith("warning") for note in notes) == (noise > 1.0)
+
+
+@pytest.mark.parametrize(
     ("spoil", "said"),
     [
         (lambda text: text.replace("0.005", "nan", 1) and "a,b\n1,2\n3,4\n", "holds 2 samples"),

@@ -18,7 +18,7 @@ from tui.options import (
     Plots,
     Tolerance,
     UnitName,
-    prepare_directory,
+    directory_to_fill,
     tolerance_shares,
 )
 from tui.places import cache_folder
@@ -52,9 +52,9 @@ def diagnose(
 ) -> None:
     """Show what the simulation gets wrong, name the cause and extend the model with it.
 
-    Simulates every cause of the catalogue through the sweep that was measured,
-    and tells which one, or which two, the response looks like; that nothing is
-    missing, and that nothing known explains it, are answers too.
+    Asks the posterior of the unit, which was trained over every cause of the catalogue, which
+    causes the response looks like, and simulates those through the sweep that was measured.
+    That nothing is missing, and that nothing known explains it, are answers too.
 
     Parameters
     ----------
@@ -77,12 +77,27 @@ def diagnose(
     if paper and cluster is not None:
         raise InputError("--cluster is for responses; the paper's numbers are diagnosed here")
     subject = load_unit(unit).with_tolerance(tolerance_shares(tolerance))
-    if plots is not None:
-        prepare_directory(plots)
-    if file is None:
-        _diagnose_paper(subject, unit, plots, json, console)
-        return
-    response, *others = read_files([file, *further], given, console)
+    with directory_to_fill(plots):
+        if file is None:
+            _diagnose_paper(subject, unit, plots, json, console)
+        else:
+            _diagnose_files(
+                [file, *further], subject, unit, plots, json, as_is, cluster, given, console
+            )
+
+
+def _diagnose_files(
+    files: Sequence[Path],
+    subject: Unit,
+    unit: str,
+    plots: Path | None,
+    json: bool,
+    as_is: bool,
+    cluster: str | None,
+    given: ReadingOptions,
+    console: Console,
+) -> None:
+    response, *others = read_files(files, given, console)
     from analysis.diagnosis import diagnose_response
     from analysis.observation.input_check import check_inputs
     from analysis.observation.joint import check_together, unit_doubts

@@ -79,7 +79,7 @@ def report(
 
     if out.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{out}: a report is HTML; give a name that ends in .html")
-    checked_target(out)
+    checked_target(out, source, unit, history_path(db))
     subject = load_unit(unit).with_tolerance(tolerance_shares(tolerance))
     remarks: dict[str, str] = {}
     kept: _Kept | None = None

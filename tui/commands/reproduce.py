@@ -5,7 +5,7 @@ Owns the options of the verb only.
 
 from __future__ import annotations
 
-from tui.options import Json, Plots, prepare_directory
+from tui.options import Json, Plots, directory_to_fill
 from tui.text.output import Injected
 
 __all__ = ["reproduce"]
@@ -16,14 +16,13 @@ def reproduce(*, json: Json = False, plots: Plots = None, console: Injected) -> 
 
     The paper is Baek, Kwak and Kim, Int. J. Adv. Manuf. Technol. 21 (2003) 604.
     """
-    if plots is not None:
-        prepare_directory(plots)
-    from analysis.paper import reproduce as computed
+    with directory_to_fill(plots):
+        from analysis.paper import reproduce as computed
 
-    result = computed(progress=console.progress)
-    if plots is not None:
-        result.plot(plots)
-        console.note(f"wrote figures to {plots}")
+        result = computed(progress=console.progress)
+        if plots is not None:
+            result.plot(plots)
+            console.note(f"wrote figures to {plots}")
     if json:
         console.document(result.to_json())
     else:

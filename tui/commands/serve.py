@@ -58,7 +58,7 @@ def serve(
     serial_pty
         The instrument's own RS-232 on a pseudo-terminal, where it has one (SR785).
     model
-        Which analyser: 35670A or SR785.
+        What is simulated: 35670A, SR785, or SAMPLED for the converter of a sampled bench.
     speed
         By the clock, or as fast as it can be computed.
     fault

@@ -87,7 +87,7 @@ def simulate(
     from sim.response import simulate as simulated
     from sim.unit import load_unit
 
-    check_writable(out)
+    check_writable(out, unit)
     if seed < 0:
         raise InputError(f"--seed {seed} is negative; give 0 or more")
     if points * len(level) * integrate_cycles > _MOST_CYCLES:

@@ -6,7 +6,6 @@ The formats are `daq.formats`'.
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -57,9 +56,7 @@ def convert(
     if save_profile is not None:
         profile_path(save_profile, profiles_folder())
     if out is not None:
-        check_writable(out)
-        if os.path.exists(out) and os.path.exists(source) and os.path.samefile(source, out):
-            raise InputError(f"{out}: is the file that is read; give another name")
+        check_writable(out, source)
     reading = given.reading()
     layout = foreign_layout(source, reading)
     if layout is None:

@@ -39,7 +39,7 @@ def export(
     from daq.formats import check_writable, write_response
     from daq.store import Store
 
-    check_writable(out)
+    check_writable(out, history_path(db))
     with Store(history_path(db), read_only=True) as store:
         response = store.response(measurement)
     write_response(response, out)

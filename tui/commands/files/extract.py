@@ -39,3 +39,7 @@ def extract(
         console.document(to_json(features))
     else:
         console.data("\n".join(summary(features)))
+    if not any(level.arf or level.rf for level in features):
+        console.note(
+            f"{file}: neither ARF nor RF was found at any level; the flags of each level say why"
+        )

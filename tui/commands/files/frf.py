@@ -88,7 +88,7 @@ def frf(
     from daq.formats import check_writable, write_response
     from daq.time_records.columns import read_record
 
-    check_writable(out)
+    check_writable(out, file)
     if rate is not None and not (math.isfinite(rate) and rate > 0.0):
         raise InputError(f"--rate {rate:g} Hz is no sampling rate; give samples per second")
     for name, value in (("--resolution", resolution), ("--start", start), ("--stop", stop)):
