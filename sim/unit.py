@@ -135,6 +135,8 @@ class Commissioning(_Section):
     """How the values of a unit were identified while it was known to be good."""
 
     date: str
+    of: str
+    """Name of the unit whose datasheet it began with."""
     contribution_ratio: Annotated[float, Field(ge=0, le=1)] | None = None
     contribution_ratio_std: NonNegative | None = None
     datasheet: Mapping[str, Positive]

@@ -69,6 +69,7 @@ def _commissioning(found: Commissioned, today: date) -> Table:
     table = tomlkit.table()
     table.add(tomlkit.comment("how the values were identified; `lashbench commission` wrote this"))
     table.add("date", today.isoformat())
+    table.add("of", found.unit.name)
     for one in found.parameters:
         if one.symbol == RATIO:
             table.add("contribution_ratio", _rounded(one.value))

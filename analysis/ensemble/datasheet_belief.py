@@ -5,7 +5,7 @@ Owns the fields of a document and the words for a person. What is believed, `sim
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from sim.tolerance import USUAL
@@ -20,6 +20,9 @@ HINT = (
 
 _HEALTHY = 3.0
 """Standard deviations within which a value is as its datasheet says."""
+
+_LINES = 5
+"""Most lines of what is believed."""
 
 _ORIGINS = {
     "option": "by --tolerance",
@@ -40,7 +43,8 @@ def believed_document(unit: Unit) -> dict[str, Any]:
 def believed_lines(document: Mapping[str, Any]) -> list[str]:
     """The same in words, of a document that holds them: a line for every share.
 
-    Counted teeth and the filter's gain are exact if nobody says otherwise, and not told.
+    Counted teeth and the filter's gain are exact if nobody says otherwise, and not told. Many
+    shares that differ are told as a range.
     """
     shares, origins = document.get("tolerance", {}), document.get("tolerance_from", {})
     alike: dict[tuple[float, str], list[str]] = {}
@@ -48,6 +52,8 @@ def believed_lines(document: Mapping[str, Any]) -> list[str]:
         origin = origins.get(symbol, "")
         if share or origin != "default":
             alike.setdefault((share, origin), []).append(symbol)
+    if len(alike) > _LINES:
+        return _ranges(alike)
     ranked = sorted(alike.items(), key=lambda one: len(one[1]))
     rest = "all values" if len(alike) == 1 else "all other values"
     lines = []
@@ -56,6 +62,21 @@ def believed_lines(document: Mapping[str, Any]) -> list[str]:
         named = rest if number == len(ranked) and len(symbols) > 1 else ", ".join(symbols)
         by = f" ({_ORIGINS[origin]})" if origin in _ORIGINS else ""
         lines.append(f"datasheet believed {said}: {named}{by}")
+    return lines
+
+
+def _ranges(alike: Mapping[tuple[float, str], Sequence[str]]) -> list[str]:
+    """A line for each origin, of shares that differ from value to value."""
+    lines = []
+    for origin in dict.fromkeys(origin for _, origin in alike):
+        known = [(share, symbol) for (share, by), names in alike.items() if by == origin
+                 for symbol in names]  # fmt: skip
+        (least, best), (most, worst) = min(known), max(known)
+        by = f" ({_ORIGINS[origin]})" if origin in _ORIGINS else ""
+        lines.append(
+            f"datasheet believed to {100.0 * least:.2g} % ({best}) to {100.0 * most:.2g} % "
+            f"({worst}), {len(known)} values{by}"
+        )
     return lines
 
 

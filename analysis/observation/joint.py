@@ -50,7 +50,10 @@ def check_together(responses: Sequence[FrequencyResponse]) -> None:
 def unit_doubts(responses: Sequence[FrequencyResponse], unit: Unit) -> list[str]:
     """What is to be said where responses are said to be of another unit than the one given."""
     said = {one.unit for one in responses if one.unit.lower() not in _NAMELESS}
-    others = sorted(name for name in said if name.lower() != unit.name.lower())
+    own = {unit.name.lower()}
+    if unit.commissioning is not None:
+        own.add(unit.commissioning.of.lower())
+    others = sorted(name for name in said if name.lower() not in own)
     return [f"the response is of unit {other}, not of {unit.name}" for other in others]
 
 

@@ -1,16 +1,20 @@
 """The unit file that commissioning writes, read back as a unit."""
 
 from datetime import date
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from analysis.commissioning import Commissioned, Parameter, commissioned_unit_text
+from analysis.observation.joint import unit_doubts
 from daq.configs import config_path
 from daq.errors import ConfigurationError
+from daq.formats import read_response
 from daq.untrusted.bounded_text import parse_toml
 from sim.unit import load_unit, unit_from_mapping
 
+DATA = Path(__file__).parents[2] / "data" / "practice"
 DATASHEET = config_path("units", "adss").read_text()
 
 
@@ -57,6 +61,13 @@ def test_what_it_was_identified_by_is_in_the_file():
     assert (said.contribution_ratio, said.contribution_ratio_std) == (0.31, 0.02)
     np.testing.assert_allclose(np.diag(said.covariance), [0.0016, 0.0009, 0.0004, 0.01])
     assert unit.backlash.b_t_deg == pytest.approx(0.08)
+
+
+def test_a_sweep_of_the_datasheets_unit_is_one_of_the_commissioned():
+    unit = read(commissioned_unit_text(DATASHEET, found(), "A7", date(2026, 11, 2)))
+    sweep = read_response(DATA / "practice-09.csv")
+    assert unit_doubts([sweep], unit) == []
+    assert unit_doubts([sweep], load_unit("edss"))
 
 
 def test_comments_stay():
