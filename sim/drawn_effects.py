@@ -16,7 +16,7 @@ from sim.catalogue import CATALOGUE, COMMON, EffectParameter
 from sim.effects import EffectSetting
 from sim.unit import Unit
 
-__all__ = ["draw_effect"]
+__all__ = ["draw_effect", "draw_hidden"]
 
 _OFF = (0.15, 0.4)
 """By how much a datasheet value is off, up or down; the datasheet's tolerance is 0.005."""
@@ -28,6 +28,9 @@ _BETWEEN = (0.45, 0.75)
 """Where anything else lies between the ends of its range, by logarithm."""
 
 _LEAST_SHARE = 0.01
+
+_RATIO = (0.15, 0.85)
+"""Where the contribution ratio of a bench that hides something lies."""
 
 
 def draw_effect(
@@ -52,6 +55,17 @@ def draw_effect(
     effect = CATALOGUE[possible[int(rng.integers(len(possible)))]]
     values = {p.name: _draw_value(p, unit, band_hz, rng) for p in effect.parameters}
     return EffectSetting(effect.id, MappingProxyType(values))
+
+
+def draw_hidden(unit: Unit, seed: int) -> tuple[float, EffectSetting]:
+    """What a simulated bench hides: a contribution ratio and one effect, the same for a seed.
+
+    A payload is left out: where it swings depends on the band that will be swept.
+    """
+    rng = np.random.default_rng(seed)
+    effects = [name for name in COMMON if name != "payload-flexibility"]
+    setting = draw_effect(unit, (unit.limits.start_hz, unit.limits.stop_hz), rng, effects)
+    return (1.0 if unit.stages == 1 else float(rng.uniform(*_RATIO))), setting
 
 
 def _draw_value(

@@ -14,6 +14,7 @@ from urllib.parse import parse_qsl
 from daq.errors import BenchTimeout, ConfigurationError, LinkError
 from daq.transports.base import Deadline, checked_line
 from daq.transports.messages import MessageReader
+from sim.drawn_effects import draw_hidden
 from sim.effects import EffectSetting, parse_effect
 from sim.faults import Fault
 from sim.instrument.bus import Instrument, TalkState
@@ -24,6 +25,7 @@ from sim.unit import Unit
 
 __all__ = ["Loopback", "LoopbackSettings", "open_loopback", "read_loopback_settings"]
 
+_KEYS = {"ratio", "seed", "noise", "speed", "options", "effect", "fault", "hidden"}
 _WAIT_S = 0.002
 _RATIO = 0.25
 
@@ -118,7 +120,10 @@ class Loopback(MessageReader):
 
 @dataclass(frozen=True, slots=True)
 class LoopbackSettings:
-    """What may follow ``sim:``, as in ``sim:?ratio=0.3&seed=1&fault=silence:point=5``."""
+    """What may follow ``sim:``, as in ``sim:?ratio=0.3&seed=1&fault=silence:point=5``.
+
+    `hidden`: seed by which ratio and one effect are drawn, so that the address does not tell them.
+    """
 
     ratio: float = _RATIO
     seed: int = 0
@@ -127,6 +132,7 @@ class LoopbackSettings:
     options: str | None = None
     effects: tuple[EffectSetting, ...] = ()
     faults: tuple[Fault, ...] = ()
+    hidden: int | None = None
 
 
 def read_loopback_settings(rest: str, model: Model | None = None) -> LoopbackSettings:
@@ -147,11 +153,13 @@ def read_loopback_settings(rest: str, model: Model | None = None) -> LoopbackSet
         raise _refusal(rest, "is not KEY=VALUE&KEY=VALUE") from error
     for key, value in pairs:
         values.setdefault(key, []).append(value)
-    if wrong := set(values) - {"ratio", "seed", "noise", "speed", "options", "effect", "fault"}:
+    if wrong := set(values) - _KEYS:
         raise _refusal(rest, f"has the unknown key {sorted(wrong)[0]!r}")
     once = [key for key, found in values.items() if len(found) > 1]
     if once and not set(once) <= {"effect", "fault"}:
         raise _refusal(rest, f"has {once[0]!r} twice")
+    if "hidden" in values and (told := sorted(values.keys() & {"ratio", "effect"})):
+        raise _refusal(rest, f"has hidden beside {told[0]}, which tells what is hidden")
     if "options" in values and not known.has_options:
         raise _refusal(rest, f"has options, which a {known.name} does not list")
     speed = values.get("speed", ["fast"])[0]
@@ -165,6 +173,7 @@ def read_loopback_settings(rest: str, model: Model | None = None) -> LoopbackSet
         options=values["options"][0] if "options" in values else None,
         effects=tuple(parse_effect(text) for text in values.get("effect", [])),
         faults=tuple(known.parse_fault(text) for text in values.get("fault", [])),
+        hidden=int(_number(rest, values, "hidden", 0.0, 1e9)) if "hidden" in values else None,
     )
 
 
@@ -176,7 +185,7 @@ def _number(rest: str, values: dict[str, list[str]], key: str, preset: float, hi
         number = float(text)
     except ValueError as error:
         raise _refusal(rest, f"has {key} {text!r}, which is no number") from error
-    if not 0.0 <= number <= high or (key == "seed" and number % 1):
+    if not 0.0 <= number <= high or (key in ("seed", "hidden") and number % 1):
         raise _refusal(rest, f"has {key} {text}; it must be from 0 to {high:g}")
     return number
 
@@ -184,7 +193,7 @@ def _number(rest: str, values: dict[str, list[str]], key: str, preset: float, hi
 def _refusal(rest: str, fault: str) -> ConfigurationError:
     return ConfigurationError(
         f"instrument 'sim:{rest}' {fault}; "
-        "keys are ratio, seed, noise, speed, options, effect and fault"
+        "keys are ratio, seed, noise, speed, options, effect, fault and hidden"
     )
 
 
@@ -220,8 +229,12 @@ def open_loopback(
         share = wanted.ratio if "ratio=" in rest or ratio is None else ratio
         if unit.stages == 1 and "ratio=" not in rest and ratio is None:
             share = 1.0
+        own = wanted.effects or tuple(effects)
+        if wanted.hidden is not None:
+            share, effect = draw_hidden(unit, wanted.hidden)
+            own = (effect,)
         bench = Bench(wanted.seed, wanted.noise_v, options=wanted.options, faults=wanted.faults)
-        servo = SteppedServo(unit, share, wanted.effects or tuple(effects), seed=wanted.seed)
+        servo = SteppedServo(unit, share, own, seed=wanted.seed)
         instrument = model.build(servo, bench)
         if progress is not None:
             progress(instrument)

@@ -157,6 +157,7 @@ class Operator:
     async def goes_to(self, step):
         """Step by step, as the keys for it work while a field has the focus."""
         while step != self.app.screen.STEP:
+            # The first Escape leaves a field, the next one the step.
             await self.press("ctrl+n" if step > self.app.screen.STEP else "escape")
         await self.sees(f"[{step} ")
 

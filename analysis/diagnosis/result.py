@@ -13,6 +13,7 @@ import numpy as np
 
 from analysis.diagnosis.experiment_design import CLEAR_SIGMA, NextMeasurement
 from analysis.diagnosis.harmonics import Harmonic, describe_harmonics
+from analysis.diagnosis.prediction import prediction_document
 from analysis.diagnosis.remaining_models import Model, backlash_document, backlash_lines
 from analysis.diagnosis.residuals import Residual
 from analysis.diagnosis.stages import Stage
@@ -145,7 +146,12 @@ class Diagnosis:
                 {
                     "effect": cause.effect,
                     "parameters": {
-                        s.name: {"value": s.value, "std": s.std, "unit": s.unit_symbol}
+                        s.name: {
+                            "value": s.value,
+                            "std": s.std,
+                            "unit": s.unit_symbol,
+                            "datasheet": s.datasheet,
+                        }
                         for s in cause.sizes
                     },
                     "probability": cause.probability,
@@ -190,6 +196,9 @@ class Diagnosis:
                 for level, plain, extended in self.by_level
             ],
             "sweeps": self._swept(),
+            "prediction": prediction_document(
+                self.observation, self.verdict.baseline, self.extended if self.causes else None
+            ),
             **self.believed,
             "misfit_sigma": {
                 "baseline": self.verdict.baseline.misfit,

@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from screen import operated
 from textual.events import Key
 
-from tui.app.widgets.bode import BodePlot
+from tui.app.plot.bode import BodePlot
 
 _KEYS = 60
 _IDLE_S = 5.0

@@ -45,7 +45,7 @@ def test_trend_overlay_and_opening(db):
             await op.press("o")
             await op.sees("mark two sessions first")
             await op.press("space", "down", "space", "o")
-            await op.sees("o 2.5 V", "line #2 2.5 V")
+            await op.sees("\u25cf 2.5 V", "line #2 2.5 V")
             await op.press("t")
             await op.sees("oldest first")
             await op.press("enter")

@@ -246,7 +246,7 @@ def test_no_instrument_says_what_to_try(tmp_path):
     run(way)
 
 
-def test_a_refused_plan_is_a_dialog_and_the_old_one_stays(tmp_path):
+def test_a_refused_plan_is_said_in_its_dialog_and_the_old_one_stays(tmp_path):
     async def way():
         async with operated(tmp_path / "bench.db") as op:
             await op.connects("sim:")
@@ -254,9 +254,9 @@ def test_a_refused_plan_is_a_dialog_and_the_old_one_stays(tmp_path):
             await op.press("p")
             op.app.screen.query_one("#plan-levels").value = "4.5"
             await op.press("enter")
-            await op.sees("The plan is refused", "above the 3 V peak of recipe ADSS")
-            await op.press("c", "enter")
-            await op.sees("[3 Check]", "at 2.5 V peak")
+            await op.sees("The sweep", "above the 3 V peak of recipe ADSS")
+            await op.press("escape")
+            await op.sees("[3 Check]", "at 1.5, 2.2, 3 V peak")
             await op.press("p")
             op.app.screen.query_one("#plan-points").value = "x"
             await op.press("enter")

@@ -13,11 +13,11 @@ from daq.errors import InputError
 from daq.frf import FrequencyResponse, PointFlag
 from daq.plan import SweepPlan
 from daq.store_records import StoredPoint
+from tui.app.diagnosis_words import diagnosis_lines, next_sentence
+from tui.app.plot.palette import Palette
+from tui.app.plot.traces import legend, traces_of_points, traces_of_response
 from tui.app.run_view import RunView, source_words
-from tui.app.screens.diagnosis_screen import diagnosis_lines
 from tui.app.state.desk import plan_of_document
-from tui.app.widgets.axes import DegreeAxis, LogHertzAxis
-from tui.app.widgets.traces import legend, traces_of_points, traces_of_response
 
 PLAN = SweepPlan((100.0, 110.0, 120.0), (1.5, 2.5))
 
@@ -117,11 +117,11 @@ def test_traces_never_bridge_a_spoilt_point_and_mark_flags_by_shape():
         stored(100.0, 2.5),
     ]  # fmt: skip
     low, high = traces_of_points(points, (1.5, 2.5))
-    assert low.marks == ["o", "!", "?", "~", "o"]
+    assert low.marks == ["\u25cf", "!", "?", "~", "\u25cf"]
     assert [(run.start, run.stop) for run in low.runs] == [(0, 2), (3, 5)]
     assert high.mark != low.mark
     words = legend([low, high])
-    for word in ("o 1.5 V", "x 2.5 V", "! overload", "? spoilt", "~ not periodic"):
+    for word in ("\u25cf 1.5 V", "\u25a0 2.5 V", "! overload", "? spoilt", "~ not periodic"):
         assert word in words
     assert "coarse" not in words
 
@@ -137,26 +137,6 @@ def test_a_response_is_drawn_with_its_levels_and_as_a_reference():
     assert "line #3 1 V" in legend(traces_of_response(response, "#3"))
 
 
-@pytest.mark.parametrize(
-    ("band", "ticks"),
-    [
-        ((10.0, 1000.0), ["10", "20", "50", "100", "200", "500", "1000"]),
-        ((100.0, 180.0), ["100", "120", "140", "160", "180"]),
-        ((130.0, 131.0), ["130", "130.2", "130.4", "130.6", "130.8", "131"]),
-    ],
-)
-def test_frequency_ticks_are_round(band, ticks):
-    axis = LogHertzAxis()
-    low, high = np.log10(band)
-    places = axis.get_ticks(low - 1e-9, high + 1e-9, 8)
-    assert axis.get_labels_for_ticks(places) == ticks
-
-
-def test_phase_ticks_are_parts_of_a_turn():
-    assert DegreeAxis().get_ticks(-190, 190, 5) == [-180.0, -90.0, 0.0, 90.0, 180.0]
-    assert DegreeAxis(rows=6).get_ticks(-190, 190, 8) == [-180.0, 0.0, 180.0]
-
-
 def test_a_proposed_plan_is_read_in_both_forms_and_refused_in_others():
     whole = dataclasses.asdict(PLAN)
     assert plan_of_document(whole) == PLAN
@@ -167,34 +147,64 @@ def test_a_proposed_plan_is_read_in_both_forms_and_refused_in_others():
             plan_of_document(bad)
 
 
+COLOURS = Palette("#000000", "#ffffff", "#333333", "#ff0000", ("#ffffff",), ("#222222",))
+
+
+def told_of(document):
+    return "\n".join(line.plain for line in diagnosis_lines(document, COLOURS))
+
+
+def test_what_to_do_next_is_one_sentence():
+    named = DIAGNOSIS | {"next_measurement": None}
+    assert next_sentence(named).startswith("to make sure, compare what is mounted")
+    consistent = named | {"verdict": "consistent", "causes": []}
+    assert "nothing to mend" in next_sentence(consistent)
+    assert "departures" in next_sentence(consistent | {"verdict": "unexplained"})
+
+
+def test_departures_are_a_grid_of_levels_and_bands():
+    parts = [
+        {"band_hz": [120.0, 126.0], "source_vpk": 1.5, "quantity": "gain", "mean": 1.44,
+         "sigma": 7.0},
+        {"band_hz": [126.0, 132.0], "source_vpk": 3.0, "quantity": "phase", "mean": -12.3,
+         "sigma": -2.5},
+    ]  # fmt: skip
+    lines = told_of(DIAGNOSIS | {"residual": parts}).splitlines()
+    head = next(at for at, line in enumerate(lines) if line.startswith("Hz"))
+    assert lines[head].split() == ["Hz", "120-126", "126-132"]
+    assert lines[head + 1].split() == ["1.5", "V,", "dB", "+1.4!!", "\u00b7"]
+    assert lines[head + 2].split() == ["3", "V,", "deg", "\u00b7", "-12.3!"]
+
+
 def test_a_diagnosis_is_told_with_causes_rivals_and_what_next():
-    text = "\n".join(diagnosis_lines(DIAGNOSIS))
+    text = told_of(DIAGNOSIS)
     assert "\nRivals\n" in text
     for words in (
         "VERDICT: AMBIGUOUS", "before  4.2 standard errors, 1.9 dB", "load-inertia",
-        "J_L = 0.0031 +- 0.0001 kg.m^2",
-        "shaft-stiffness  probability 0.41 (needs a size outside its plausible range)",
+        "load inertia J_L = 0.00310 +- 0.00010 kg\u00b7m\u00b2",
+        "0.41  shaft-stiffness (needs a size outside its plausible range)",
         "MEASURE THIS NEXT",
         "To make sure: compare what is mounted with the drawing",
     ):  # fmt: skip
         assert words in text
     nothing = DIAGNOSIS | {"verdict": "unexplained", "causes": [], "rivals": [],
                            "next_measurement": None}  # fmt: skip
-    text = "\n".join(diagnosis_lines(nothing))
+    text = told_of(nothing)
     assert "Causes: none named" in text
-    assert "NEXT" not in text
+    assert "MEASURE THIS NEXT" not in text
     assert "unseen" not in text
     plain = {"causes": [], "probability": 0.7}
-    judged = "\n".join(diagnosis_lines(nothing | {"rivals": [plain]}))
-    assert "\nSets judged\n - no cause  probability 0.70" in judged
+    judged = told_of(nothing | {"rivals": [plain, plain | {"probability": 0.004}]})
+    assert judged.count("no cause") == 1
+    assert "0.70  no cause" in judged
     load = ExclusionLimit("load-inertia", "J_L", "kg.m^2", 0.0026, 0.0029, 0.00275)
     size = "\n - load-inertia: J_L 0.0026 to 0.0029 kg.m^2"
     plain = nothing | {"verdict": "consistent", "unseen": [load.to_json()]}
     assert (
         f"\n\nSizes of causes that this sweep cannot exclude, one cause at a time{size}"
-        in "\n".join(diagnosis_lines(plain))
+        in told_of(plain)
     )
-    named = "\n".join(diagnosis_lines(DIAGNOSIS | {"unseen": [load.to_json()]}))
+    named = told_of(DIAGNOSIS | {"unseen": [load.to_json()]})
     assert (
         f"\n\nSizes of further causes that this sweep cannot exclude, one cause at a time{size}"
         in named

@@ -25,6 +25,7 @@ from daq.untrusted.visible_text import visible, visible_line
 from tui.app import messages
 from tui.app.copied import keep_copy
 from tui.app.dialogs.dialogs import KEYS, ErrorDialog, HelpDialog, QuestionDialog
+from tui.app.plot.bode import BodePlot
 from tui.app.run_view import RunView
 from tui.app.screens import SCREENS
 from tui.app.screens.instrument_screen import InstrumentScreen
@@ -37,6 +38,7 @@ from tui.app.state.session_keeper import SessionKeeper
 from tui.app.state.sessions import one_session
 from tui.app.step_screen import STEPS, StepScreen
 from tui.app.style import STYLE
+from tui.app.system_commands import system_commands
 from tui.app.terminal_app import TerminalApp
 from tui.entry import INTERRUPTED
 
@@ -63,6 +65,8 @@ class BenchApp(TerminalApp):
         Lists instruments; the real search if left out.
     log
         Where the log goes, for messages that point to it.
+    bench
+        Name or path of the bench file.
     """
 
     TITLE = "lashbench"
@@ -85,9 +89,10 @@ class BenchApp(TerminalApp):
         analyses: Analyses | None = None,
         find: Callable[[bench_owner.Post], None] = bench_owner.find_instruments,
         log: Path | None = None,
+        bench: str = "default",
     ) -> None:
         super().__init__()
-        self.desk = Desk(db)
+        self.desk = Desk(db, bench=bench)
         self.keeper = SessionKeeper(self)
         self.analyses = AnalysisKeeper(self, analyses or Analyses())
         self.beside = Beside(self)
@@ -116,7 +121,10 @@ class BenchApp(TerminalApp):
         """Put a step on top, if what it needs is there; else say what is missing."""
         if not 1 <= step <= len(STEPS) or isinstance(self.screen, ModalScreen):
             return
-        missing = self._missing(step)
+        screen = self.screen
+        on = isinstance(screen, StepScreen) and step > screen.STEP and step != 7
+        unread = screen.unread() if isinstance(screen, StepScreen) and on else ""
+        missing = unread or self._missing(step)
         if missing:
             self.notify(missing, severity="warning")
         elif self.screen is not self.get_screen(STEPS[step - 1]):
@@ -162,7 +170,8 @@ class BenchApp(TerminalApp):
         screen = self.screen
         if isinstance(screen, StepScreen):
             title = f"Step {screen.STEP}: {STEPS[screen.STEP - 1]}"
-            self.push_screen(HelpDialog(title, f"{screen.HELP.strip()}\n\n{KEYS}"))
+            plots = f"{BodePlot.KEYS}\n\n" if screen.query(BodePlot) else ""
+            self.push_screen(HelpDialog(title, f"{screen.HELP.strip()}\n\n{plots}{KEYS}"))
 
     def action_copy(self) -> None:
         """Copy the step's result; it is written to a file too, for terminals that take none."""
@@ -202,15 +211,7 @@ class BenchApp(TerminalApp):
 
     def get_system_commands(self, screen: Screen) -> Iterable[SystemCommand]:
         """The palette: steps, keys of the step, and what Textual offers."""
-        yield SystemCommand("Source: stop", "End whatever drives", self.action_stop_source)
-        yield SystemCommand("Copy: what is shown", "To the clipboard", self.action_copy)
-        for number, name in enumerate(STEPS, start=1):
-            yield SystemCommand(f"Go to: {name}", f"Step {number}", partial(self.go, number))
-        for binding in screen.active_bindings.values():
-            if binding.node is screen and binding.binding.description:
-                action = partial(screen.run_action, binding.binding.action)
-                described = binding.binding.tooltip or f"key {binding.binding.key}"
-                yield SystemCommand(f"Step: {binding.binding.description}", described, action)
+        yield from system_commands(self, screen)
         for command in super().get_system_commands(screen):
             if command.title != "Screenshot":
                 yield command

@@ -18,7 +18,7 @@ from textual.style import Style
 from textual.widgets import Footer
 
 from daq.analyser import SourceState
-from tui.app.widgets.plain import Words
+from tui.app.widgets.plain import Caption, Field, Words
 
 if TYPE_CHECKING:
     from tui.app.application import BenchApp
@@ -30,6 +30,9 @@ STEPS = ("unit", "instrument", "check", "sweep", "result", "diagnosis", "history
 """The steps in order; `_TITLES` are their names for people."""
 _TITLES = ("Unit", "Instrument", "Check", "Sweep", "Result", "Diagnosis", "Report")
 _WIDE = 100
+_SIDE = 120
+"""Columns from which on master and detail stand side by side."""
+
 _TALL = 34
 
 
@@ -41,7 +44,7 @@ class StepScreen(Screen[None]):
 
     STEP: ClassVar[int] = 0
     HELP: ClassVar[str] = ""
-    HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (_WIDE, "-wide")]
+    HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (_WIDE, "-wide"), (_SIDE, "-side")]
     VERTICAL_BREAKPOINTS = [(0, "-short"), (_TALL, "-tall")]
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("ctrl+n", "next", "Next", id="step.next", tooltip="Go on to the next step"),
@@ -81,6 +84,8 @@ class StepScreen(Screen[None]):
     def on_screen_resume(self) -> None:
         """Back on top."""
         if self.is_mounted and self.query("#banner"):
+            # Whoever comes by a key has commands in mind, and not the field of before.
+            self.leave_field()
             self.arrive()
             self.show()
 
@@ -117,8 +122,29 @@ class StepScreen(Screen[None]):
         self.bench.go(self.STEP + 1)
 
     def action_back(self) -> None:
-        """Go back one step."""
-        self.bench.go(self.STEP - 1)
+        """Leave the field that is typed into, else go back one step."""
+        if not self.leave_field():
+            self.bench.go(self.STEP - 1)
+
+    @property
+    def typing_into(self) -> str | None:
+        """The caption of the field that has the focus; None where keys are commands."""
+        field = self.focused
+        if not isinstance(field, Field) or field.parent is None:
+            return None
+        return str(field.parent.query_one(Caption).content)
+
+    def leave_field(self) -> bool:
+        """Move the focus from a field to what takes commands; whether there was one."""
+        if not isinstance(self.focused, Field):
+            return False
+        others = [one for one in self.focus_chain if not isinstance(one, Field)]
+        self.set_focus(others[0] if others else None)
+        return True
+
+    def unread(self) -> str:
+        """What was typed on this step and not taken yet; the way on waits for it."""
+        return ""
 
     def _show_frame(self) -> None:
         self.query_one("#step-bar", Words).update(_trail(self.STEP))

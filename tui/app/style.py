@@ -14,9 +14,9 @@ Screen { layers: base dialog; }
 #banner.-driving { background: $warning; color: black; }
 #banner.-alarm { background: $error; color: white; }
 #body { height: 1fr; }
-#hint { height: 1; background: $surface; color: $text-accent; }
+#hint { height: 1; background: $surface; color: $foreground; text-style: bold; }
 .pane { padding: 0 1; }
-.heading { text-style: bold; height: 1; color: $text-accent; }
+.heading { text-style: bold underline; height: 1; color: $foreground; }
 .heading { text-wrap: nowrap; text-overflow: ellipsis; }
 .scroll { overflow-y: auto; }
 Input.-textual-compact { height: 1; }
@@ -30,8 +30,14 @@ Dialog > #dialog {
     border: round $accent; background: $surface; padding: 0 1;
 }
 Dialog #title { text-style: bold; }
-Dialog TextArea { height: auto; max-height: 12; min-height: 3; border: none; }
-Dialog #keys { height: 1; color: $text-accent; }
+Dialog TextArea { height: auto; max-height: 16; min-height: 3; border: none; }
+Dialog #keys { height: 1; color: $foreground; text-style: bold; }
+Footer, FooterKey { color: $foreground; }
+FooterKey .footer-key--key, FooterKey .footer-key--description { color: $foreground; }
+FooterKey .footer-key--key { text-style: bold; }
+Input > .input--placeholder { color: $foreground 80%; }
+OptionList > .option-list--option-highlighted { color: $foreground; background: $panel; }
+OptionList:focus > .option-list--option-highlighted { text-style: reverse bold; }
 ToastRack { dock: top; align: right top; margin-top: 2; }
 #info { height: auto; max-height: 4; }
 #progress { height: 1; }

@@ -10,7 +10,7 @@ from datetime import datetime, timedelta
 from typing import TYPE_CHECKING
 
 from daq.drivers import is_simulated
-from tui.app.widgets.traces import FLAG_MARKS
+from tui.app.plot.traces import FLAG_MARKS
 
 if TYPE_CHECKING:
     from daq.plan import SweepPlan

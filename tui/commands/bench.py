@@ -15,14 +15,19 @@ from tui.text.output import Injected
 __all__ = ["bench", "is_terminal", "require_terminal"]
 
 
-def bench(*, db: Path | None = None, console: Injected) -> int:
+def bench(*, db: Path | None = None, bench: str = "default", console: Injected) -> int:
     """Open the bench screen: from a unit to a report, guided, by keyboard or mouse.
 
     Parameters
     ----------
     db
         File of the bench's history, made by the first session; yours, if left out.
+    bench
+        Bench file, by name or path: limits, slew, input ranges.
     """
+    from daq.limits import load_bench
+
+    load_bench(bench)
     require_terminal("bench")
     from tui.app.application import BenchApp
     from tui.logs import logging_to_file
@@ -31,7 +36,7 @@ def bench(*, db: Path | None = None, console: Injected) -> int:
         if log is None:
             console.note("the log file cannot be written; going on without")
         look_at_caches()
-        app = BenchApp(history_path(db, create=True), log=log)
+        app = BenchApp(history_path(db, create=True), log=log, bench=bench)
         code = app.run()
     return code if code is not None else app.return_code or 0
 

@@ -14,7 +14,9 @@ if TYPE_CHECKING:
     from sim.effects import EffectSetting
     from sim.unit import Unit
 
-__all__ = ["BAND_HZ", "Hidden", "Outcome", "compare", "drawn", "standing", "worded"]
+__all__ = [
+    "BAND_HZ", "Hidden", "Outcome", "behind_address", "compare", "drawn", "standing", "worded",
+]  # fmt: skip
 
 BAND_HZ = (110.0, 170.0)
 """What the demonstration sweeps: around both resonances of the paper's ADSS."""
@@ -50,6 +52,22 @@ def drawn(unit: Unit, seed: int | None) -> Hidden:
         seed = int(np.random.default_rng().integers(_SEEDS))
     rng = np.random.default_rng(seed)
     return Hidden(float(rng.uniform(0.15, 0.85)), draw_effect(unit, BAND_HZ, rng), seed)
+
+
+def behind_address(url: str, unit: Unit) -> Hidden | None:
+    """What a simulated bench of an address hides; None where it hides nothing."""
+    from daq.drivers import is_simulated
+    from sim.drawn_effects import draw_hidden
+    from sim.loopback import read_loopback_settings
+
+    _, mark, rest = url.partition("?")
+    if not (mark and is_simulated(url)):
+        return None
+    seed = read_loopback_settings(f"?{rest}").hidden
+    if seed is None:
+        return None
+    ratio, effect = draw_hidden(unit, seed)
+    return Hidden(ratio, effect, seed)
 
 
 def compare(hidden: Hidden, document: Mapping[str, Any]) -> Outcome:

@@ -7,9 +7,9 @@ hold more; what is left out is left out where it is shown. It reads no file.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 __all__ = ["fault_of"]
 
@@ -97,6 +97,7 @@ class _Size(_Shape):
     value: _Finite | None
     std: _Finite | None = None
     unit: _Text = ""
+    datasheet: _Finite | None = None
 
 
 class _Cause(_Shape):
@@ -138,6 +139,39 @@ class _Departure(_Shape):
     sweep: int = 0
 
 
+_Readings = list[_Finite | None]
+
+
+class _Predicted(_Shape):
+    gain_db: _Readings
+    gain_std_db: _Readings
+    phase_deg: _Readings
+    phase_std_deg: _Readings
+
+
+class _Prediction(_Shape):
+    """Rows of readings; all lists have one length."""
+
+    source_vpk: list[_Finite]
+    frequency_hz: list[_Finite]
+    sweep: list[int]
+    gain_db: _Readings
+    phase_deg: _Readings
+    baseline: _Predicted
+    extended: _Predicted | None
+
+    @model_validator(mode="after")
+    def _of_one_length(self) -> Self:
+        rows = len(self.frequency_hz)
+        lists: list[list[Any]] = [self.source_vpk, self.sweep, self.gain_db, self.phase_deg]
+        for model in (self.baseline, self.extended):
+            if model is not None:
+                lists += [model.gain_db, model.gain_std_db, model.phase_deg, model.phase_std_deg]
+        if any(len(one) != rows for one in lists):
+            raise ValueError("lists of different lengths")
+        return self
+
+
 class _Unseen(_Shape):
     effect: _Text
     parameter: _Text | None = None
@@ -168,6 +202,7 @@ class _Diagnosis(_Said):
     unseen: list[_Unseen] = []
     models: list[_Model] = []
     next_measurement: _Proposal | None = None
+    prediction: _Prediction | None = None
     elapsed_s: _Finite | None = None
 
 

@@ -100,7 +100,8 @@ class HelpDialog(Dialog):
 
     def __init__(self, title: str, text: str) -> None:
         super().__init__(title)
-        self.text = text
+        # The dialog breaks the lines, at the width that it has.
+        self.text = "\n\n".join(" ".join(part.split()) for part in text.split("\n\n"))
 
     def content(self) -> ComposeResult:
         """The text."""

@@ -1,10 +1,13 @@
-"""The dialog in which the sweep is chosen: levels, band, points, cycles.
+"""The dialog in which the sweep is chosen: recipe, levels, band, points, cycles.
 
-Owns the reading of its fields. Whether the plan is allowed is for the limits
-to say, when the application asks for the request.
+Owns the reading of its fields, and stays open with what was typed until the sweep is accepted.
+Whether it is allowed is for the limits to say, which whoever opens the dialog asks.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
 
 from textual.app import ComposeResult
 from textual.binding import Binding
@@ -12,13 +15,15 @@ from textual.containers import Horizontal, Vertical
 from textual.screen import ModalScreen
 
 from daq.plan import SweepPlan
+from tui.app.state.desk import NO_RECIPE
 from tui.app.widgets.plain import Caption, Field, Words
 from tui.measure_options import PlanOptions
 from tui.options import real_number
 
-__all__ = ["PlanDialog"]
+__all__ = ["PlanChoice", "PlanDialog"]
 
 _FIELDS = (
+    ("recipe", "recipe", f"name, file or {NO_RECIPE}"),
     ("levels", "source levels", "V peak: 1 2.5"),
     ("start", "start", "Hz"),
     ("stop", "stop", "Hz"),
@@ -31,8 +36,28 @@ _FIELDS = (
 )
 
 
-class PlanDialog(ModalScreen[PlanOptions | None]):
-    """Asks for a plan; gives None where the old one is to stay."""
+@dataclass(frozen=True, slots=True)
+class PlanChoice:
+    """What was typed; `recipe` is a name, a path, or `NO_RECIPE`."""
+
+    recipe: str
+    options: PlanOptions
+
+
+class PlanDialog(ModalScreen[PlanChoice | None]):
+    """Asks for a plan; gives None where the old one is to stay.
+
+    Parameters
+    ----------
+    plan
+        The sweep that stands, if there is one.
+    options
+        What the operator said of it.
+    recipe
+        The recipe in force, or `NO_RECIPE`.
+    judge
+        Called with each choice; closes the dialog by `accept`, or has it say why by `refuse`.
+    """
 
     BINDINGS = [
         Binding("escape", "leave", "Keep the old plan", priority=True),
@@ -51,9 +76,16 @@ class PlanDialog(ModalScreen[PlanOptions | None]):
     PlanDialog #fault { color: $text-error; height: auto; }
     """
 
-    def __init__(self, plan: SweepPlan | None, options: PlanOptions) -> None:
+    def __init__(
+        self,
+        plan: SweepPlan | None,
+        options: PlanOptions,
+        recipe: str,
+        judge: Callable[[PlanDialog, PlanChoice], None],
+    ) -> None:
         super().__init__()
-        self._values = _texts(plan, options)
+        self._values = _texts(plan, options) | {"recipe": recipe}
+        self._judge = judge
 
     def compose(self) -> ComposeResult:
         """A line per field."""
@@ -74,17 +106,40 @@ class PlanDialog(ModalScreen[PlanOptions | None]):
     def action_take(self) -> None:
         """Read the fields; stay where one is wrong."""
         try:
-            options = self._options()
+            choice = self._choice()
         except ValueError as error:
-            self.query_one("#fault", Words).update(str(error))
+            self.refuse(str(error))
             return
-        self.dismiss(options)
+        self.query_one("#fault", Words).update("")
+        self._judge(self, choice)
+
+    def refuse(self, why: str) -> None:
+        """Stay open, with what was typed, and say why."""
+        self.query_one("#fault", Words).update(why)
+
+    def accept(self, choice: PlanChoice) -> None:
+        """Close with a choice, unless it was closed meanwhile."""
+        if self.is_current:
+            self.dismiss(choice)
+
+    def _choice(self) -> PlanChoice:
+        recipe = self._text("recipe") or NO_RECIPE
+        others = [name for name, _, _ in _FIELDS if name != "recipe"]
+        if recipe != self._values["recipe"] and all(
+            self._text(name) == self._values[name] for name in others
+        ):
+            # Another recipe alone: its own sweep is meant.
+            return PlanChoice(recipe, PlanOptions())
+        return PlanChoice(recipe, self._options())
 
     def _options(self) -> PlanOptions:
+        levels = tuple(real_number(w) for w in self._text("levels").replace(",", " ").split())
+        if not levels:
+            raise ValueError("levels: give one or more in V peak")
         return PlanOptions(
-            levels_vpk=tuple(real_number(word) for word in self._text("levels").split()),
-            start_hz=real_number(self._text("start")),
-            stop_hz=real_number(self._text("stop")),
+            levels_vpk=levels,
+            start_hz=self._number("start"),
+            stop_hz=self._number("stop"),
             points=self._count("points"),
             spacing=self._word("spacing", ("lin", "log")),
             direction=self._word("direction", ("up", "down")),
@@ -92,6 +147,12 @@ class PlanDialog(ModalScreen[PlanOptions | None]):
             integrate_cycles=self._count("integrate"),
             adaptive=self._word("adaptive", ("no", "yes")) == "yes",
         )
+
+    def _number(self, name: str) -> float:
+        try:
+            return real_number(self._text(name))
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from error
 
     def _text(self, name: str) -> str:
         return self.query_one(f"#plan-{name}", Field).value.strip()

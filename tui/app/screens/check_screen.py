@@ -16,13 +16,13 @@ from textual.containers import Vertical, VerticalScroll
 
 from daq.errors import LashbenchError
 from tui.app.dialogs.dialogs import QuestionDialog
-from tui.app.dialogs.plan import PlanDialog
+from tui.app.dialogs.plan import PlanChoice, PlanDialog
 from tui.app.run_view import RunView
-from tui.app.state.desk import Desk, Results
+from tui.app.state.desk import NO_RECIPE, Desk, Results
+from tui.app.state.proposed_sweep import LEVELS
 from tui.app.step_screen import StepScreen
 from tui.app.widgets.plain import Words
 from tui.app.words import plan_words
-from tui.measure_options import PlanOptions
 
 if TYPE_CHECKING:
     from daq.plan import SweepPlan
@@ -48,6 +48,11 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
         Binding("p", "plan", "Plan", id="check.plan", tooltip="Change the plan"),
     ]
     DEFAULT_CSS = """
+    CheckScreen #halves { height: 1fr; }
+    CheckScreen.-side #halves { layout: horizontal; }
+    CheckScreen #planned { height: auto; }
+    CheckScreen.-side #planned { width: 2fr; }
+    CheckScreen.-side #checked { width: 3fr; }
     CheckScreen #lines { height: 1fr; }
     """
 
@@ -62,14 +67,16 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
         self._is_fresh = False
 
     def body(self) -> ComposeResult:
-        """Plan above, checks below."""
-        with Vertical(classes="pane"):
-            yield Words("Plan", classes="heading")
-            yield Words("", id="plan")
-            yield Words("")
-            yield Words("Checks", classes="heading")
-            with VerticalScroll(id="lines"):
-                yield Words("", id="checks")
+        """Plan above, checks below; side by side where there is room."""
+        with Vertical(id="halves"):
+            with Vertical(id="planned", classes="pane"):
+                yield Words("Plan", classes="heading")
+                yield Words("", id="plan")
+                yield Words("")
+            with Vertical(id="checked", classes="pane"):
+                yield Words("Checks", classes="heading")
+                with VerticalScroll(id="lines"):
+                    yield Words("", id="checks")
 
     def show_body(self) -> None:
         """The plan, and every check told so far."""
@@ -141,30 +148,38 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
             self.notify("a session is under way; its plan stays", severity="warning")
             return
         plan = None if isinstance(self._planned, LashbenchError) else self._planned
-        self.app.push_screen(PlanDialog(plan, desk.options), self._take_plan)
+        recipe = NO_RECIPE if desk.recipe is None else desk.recipe
+        dialog = PlanDialog(plan, desk.options, recipe, self._judge_plan)
+        self.app.push_screen(dialog, self._take_plan)
 
-    def _take_plan(self, options: PlanOptions | None) -> None:
-        if options is None:
+    def _judge_plan(self, dialog: PlanDialog, choice: PlanChoice) -> None:
+        """Ask the limits beside the screen; the dialog stays open where they forbid it."""
+        asked = _with_choice(replace(self.desk), choice)
+
+        def refuse(error: LashbenchError) -> None:
+            dialog.refuse(str(error))
+
+        def accept(_request: object) -> None:
+            dialog.accept(choice)
+
+        title = "The plan is refused; the old one stays"
+        self.bench.beside.do("plan change", asked.request, accept, title, refuse)
+
+    def _take_plan(self, choice: PlanChoice | None) -> None:
+        if choice is None:
             return
         # A session that holds on the old plan leaves its own on the desk when it ends.
         if self.desk.run.phase == "ready":
-            self.bench.keeper.finish_then(lambda: self._apply(options))
+            self.bench.keeper.finish_then(lambda: self._apply(choice))
         else:
-            self._apply(options)
+            self._apply(choice)
 
-    def _apply(self, options: PlanOptions) -> None:
-        desk = self.desk
-
-        def take(_request: object) -> None:
-            if self.bench.keeper.busy:
-                self.notify("a session is under way; its plan stays", severity="warning")
-                return
-            desk.options, desk.given_plan, desk.resume = options, None, None
-            self.show()
-
-        asked = replace(desk, options=options, given_plan=None, resume=None)
-        title = "The plan is refused; the old one stays"
-        self.bench.beside.do("plan change", asked.request, take, title)
+    def _apply(self, choice: PlanChoice) -> None:
+        if self.bench.keeper.busy:
+            self.notify("a session is under way; its plan stays", severity="warning")
+            return
+        _with_choice(self.desk, choice)
+        self.show()
 
     def _work_out(self) -> None:
         """Have the plan made of its files beside the screen, where the desk is another."""
@@ -187,12 +202,25 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
         if isinstance(plan, LashbenchError):
             return f"REFUSED: {plan}"
         lines = plan_words(plan, desk.url)
+        lines.append(self._governed(plan))
         if desk.resume is not None:
             lines.append(f"going on with measurement {desk.resume}: only missing points are taken")
             lines.append("P: a new plan, and a new measurement, in its place")
         if desk.options.adaptive:
             lines.append("then refined around anti-resonance and resonance")
         return "\n".join(lines)
+
+    def _governed(self, plan: SweepPlan) -> str:
+        """Which files limit the sweep."""
+        desk = self.desk
+        parts = [f"bench {desk.bench}"]
+        if desk.given_plan is None and desk.resume is None:
+            recipe = desk.recipe
+            parts.append("no recipe" if recipe is None else f"recipe {recipe} (P: another or none)")
+        words = f"limits: unit, {', '.join(parts)}"
+        if len(plan.levels_vpk) < LEVELS:
+            words += f"; a diagnosis wants {LEVELS} levels"
+        return words
 
     def _lines(self) -> list[str]:
         run = self.desk.run
@@ -209,6 +237,15 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
         elif run.finished is not None and run.finished.state != "complete":
             lines.append(f"[{run.finished.state}] {run.finished.reason}")
         return lines
+
+
+def _with_choice(desk: Desk, choice: PlanChoice) -> Desk:
+    """Put what was typed on a desk, in place of what was proposed or is to be gone on with."""
+    known = NO_RECIPE if desk.recipe is None else desk.recipe
+    if choice.recipe != known:
+        desk.recipe_asked = choice.recipe
+    desk.options, desk.given_plan, desk.resume = choice.options, None, None
+    return desk
 
 
 def _plan_of(desk: Desk) -> SweepPlan | LashbenchError:

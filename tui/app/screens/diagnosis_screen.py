@@ -7,28 +7,30 @@ screen and nothing of it is made here.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import VerticalScroll
+from textual.containers import Horizontal, Vertical, VerticalScroll
+from textual.content import Content
 from textual.widgets import ProgressBar
 
-from analysis.ensemble.datasheet_belief import believed_lines
-from analysis.inference.exclusion import head_unseen, list_unseen
-from analysis.observation.joint import sweep_lines
-from analysis.selection.wording import verdict_words
+from analysis.execution.pace import Pace, duration
 from daq.errors import LashbenchError
+from daq.untrusted.visible_text import visible
+from tui.app.diagnosis_words import diagnosis_lines
+from tui.app.dialogs.dialogs import HelpDialog
+from tui.app.plot.chart import Chart
+from tui.app.plot.predictions import ratio_drawing, residual_drawing
 from tui.app.screens.result_screen import answer_lines
 from tui.app.state.desk import plan_of_document
+from tui.app.state.sessions import one_session
 from tui.app.step_screen import StepScreen
 from tui.app.widgets.plain import Words
-from tui.app.words import plan_words
+from tui.app.words import clock_in, plan_words
 
-__all__ = ["DiagnosisScreen", "diagnosis_lines"]
-
-_DEPARTURES = 4
-"""The strongest departures of the plain model that are shown."""
+__all__ = ["DiagnosisScreen"]
 
 
 class DiagnosisScreen(StepScreen):
@@ -39,37 +41,96 @@ class DiagnosisScreen(StepScreen):
 D compares the measurement with the model and asks which physical cause explains what is left,
 which takes a minute or two of both processors; the screen stays free meanwhile.
 
-Every cause is given with its probability. The residual is the distance of measurement and model
-on source levels that were held out, in standard errors and dB, before and after the cause was
-added. N starts the measurement that would tell rivals apart: checks first, as always, then the
+Every cause is given with its probability and its size beside the datasheet. The residual is the
+distance of measurement and model on source levels that were held out, in standard errors and dB,
+before and after the cause was added. The grid shows where the measurement departs from the plain
+model: ! from 2, !! from 5 standard deviations on. V changes between words and plots, which stand
+side by side where there is room: what each model leaves over frequency, and the contribution
+ratio before and after.
+
+N starts the measurement that would tell rivals apart: checks first, as always, then the
 sweep itself. D then diagnoses both measurements together. A response that looks like a mistake
 is not diagnosed; A takes it as it stands.
+
+H tells what a simulated bench hid, where the measurement is of one that hides something.
 """
     BINDINGS = [
         Binding("d", "diagnose", "Diagnose", id="diagnosis.run"),
         Binding("a", "as_is", "As it is", id="diagnosis.as-is", show=False),
         Binding("n", "measure_next", "Measure this next", id="diagnosis.next"),
+        Binding("v", "view", "Words/plots", id="diagnosis.view"),
+        Binding("h", "reveal", "What was hidden", id="diagnosis.reveal", show=False),
     ]
 
+    DEFAULT_CSS = """
+    DiagnosisScreen #running { height: 1; }
+    DiagnosisScreen #share { width: 40; }
+    DiagnosisScreen #left { width: 1fr; text-wrap: nowrap; text-overflow: ellipsis; }
+    DiagnosisScreen #halves { height: 1fr; }
+    DiagnosisScreen #scroll { width: 1fr; }
+    DiagnosisScreen #plots { width: 1fr; display: none; }
+    DiagnosisScreen.-plots #plots { display: block; }
+    DiagnosisScreen.-plots #scroll { display: none; }
+    DiagnosisScreen.-side #plots, DiagnosisScreen.-side #scroll { display: block; }
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._pace = Pace()
+
     def body(self) -> ComposeResult:
-        """Progress and words."""
-        yield ProgressBar(total=100, show_eta=False, id="share")
-        with VerticalScroll(classes="pane", id="scroll"):
-            yield Words("", id="text")
+        """Progress, words, and two plots beside them or in their place."""
+        with Horizontal(id="running"):
+            yield ProgressBar(total=100, show_eta=False, show_percentage=True, id="share")
+            yield Words("", id="left")
+        with Horizontal(id="halves"):
+            with VerticalScroll(classes="pane", id="scroll"):
+                yield Words("", id="text")
+            with Vertical(id="plots"):
+                yield Chart("residual")
+                yield Chart("residual-after")
+                yield Chart("ratios")
 
     def on_mount(self) -> None:
         """The words have the focus, to be scrolled."""
         super().on_mount()
         self.query_one("#scroll").focus()
+        self.app.theme_changed_signal.subscribe(self, lambda _: self.show())
+
+    def on_resize(self) -> None:
+        """Plots are drawn for a size."""
+        self.call_after_refresh(self.show)
 
     def show_body(self) -> None:
         """Progress or verdict."""
         running = self.bench.analyses.progress.get("diagnosis")
-        bar = self.query_one("#share", ProgressBar)
-        bar.display = running is not None
+        self.query_one("#running").display = running is not None
         if running is not None:
-            bar.update(progress=100 * running[0])
-        self.query_one("#text", Words).update("\n".join(self._lines()))
+            share, text = running
+            self.query_one("#share", ProgressBar).update(progress=100 * share)
+            left_s = self._pace.remaining_s(share)
+            left = "" if left_s is None else f"{duration(left_s)} left, done {clock_in(left_s)}; "
+            self.query_one("#left", Words).update(f" {left}{text}")
+        self.query_one("#text", Words).update(Content("\n").join(self._lines()))
+        self._draw()
+
+    def _draw(self) -> None:
+        """The plots, as far as the document holds what they show."""
+        diagnosis = None if self._is_running else self.desk.results.diagnosis
+        document = None if diagnosis is None else diagnosis.to_json()
+        for name, drawing in (
+            ("#residual", partial(residual_drawing, which="baseline")),
+            ("#residual-after", partial(residual_drawing, which="extended")),
+            ("#ratios", ratio_drawing),
+        ):
+            chart = self.query_one(name, Chart)
+            drawn = None if document is None else drawing(chart, document)
+            chart.display = drawn is not None
+            chart.show(drawn)
+
+    @property
+    def _is_running(self) -> bool:
+        return "diagnosis" in self.bench.analyses.progress
 
     def hint(self) -> str:
         """Diagnose, measure next, or go on."""
@@ -85,7 +146,12 @@ is not diagnosed; A takes it as it stands.
 
     def copy_text(self) -> str:
         """All lines."""
-        return "\n".join(self._lines())
+        return "\n".join(line.plain for line in self._lines())
+
+    def action_view(self) -> None:
+        """Words or plots, where there is room for one of them only."""
+        self.toggle_class("-plots")
+        self.call_after_refresh(self.show)
 
     def action_diagnose(self) -> None:
         """Begin, unless it runs."""
@@ -117,6 +183,32 @@ is not diagnosed; A takes it as it stands.
         if self.bench.keeper.start(hold=False):
             self.bench.go(4)
 
+    def action_reveal(self) -> None:
+        """Tell what the simulated bench hid, beside what was diagnosed."""
+        desk = self.desk
+        if desk.measurement is None or desk.unit is None or desk.results.diagnosis is None:
+            self.notify("diagnose first: D", severity="warning")
+            return
+        unit, document = desk.unit, desk.results.diagnosis.to_json()
+
+        def work() -> list[str]:
+            from tui.demonstration.hidden import behind_address, compare, worded
+
+            address = one_session(desk.db, number).header.address
+            hidden = behind_address(address, unit)
+            if hidden is None:
+                return []
+            return list(worded(hidden, compare(hidden, document), document, None))
+
+        def tell(lines: list[str]) -> None:
+            if lines:
+                self.app.push_screen(HelpDialog("What was hidden", "\n\n".join(lines)))
+            else:
+                self.notify("the bench of this measurement hides nothing")
+
+        number = desk.measurement
+        self.bench.beside.do("reveal", work, tell, "It cannot be told")
+
     def _next_plan(self) -> Mapping[str, Any] | None:
         diagnosis = self.desk.results.diagnosis
         if diagnosis is None:
@@ -124,116 +216,35 @@ is not diagnosed; A takes it as it stands.
         proposed = diagnosis.to_json().get("next_measurement")
         return None if proposed is None else proposed["plan"]
 
-    def _lines(self) -> list[str]:
+    def _lines(self) -> list[Content]:
         desk, results = self.desk, self.desk.results
         head = f"measurement {desk.measurement}" + (", SIMULATED" if desk.simulated else "")
-        if "diagnosis" in self.bench.analyses.progress:
-            fraction, text = self.bench.analyses.progress["diagnosis"]
-            return [f"{head}: {100 * fraction:.0f} %  {text}"]
+        if self._is_running:
+            return _plain(f"{head}: the diagnosis runs beside the screen")
         if "diagnosis" in results.faults:
-            return [f"{head}: NO DIAGNOSIS", results.faults["diagnosis"], "", "D: try once more"]
+            return _plain(
+                f"{head}: NO DIAGNOSIS", results.faults["diagnosis"], "", "D: try once more"
+            )
         if results.diagnosis is None:
-            return [f"{head}: not diagnosed yet", "", "D compares it with the model: which"
-                    " physical cause explains what the model misses?"]  # fmt: skip
+            return _plain(f"{head}: not diagnosed yet", "", "D compares it with the model: which"
+                          " physical cause explains what the model misses?")  # fmt: skip
         document = results.diagnosis.to_json()
         origin = getattr(results.diagnosis, "origin", "")
-        lines = [f"{head}, {origin}; D makes it anew"] if origin else [head]
-        lines += [*self._answer(document), *diagnosis_lines(document)]
+        lines = _plain(f"{head}, {origin}; D makes it anew" if origin else head)
+        unit = desk.unit
+        answer = [] if unit is None else answer_lines(None, document, unit)
+        chart = self.query_one("#ratios", Chart)
+        width = max(40, self.query_one("#scroll").size.width - 4)
+        lines += diagnosis_lines(document, chart.palette, width, answer)
         plan = self._next_plan()
         if plan is not None:
             try:
-                lines += plan_words(plan_of_document(plan), desk.url)
+                lines += _plain("", *plan_words(plan_of_document(plan), desk.url))
             except LashbenchError as error:
-                lines.append(f"it cannot be made: {error}")
+                lines += _plain(f"it cannot be made: {error}")
         return lines
 
-    def _answer(self, document: Mapping[str, Any]) -> list[str]:
-        """Advice and backlash by the model that is accepted."""
-        unit = self.desk.unit
-        return [] if unit is None else answer_lines(None, document, unit)
 
-
-def diagnosis_lines(document: Mapping[str, Any]) -> list[str]:
-    """A diagnosis for people: verdict, residual, causes with a sentence each, rivals, what next."""
-    before, after = document["baseline"], document["extended"]
-    lines = [
-        f"VERDICT: {document['verdict'].upper()}. {' '.join(verdict_words(document))}",
-        *sweep_lines(document.get("sweeps", ())),
-        *believed_lines(document),
-        "",
-        f"residual before  {_residual(before)}",
-        f"residual after   {_residual(after)}",
-    ]
-    gain = (document.get("gain") or {}).get("held_out_rms_ratio")
-    if gain is not None:
-        lines.append(f"gain             {gain:.2f} of the residual is left (1.00: nothing gained)")
-    if document.get("shape"):
-        lines.append(f"left by the plain model: {document['shape']}")
-    lines += [f"  {_departure(part)}" for part in document.get("residual", ())[:_DEPARTURES]]
-    lines += ["", "Causes" if document["causes"] else "Causes: none named"]
-    for rank, cause in enumerate(document["causes"], start=1):
-        lines.append(f" {rank}. {cause['effect']}  probability {cause['probability']:.2f}")
-        lines.append(f"    {_explained(cause['effect'])}{_parameters(cause['parameters'])}")
-        lines += [f"    {text}" for text in _checked(cause["effect"])]
-    if document.get("rivals"):
-        lines += ["", "Rivals" if document["causes"] else "Sets judged"]
-        for rival in document["rivals"]:
-            names = " + ".join(rival["causes"]) or "no cause"
-            remark = f" ({rival['remark']})" if rival.get("remark") else ""
-            lines.append(f" - {names}  probability {rival['probability']:.2f}{remark}")
-    lines += [f"warning: {text}" for text in document.get("warnings", ())]
-    proposed = document.get("next_measurement")
-    if proposed:
-        apart = " from ".join(proposed["separates"])
-        sigma = _number(proposed.get("expected_sigma"))
-        lines += ["", f"MEASURE THIS NEXT (key N): tells {apart}, {sigma} sigma expected"]
-    if document.get("unseen"):
-        lines += ["", head_unseen(document["verdict"]).capitalize()]
-        lines += [f" - {text}" for text in list_unseen(document["unseen"])]
-    return lines
-
-
-def _explained(effect: str) -> str:
-    from sim.catalogue import CATALOGUE
-
-    known = CATALOGUE.get(effect)
-    if known is None:
-        return ""
-    return f"{known.meaning.rstrip('.')}; on the bench: {known.bench_cause.rstrip('.')}."
-
-
-def _checked(effect: str) -> list[str]:
-    from sim.catalogue import CATALOGUE
-
-    known = CATALOGUE.get(effect)
-    return [] if known is None else [f"To make sure: {known.check}."]
-
-
-def _parameters(parameters: Mapping[str, Any]) -> str:
-    parts = [
-        f"{name} = {_value(number)} {number.get('unit', '')}".rstrip()
-        for name, number in parameters.items()
-    ]
-    return f" {', '.join(parts)}" if parts else ""
-
-
-def _departure(part: Mapping[str, Any]) -> str:
-    low, high = part["band_hz"]
-    sweep = f" of sweep {part['sweep'] + 1}" if "sweep" in part else ""
-    return (
-        f"{part['quantity']} {part['mean']:+.2g} from {low:.0f} to {high:.0f} Hz at "
-        f"{part['source_vpk']:g} V{sweep} ({abs(part['sigma']):.1f} standard errors)"
-    )
-
-
-def _residual(part: Mapping[str, Any]) -> str:
-    sigma, decibel = part.get("held_out_rms_sigma"), part.get("held_out_rms_db")
-    return f"{_number(sigma)} standard errors, {_number(decibel)} dB (held-out levels)"
-
-
-def _value(number: Mapping[str, Any]) -> str:
-    return f"{number['value']:.4g} +- {_number(number.get('std'))}"
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.2g}"
+def _plain(*texts: str) -> list[Content]:
+    """Lines of text as they stand, whatever they hold."""
+    return [Content(visible(text)) for text in texts]

@@ -11,18 +11,18 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
 
 from tui.app.dialogs.correction import CorrectionDialog
+from tui.app.plot.bode import BodePlot
+from tui.app.plot.chart import Chart
+from tui.app.plot.curves import trend_drawing
+from tui.app.plot.traces import traces_of_response
 from tui.app.state.sessions import audit_trail, correct_session, responses_of
 from tui.app.step_screen import StepScreen
-from tui.app.widgets.bode import BodePlot
-from tui.app.widgets.panel import Panel
 from tui.app.widgets.plain import Table, Words
-from tui.app.widgets.traces import traces_of_response
 from tui.measurements.history_rows import Trends, answer_words, measurement_row, trend_lines
 
 if TYPE_CHECKING:
@@ -31,6 +31,11 @@ if TYPE_CHECKING:
 __all__ = ["HistoryScreen"]
 
 _SHOWN = 200
+_WIDE = ("", "#", "started", "unit", "state", "points", "r", "b1/deg", "b2/deg")
+_NARROW = ("#", "started", "serial", "points", "r", "b1/deg", "b2/deg")
+_SHORT = 8
+"""Characters of a serial number on a narrow screen; the words below have all of it."""
+
 _TREND_WORDS = "contribution ratio of stage 1 by session, oldest first, one standard error"
 
 
@@ -59,8 +64,14 @@ before stays in its audit trail, which A shows.
         Binding("a", "audit", "Audit trail", id="history.audit", show=False),
     ]
     DEFAULT_CSS = """
+    HistoryScreen #list { height: auto; }
+    HistoryScreen #plots { height: 1fr; }
+    HistoryScreen.-side #halves { layout: horizontal; }
+    HistoryScreen.-side #list { width: 3fr; height: 100%; }
+    HistoryScreen.-side #plots { width: 2fr; height: 100%; }
     HistoryScreen #sessions { height: 8; }
     HistoryScreen.-tall #sessions { height: 16; }
+    HistoryScreen.-side #sessions { height: 1fr; }
     HistoryScreen BodePlot { display: none; }
     HistoryScreen.-overlay BodePlot { display: block; }
     HistoryScreen.-overlay #trend { display: none; }
@@ -75,22 +86,43 @@ before stays in its audit trail, which A shows.
         self._every_unit = self._audit = False
         self._trends: list[str] = []
         self._trails: dict[int, list[str]] = {}
+        self._columns: tuple[str, ...] = ()
 
     def body(self) -> ComposeResult:
-        """Table, plot, words."""
-        with Vertical(classes="pane"):
-            yield Table(id="sessions", cursor_type="row", zebra_stripes=True)
-            yield Panel("trend")
-            yield BodePlot()
-            yield Words("", id="text")
+        """Table, plot, words; the plot beside the others where there is room."""
+        with Vertical(id="halves", classes="pane"):
+            with Vertical(id="list"):
+                yield Table(id="sessions", cursor_type="row", zebra_stripes=True)
+                yield Words("", id="text")
+            with Vertical(id="plots"):
+                yield Chart("trend")
+                yield BodePlot()
 
     def on_mount(self) -> None:
         """Columns; gain alone where there is little room."""
-        table = self.query_one("#sessions", Table)
-        table.add_columns("", "#", "started", "unit", "state", "points", "r", "b1/deg", "b2/deg")
+        self._add_columns()
         self.query_one(BodePlot).set_class(self.size.height < 40, "-gain-only")
         super().on_mount()
-        table.focus()
+        self.query_one("#sessions", Table).focus()
+
+    def on_resize(self) -> None:
+        """Columns and plots are for a width."""
+        self.call_after_refresh(self._fit)
+
+    def _fit(self) -> None:
+        if self._columns != self._headings():
+            self.query_one("#sessions", Table).clear(columns=True)
+            self._add_columns()
+            self._fill()
+        self.show()
+
+    def _headings(self) -> tuple[str, ...]:
+        return _NARROW if self.has_class("-narrow") else _WIDE
+
+    def _add_columns(self) -> None:
+        self._columns = self._headings()
+        table = self.query_one("#sessions", Table)
+        table.add_columns(*self._columns)
 
     def arrive(self) -> None:
         """Sessions as they are now; those of before stay until they are read."""
@@ -235,8 +267,10 @@ before stays in its audit trail, which A shows.
         table = self.query_one("#sessions", Table)
         cursor = table.cursor_row
         table.clear()
+        narrow = self._columns == _NARROW
         for row in reversed(self._rows):
-            table.add_row(*self._cells(row), key=str(row["id"]))
+            cells = self._narrow_cells(row) if narrow else self._cells(row)
+            table.add_row(*cells, key=str(row["id"]))
         table.move_cursor(row=min(cursor, max(0, len(self._rows) - 1)))
 
     def _cells(self, row: dict[str, Any]) -> list[str]:
@@ -262,6 +296,14 @@ before stays in its audit trail, which A shows.
             shown("b2_deg", 3),
         ]
 
+    def _narrow_cells(self, row: dict[str, Any]) -> list[str]:
+        """The same on 80 columns: nothing that was measured is cut."""
+        mark, number, started, unit, state, points, *answer = self._cells(row)
+        whole = f"{row['points']}" if row["state"] == "complete" else points
+        name = row["serial"] if row["serial"] and not self._every_unit else unit
+        simulated = "S" if row["simulated"] else ""
+        return [f"{mark}{simulated}{number}", started, _short(name), whole, *answer]
+
     def _under_cursor(self) -> int | None:
         row = self._row_under_cursor()
         return None if row is None else int(row["id"])
@@ -274,18 +316,9 @@ before stays in its audit trail, which A shows.
         return None
 
     def _draw_trend(self) -> None:
-        panel = self.query_one("#trend", Panel)
-        panel.clear()
-        rows = [row for row in self._rows if row["contribution_ratio"]]
-        panel.set_ylimits(-0.05, 1.05)
-        if not rows:
-            return
-        place = np.arange(len(rows), dtype=float) + 1.0
-        value = np.array([row["contribution_ratio"]["value"] for row in rows], float)
-        std = np.array([row["contribution_ratio"]["std"] or 0.0 for row in rows], float)
-        panel.set_xlimits(0.5, len(rows) + 0.5)
-        panel.set_xticks([float(p) for p in place[:: max(1, len(rows) // 12)]])
-        panel.errorbar(place, value, None, std, marker="o", marker_style="bright_blue")
+        chart = self.query_one("#trend", Chart)
+        ratios = [row["contribution_ratio"] for row in self._rows if row["contribution_ratio"]]
+        chart.show(trend_drawing(chart, ratios))
 
     def _lines(self) -> list[str]:
         results, lines = self.desk.results, []
@@ -298,6 +331,10 @@ before stays in its audit trail, which A shows.
         if row is not None and self._audit:
             return [*lines, *self._trail(row)]
         if row is not None:
+            if self._columns == _NARROW:
+                of = f"{row['unit']} {row['serial']}".strip()
+                state = row["state"] + (", SIMULATED" if row["simulated"] else "")
+                lines.append(f"#{row['id']}: {of}, {state}")
             lines += [f"#{row['id']}: {words}" for words in answer_words(row)]
         if not self.has_class("-overlay"):
             lines.append(_TREND_WORDS)
@@ -307,6 +344,10 @@ before stays in its audit trail, which A shows.
         elif not any(row["answer"]["state"] != "none" for row in self._rows):
             lines.append("no session is estimated yet: open one with Enter")
         return lines
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _SHORT else f"{text[: _SHORT - 1]}\u2026"
 
 
 def _read_rows(db: Path, unit: str | None) -> tuple[list[dict[str, Any]], list[str]]:

@@ -9,23 +9,26 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical, VerticalScroll
-from textual_plot import HiResMode
 
+from tui.app.plot.bode import BodePlot
+from tui.app.plot.chart import Chart
+from tui.app.plot.curves import index_drawing
+from tui.app.plot.predictions import Which, predictions_of
+from tui.app.plot.traces import Prediction, traces_of_response
 from tui.app.step_screen import StepScreen
-from tui.app.widgets.bode import BodePlot
-from tui.app.widgets.panel import Panel
 from tui.app.widgets.plain import Words
-from tui.app.widgets.traces import traces_of_response
 
 if TYPE_CHECKING:
     from analysis.resonance.records import LevelFeatures
     from sim.unit import Unit
 
 __all__ = ["ResultScreen", "answer_lines"]
+
+_MODELS: tuple[Which | None, ...] = ("extended", "baseline", None)
+"""Whose prediction is shown, in the order of the key."""
 
 _INDEX_WORDS = "error index in Hz over the contribution ratio of stage 1: least is likeliest"
 
@@ -42,18 +45,33 @@ takes a while; the screen stays free meanwhile. Where the unit's own model does 
 response there is no advice before a diagnosis (step 6); after it, the numbers are those of the
 model that the diagnosis accepts.
 
+After a diagnosis, M puts a model's prediction under the points: a dashed line in the band of one
+standard deviation, with the cause that was named or without. Each level is predicted from the
+others.
+
 V changes between the Bode plot and the error index, the paper's measure over the ratio: the
 least index marks the likeliest ratio. E estimates once more. A response that looks like a mistake
 is not estimated; A takes it as it stands. Ctrl+Y copies everything.
 """
     BINDINGS = [
         Binding("v", "view", "Bode/index", id="result.view"),
+        Binding(
+            "m",
+            "model",
+            "Model",
+            id="result.model",
+            tooltip="The model's prediction: plain, with the cause, none",
+        ),
         Binding("g", "panels", "Gain/phase", id="result.panels", show=False),
         Binding("e", "estimate", "Estimate", id="result.estimate", show=False),
         Binding("a", "as_is", "As it is", id="result.as-is", show=False),
     ]
     DEFAULT_CSS = """
+    ResultScreen #halves { height: 1fr; }
+    ResultScreen.-side #halves { layout: horizontal; }
     ResultScreen #plots { height: 1fr; }
+    ResultScreen.-side #plots { width: 3fr; height: 100%; }
+    ResultScreen.-side #words { width: 2fr; max-height: 100%; height: 100%; }
     ResultScreen #index { height: 1fr; }
     ResultScreen #index-words { height: 1; }
     ResultScreen #index, ResultScreen #index-words { display: none; }
@@ -63,14 +81,19 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
     ResultScreen.-short #words { max-height: 9; }
     """
 
+    def __init__(self) -> None:
+        super().__init__()
+        self._model: Which | None = "extended"
+
     def body(self) -> ComposeResult:
-        """Plot above, words below."""
-        with Vertical(id="plots", classes="pane"):
-            yield BodePlot()
-            yield Panel("index")
-            yield Words(_INDEX_WORDS, id="index-words")
-        with VerticalScroll(id="words", classes="pane"):
-            yield Words("", id="text")
+        """Plot above, words below; side by side where there is room."""
+        with Vertical(id="halves"):
+            with Vertical(id="plots", classes="pane"):
+                yield BodePlot()
+                yield Chart("index")
+                yield Words(_INDEX_WORDS, id="index-words")
+            with VerticalScroll(id="words", classes="pane"):
+                yield Words("", id="text")
 
     def on_mount(self) -> None:
         """Gain alone where there is little room."""
@@ -95,9 +118,10 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
             for name, feature in (("ARF", level.arf), ("RF", level.rf))
             if feature is not None
         ]
-        plot.draw(traces, None, features)
+        plot.draw(traces, None, features, self._predictions())
         if results.estimate is not None:
-            _draw_index(self.query_one("#index", Panel), results.estimate)
+            index = self.query_one("#index", Chart)
+            index.show(index_drawing(index, results.estimate.get("error_index")))
         self.query_one("#text", Words).update("\n".join(self._lines()))
 
     def hint(self) -> str:
@@ -108,6 +132,8 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
             return "E: estimate once more.  A: take it as it is.  Ctrl+N: on to the diagnosis"
         if self.desk.results.estimate is None:
             return "E: estimate once more.  Ctrl+N: on to the diagnosis"
+        if self.desk.results.diagnosis is not None:
+            return "M: another model.  V: the error index.  Ctrl+N: on to the diagnosis"
         return "V: the error index.  Ctrl+Y: copy.  Ctrl+N: on to the diagnosis"
 
     def copy_text(self) -> str:
@@ -118,6 +144,28 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
         """Bode plot or error index."""
         self.toggle_class("-index")
         self.show()
+
+    def action_model(self) -> None:
+        """Another model's prediction under the points, or none."""
+        diagnosis = self.desk.results.diagnosis
+        if diagnosis is None:
+            self.notify("diagnose first: step 6")
+            return
+        document = diagnosis.to_json()
+        there = [one for one in _MODELS if one is None or predictions_of(document, one)]
+        if len(there) == 1:
+            self.notify("this diagnosis tells no prediction; D in step 6 makes it anew")
+        shown = _shown(self._model, document)
+        self._model = there[(there.index(shown) + 1) % len(there)]
+        self.show()
+
+    def _predictions(self) -> list[Prediction]:
+        diagnosis = self.desk.results.diagnosis
+        if diagnosis is None or self._model is None:
+            return []
+        document = diagnosis.to_json()
+        shown = _shown(self._model, document)
+        return [] if shown is None else predictions_of(document, shown)
 
     def action_panels(self) -> None:
         """Gain alone, or gain and phase."""
@@ -155,9 +203,16 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
             lines.append(f"NO ESTIMATE: {results.faults['result']}")
         head = f"measurement {desk.measurement}" + (", SIMULATED" if desk.simulated else "")
         if results.features:
-            wide = self.has_class("-wide")
+            wide = not self.has_class("-narrow") and not self.has_class("-side")
             lines += [head, *(summary(results.features) if wide else _brief(results.features))]
         return lines or [f"reading {head}"]
+
+
+def _shown(asked: Which | None, document: Mapping[str, Any]) -> Which | None:
+    """The model that is shown: where no cause is named, the plain one in place of the other."""
+    if asked == "extended" and not predictions_of(document, "extended"):
+        asked = "baseline"
+    return asked if asked is None or predictions_of(document, asked) else None
 
 
 def _brief(features: Sequence[LevelFeatures]) -> list[str]:
@@ -201,21 +256,3 @@ def ratio_words(ratio: Mapping[str, Any]) -> str:
         low, high = ratio["interval95"]
         words += f"  (95 %: {low:.3f} to {high:.3f})"
     return words
-
-
-def _draw_index(panel: Panel, document: Any) -> None:
-    panel.clear()
-    curve = document.get("error_index")
-    if not curve:
-        return
-    ratio, hertz = np.array(curve["ratio"], float), np.array(curve["hz"], float)
-    std = np.array([np.nan if v is None else v for v in curve["std_hz"]], float)
-    panel.plot(ratio, hertz, "bright_blue", HiResMode.BRAILLE, "error index")
-    every = slice(0, None, max(1, len(ratio) // 20))
-    shown = np.isfinite(hertz[every])
-    bars = np.where(np.isfinite(std[every]), std[every], 0.0)
-    panel.errorbar(
-        ratio[every][shown], hertz[every][shown], None, bars[shown], marker="o",
-        marker_style="bright_blue",
-    )  # fmt: skip
-    panel.add_v_line(float(curve["minimum_ratio"]), "green")

@@ -15,11 +15,11 @@ from textual.containers import Vertical
 from textual.widgets import ProgressBar
 
 from tui.app.dialogs.dialogs import QuestionDialog
+from tui.app.plot.bode import BodePlot
+from tui.app.plot.traces import traces_of_points, traces_of_response
 from tui.app.state.sessions import latest_complete, one_session
 from tui.app.step_screen import StepScreen
-from tui.app.widgets.bode import BodePlot
 from tui.app.widgets.plain import Words
-from tui.app.widgets.traces import traces_of_points, traces_of_response
 from tui.app.words import clock_in, plan_words, point_words, span_words
 
 if TYPE_CHECKING:
@@ -40,13 +40,14 @@ S starts the sweep, or goes on after a pause. Space pauses after the point in ha
 is off in a pause. Ctrl+X stops at once, the rest can be measured later with R. A aborts for good:
 the points are kept, the measurement cannot be resumed.
 
-Left and right move the cursor over the points (with Shift by ten), the mouse puts it anywhere.
 B marks one end of a band and, pressed again, the other; that band is then measured again and the
 old points are kept as superseded. Esc forgets the mark.
 
 G shows gain, phase or both. L puts the latest complete session of this unit behind the sweep.
 
-Marks: a letter shape per level, ! overload, ~ not periodic, - coarse, ? spoilt.
+Marks: a shape per level, ! overload, ~ not periodic, - coarse, ? spoilt. The shaded band is one
+standard error.
+
 """
     BINDINGS = [
         Binding("s", "start", "Start", id="sweep.start", tooltip="Start, or go on after a pause"),
@@ -61,7 +62,7 @@ Marks: a letter shape per level, ! overload, ~ not periodic, - coarse, ? spoilt.
     ]  # fmt: skip
     DEFAULT_CSS = """
     SweepScreen #line { height: 1; }
-    SweepScreen #text { height: auto; max-height: 3; }
+    SweepScreen #text { height: auto; max-height: 5; }
     SweepScreen ProgressBar { width: 100%; height: 1; }
     SweepScreen Bar { width: 1fr; }
     """
@@ -70,6 +71,7 @@ Marks: a letter shape per level, ! overload, ~ not periodic, - coarse, ? spoilt.
         super().__init__()
         self._band_from: float | None = None
         self._view = 0
+        self._is_chosen = False
 
     def body(self) -> ComposeResult:
         """Plot, progress, two or three lines."""
@@ -79,11 +81,15 @@ Marks: a letter shape per level, ! overload, ~ not periodic, - coarse, ? spoilt.
             yield Words("", id="text")
 
     def on_mount(self) -> None:
-        """Gain alone where there is little room."""
+        """The plot has the keys."""
         super().on_mount()
-        self._view = 1 if self.size.height < 30 else 0
-        self._show_view()
         self.query_one(BodePlot).focus()
+
+    def on_resize(self) -> None:
+        """Gain alone where there is little room, unless something else was chosen."""
+        if not self._is_chosen:
+            self._view = 1 if self.size.height < 30 else 0
+            self._show_view()
 
     def show_body(self) -> None:
         """The points so far, and the lines below."""
@@ -210,6 +216,7 @@ Marks: a letter shape per level, ! overload, ~ not periodic, - coarse, ? spoilt.
 
     def action_view(self) -> None:
         """Gain and phase, gain, phase."""
+        self._is_chosen = True
         self._view = (self._view + 1) % len(_VIEWS)
         self._show_view()
 

@@ -39,7 +39,10 @@ class UnitScreen(StepScreen):
 Choose the unit under test: highlight it and press Enter, or type the path of a unit file.
 Its parameters and limits stand beside it. Serial number, operator and notes are kept with
 every measurement as they are when it begins, and cannot be changed while it is under way or to
-be gone on with; Enter on a unit begins a new one. Tab goes from field to field.
+be gone on with; Enter on a unit begins a new one.
+
+Enter on a unit leads to the serial number, and Enter in a field to the next one. The line with >
+names the field that is typed into; Esc leaves the fields, so that 1 to 7 are steps again.
 
 Below are the sessions of this bench. One that was interrupted comes first: highlight it and
 press Enter to go on with it where it ended. Enter on a complete one opens its result.
@@ -68,8 +71,8 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
                 yield Words("Unit under test", classes="heading")
                 yield Choices(*self._units(), id="units", compact=True)
                 for name, label, hint in (
-                    ("file", "unit file", "or the path of one"),
                     *((remark, _REMARKS[remark], "") for remark in _REMARKS),
+                    ("file", "unit file", "path, if not listed"),
                 ):
                     with Horizontal(classes="field"):
                         yield Caption(label)
@@ -125,7 +128,19 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
         """Resume first, else choose."""
         if self.query("#sessions") and self.query_one("#sessions").has_focus:
             return "Enter: resume or open it.  Tab: a new session.  Ctrl+N: on to the instrument"
-        return "Enter: choose the unit.  Tab: next field.  Ctrl+N: on to the instrument"
+        field = self.typing_into
+        if field == "unit file":
+            return "Typing: unit file.  Enter reads it.  Esc leaves the fields"
+        if field is not None:
+            return f"Typing: {field}.  Enter: next.  Esc leaves the fields.  Ctrl+N: instrument"
+        return "Enter: choose it, then type its serial number.  Ctrl+N: on to the instrument"
+
+    def unread(self) -> str:
+        """A unit file that was typed and not read."""
+        name = self.query_one("#file", Field).value.strip()
+        if name and name != self.desk.unit_name:
+            return "the unit file was typed but not read: press Enter on it, or clear it"
+        return ""
 
     def on_descendant_focus(self) -> None:
         """The hint follows the focus."""
@@ -142,9 +157,9 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
 
     def on_option_list_option_selected(self, event: Choices.OptionSelected) -> None:
         """Chosen: on to who measures."""
-        if event.option.id is not None:
-            self._choose(event.option.id)
+        if event.option.id is not None and self._choose(event.option.id):
             self._begin_anew()
+            self.query_one("#file", Field).value = ""
         self.query_one("#serial", Field).focus()
 
     def on_input_changed(self, event: Field.Changed) -> None:
@@ -237,7 +252,7 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
             self._begin_anew()
             self.show()
             if self.query_one("#file").has_focus:
-                self.focus_next()
+                self.query_one("#serial", Field).focus()
 
         read = partial(load_unit, name)
         self.bench.beside.do("unit", read, take, "The unit file cannot be used")

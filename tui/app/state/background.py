@@ -12,6 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from daq.errors import LashbenchError
 from tui.app.messages import WorkDone
 
 if TYPE_CHECKING:
@@ -43,7 +44,14 @@ class Beside:
         self._wanted: dict[str, _Job] = {}
         self._running: dict[str, _Job] = {}
 
-    def do(self, kind: str, work: Callable[[], T], then: Callable[[T], None], title: str) -> None:
+    def do(
+        self,
+        kind: str,
+        work: Callable[[], T],
+        then: Callable[[T], None],
+        title: str,
+        refused: Callable[[LashbenchError], None] | None = None,
+    ) -> None:
         """Have something done, and something else with its result, in the event loop.
 
         Work of a kind that is under way is let come to its end, and its result is dropped: however
@@ -59,10 +67,15 @@ class Beside:
             Takes its result.
         title
             Over the error, where there is one.
+        refused
+            Takes an error of input or limits in place of the error dialog.
         """
 
         def fault(error: Exception) -> None:
-            self._app.show_error(title, error)
+            if refused is not None and isinstance(error, LashbenchError):
+                refused(error)
+            else:
+                self._app.show_error(title, error)
 
         self._wanted[kind] = _Job(work, then, fault)
         if kind not in self._running:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from daq.drivers import is_simulated
 from daq.errors import InputError
 from tui.app.run_view import RunView
+from tui.app.state.proposed_sweep import propose
 from tui.measure_options import PlanOptions
 from tui.measurements.follow_up import following
 
@@ -26,13 +27,13 @@ if TYPE_CHECKING:
     from daq.store_records import Measurement
     from sim.unit import Unit
 
-__all__ = ["Desk", "Results", "plan_of_document"]
+__all__ = ["NO_RECIPE", "Desk", "Results", "plan_of_document"]
 
 SIMULATED_URL = "sim:?ratio=0.3&seed=1"
 """The simulated bench that is offered first."""
 
-_WITHOUT_RECIPE = PlanOptions((2.0,), 50.0, 250.0, 81)
-"""The sweep that is offered for a unit without a recipe of its own."""
+NO_RECIPE = "none"
+"""What is typed for a sweep without a recipe: bench and unit alone limit it."""
 
 
 @dataclass(slots=True)
@@ -74,6 +75,10 @@ class Desk:
     serial: str = ""
     operator: str = ""
     notes: str = ""
+    bench: str = "default"
+    """Name or path of the bench file: limits, slew, input ranges."""
+    recipe_asked: str | None = None
+    """Name or path of the recipe, or `NO_RECIPE`; None: the unit's own, if there is one."""
     url: str = SIMULATED_URL
     identity: Identity | None = None
     """Who answered at `url`; None until someone did."""
@@ -190,15 +195,18 @@ class Desk:
 
         if name != self.unit_name:
             self.options, self.given_plan, self.resume = PlanOptions(), None, None
+            self.recipe_asked = None
         self.unit_name, self.unit, self.unit_text = name, unit, text
         shipped = text is None and name in config_names("units")
         self.unit_origin = "" if shipped else origin_words(unit, name)
 
     @property
     def recipe(self) -> str | None:
-        """The recipe that comes with lashbench for this unit, if there is one."""
+        """The recipe asked for; else the one that comes with lashbench for this unit, if any."""
         from daq.configs import config_names
 
+        if self.recipe_asked is not None:
+            return None if self.recipe_asked == NO_RECIPE else self.recipe_asked
         return self.unit_name if self.unit_name in config_names("recipes") else None
 
     def request(self, remeasure_hz: tuple[float, float] | None = None) -> SessionRequest:
@@ -221,7 +229,7 @@ class Desk:
         options = self._options() if fresh else PlanOptions()
         request = session_request(
             options, self.unit_name, self.unit, self.url, self.db,
-            recipe=recipe, bench="default",
+            recipe=recipe, bench=self.bench,
             resume=self.resume, remeasure=remeasure_hz, run_in=None,
             remarks={"serial": self.serial, "operator": self.operator, "notes": self.notes},
             unit_text=self.unit_text,
@@ -256,9 +264,26 @@ class Desk:
             plan = self.given_plan
             lowest, highest = min(plan.frequencies_hz), max(plan.frequencies_hz)
             return PlanOptions(plan.levels_vpk, lowest, highest, len(plan.frequencies_hz))
-        if self.options.given or self.recipe is not None:
+        if self.options.given:
             return self.options
-        return _WITHOUT_RECIPE
+        return self._proposed()
+
+    def _proposed(self) -> PlanOptions:
+        """What is proposed where the operator has not said anything of the sweep."""
+        from daq.limits import load_bench, tightest
+        from daq.recipe import load_recipe
+        from tui.bench import unit_limits
+
+        if self.unit is None:
+            return PlanOptions()
+        recipe = None if self.recipe is None else load_recipe(self.recipe)
+        limits = [load_bench(self.bench).bounds(), unit_limits(self.unit)]
+        if recipe is not None:
+            limits.append(recipe.bounds())
+        if recipe is None:
+            return propose(None, tightest(limits))
+        sweep = recipe.sweep
+        return propose(sweep.levels_vpk, tightest(limits), abs(sweep.dc_offset_v))
 
 
 def plan_of_document(document: Mapping[str, Any]) -> SweepPlan:

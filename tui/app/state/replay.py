@@ -15,12 +15,12 @@ from textual.widgets import Footer, ProgressBar
 
 from daq.store_records import StoredPoint
 from daq.untrusted.visible_text import visible_line
+from tui.app.plot.bode import BodePlot
+from tui.app.plot.traces import traces_of_points
 from tui.app.state.recording import Recording
 from tui.app.style import STYLE
 from tui.app.terminal_app import TerminalApp
-from tui.app.widgets.bode import BodePlot
 from tui.app.widgets.plain import Words
-from tui.app.widgets.traces import traces_of_points
 from tui.app.words import point_words, span_words
 
 __all__ = ["ReplayApp"]

@@ -17,12 +17,13 @@ from daq.frf import FrequencyResponse, PointFlag
 if TYPE_CHECKING:
     from daq.store_records import StoredPoint
 
-__all__ = ["FLAG_MARKS", "LEVEL_MARKS", "Trace", "legend", "traces_of_points", "traces_of_response"]
+__all__ = [
+    "FLAG_MARKS", "LEVEL_MARKS", "Prediction", "Trace", "continuous_phase", "legend",
+    "traces_of_points", "traces_of_response",
+]  # fmt: skip
 
-LEVEL_MARKS = "ox+*sd"
+LEVEL_MARKS = "\u25cf\u25a0\u25b2\u25c6\u25bc\u2605"
 """Marker of each source level in ascending order; the shape tells the level, not the colour."""
-
-LEVEL_STYLES = ("bright_blue", "orange1", "cyan", "magenta", "yellow", "bright_white")
 
 FLAG_MARKS: tuple[tuple[PointFlag, str, str], ...] = (
     (PointFlag.SPOILT, "?", "spoilt"),
@@ -47,8 +48,8 @@ class Trace:
         Phase wrapped to (-180, 180]; NaN where unknown.
     flags
         `PointFlag` bits.
-    mark, style
-        Character of a clean point, and its colour.
+    mark, colour
+        Character of a clean point, and the number of its colour.
     reference
         Drawn behind the others as a line without marks.
     """
@@ -60,7 +61,7 @@ class Trace:
     phase_deg: NDArray[np.float64]
     flags: NDArray[np.int64]
     mark: str
-    style: str
+    colour: int
     reference: bool = False
 
     @property
@@ -71,15 +72,59 @@ class Trace:
     @property
     def runs(self) -> list[slice]:
         """Stretches of usable neighbours: a line must not bridge a spoilt point."""
-        usable = ((self.flags & PointFlag.SPOILT) == 0) & np.isfinite(self.gain_db)
-        edges = np.flatnonzero(np.diff(np.concatenate(([0], usable.astype(int), [0]))))
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], self.usable.astype(int), [0]))))
         return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+    @property
+    def usable(self) -> NDArray[np.bool_]:
+        """Which points are no spoilt reading."""
+        return ((self.flags & PointFlag.SPOILT) == 0) & np.isfinite(self.gain_db)
 
     @property
     def bars_db(self) -> NDArray[np.float64]:
         """Half lengths of the error bars, dB; 0 where unknown or too small to see."""
         std = np.where(np.isfinite(self.gain_std_db), self.gain_std_db, 0.0)
         return np.where(std > _WORTH_A_BAR_DB, std, 0.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prediction:
+    """What a model says of one source level; arrays of shape (points,), ascending frequency.
+
+    `gain_std_db`, `phase_std_deg`: one standard deviation of a single reading beside it.
+    """
+
+    name: str
+    frequency_hz: NDArray[np.float64]
+    gain_db: NDArray[np.float64]
+    gain_std_db: NDArray[np.float64]
+    phase_deg: NDArray[np.float64]
+    phase_std_deg: NDArray[np.float64]
+    colour: int
+
+
+def continuous_phase(phases_deg: Sequence[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
+    """Phases without jumps of 360 degrees, all on the same turn as the first.
+
+    Parameters
+    ----------
+    phases_deg
+        Phases over ascending frequency, each (points,); NaN where unknown.
+    """
+    found: list[NDArray[np.float64]] = []
+    level = None
+    for phase in phases_deg:
+        smooth = np.array(phase, dtype=float)
+        known = np.isfinite(smooth)
+        if known.any():
+            smooth[known] = np.unwrap(smooth[known], period=360.0)
+            middle = float(np.median(smooth[known]))
+            if level is None:
+                # The median within a turn that ends at 0: a lag reads as a lag.
+                level = middle - 360.0 * np.ceil(middle / 360.0 - 0.25)
+            smooth -= 360.0 * np.round((middle - level) / 360.0)
+        found.append(smooth)
+    return found
 
 
 def flag_mark(flags: int) -> str:
@@ -101,7 +146,7 @@ def traces_of_response(response: FrequencyResponse, reference: str = "") -> list
                 part.phase_deg,
                 part.flags,
                 LEVEL_MARKS[index % len(LEVEL_MARKS)],
-                "grey62" if reference else LEVEL_STYLES[index % len(LEVEL_STYLES)],
+                index,
                 bool(reference),
             )
         )
@@ -133,14 +178,15 @@ def _trace(index: int, level: float, stored: Sequence[StoredPoint]) -> Trace:
         np.degrees(np.angle(gain)),
         np.array([int(point.flags) for point in points], dtype=np.int64),
         LEVEL_MARKS[index % len(LEVEL_MARKS)],
-        LEVEL_STYLES[index % len(LEVEL_STYLES)],
+        index,
     )
 
 
-def legend(traces: Sequence[Trace]) -> str:
+def legend(traces: Sequence[Trace], predictions: Sequence[Prediction] = ()) -> str:
     """What the marks mean, in words; flags only where there are such points."""
     parts = [f"{trace.mark} {trace.name}" for trace in traces if not trace.reference]
     parts += [f"line {trace.name}" for trace in traces if trace.reference]
+    parts += dict.fromkeys(f"band {one.name}" for one in predictions)
     seen = {mark for trace in traces if not trace.reference for mark in trace.marks}
     parts += [f"{mark} {words}" for _, mark, words in FLAG_MARKS if mark in seen]
     return "  ".join(parts)

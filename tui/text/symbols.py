@@ -1,0 +1,54 @@
+"""What symbols of parameters stand for, and their units as they are printed.
+
+Owns these names; the symbols are the paper's.
+"""
+
+from __future__ import annotations
+
+__all__ = ["named_symbol", "printed_unit"]
+
+_NAMES = {
+    "B_L": "load damping",
+    "B_m": "motor friction, viscous",
+    "J_L": "load inertia",
+    "J_m": "motor inertia",
+    "J_p": "payload inertia",
+    "K_c": "cable stiffness",
+    "N_1": "ratio of stage 1",
+    "R_m": "motor resistance",
+    "T_b": "load torque, constant",
+    "T_d": "delay of the reading",
+    "T_f_L": "load friction, dry",
+    "T_f_m": "motor friction, dry",
+    "T_s_L": "load friction, static part",
+    "V_d": "dead zone",
+    "V_sat": "voltage limit",
+    "b_t_deg": "total backlash",
+    "c_2": "damping of mesh 2",
+    "c_g1": "damping of mesh 1",
+    "c_s1": "damping of shaft 1",
+    "f_p": "payload frequency",
+    "h": "hardening",
+    "k_2": "stiffness of mesh 2",
+    "k_a": "amplifier gain",
+    "k_g1": "stiffness of mesh 1",
+    "k_s1": "stiffness of shaft 1",
+    "k_ts": "tachometer gain",
+    "omega_s": "Stribeck rate",
+    "scale": "factor",
+    "tau_a": "amplifier time constant",
+    "zeta_p": "payload damping ratio",
+}
+
+
+def named_symbol(symbol: str) -> str:
+    """A symbol behind its name; alone where it has none here."""
+    name = _NAMES.get(symbol)
+    return symbol if name is None else f"{name} {symbol}"
+
+
+def printed_unit(unit: str) -> str:
+    """A unit after its number; empty for a plain number."""
+    if unit in ("", "1"):
+        return ""
+    return " " + unit.replace(".", "\u00b7").replace("^2", "\u00b2")
