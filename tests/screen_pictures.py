@@ -9,9 +9,11 @@ keeps the history: where it holds a diagnosis, that is shown and not made anew.
 import argparse
 import asyncio
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 
 from screen import nothing_found, operated
+from textual.pilot import WaitForScreenTimeout
 
 from tui.app.state.analyses import Analyses
 
@@ -49,7 +51,8 @@ class Camera:
             await op.pilot.resize_terminal(*size)
             op.app.theme = THEMES[theme]
             op.app.clear_notifications()
-            await op.pilot.pause(SETTLED_S)
+            with suppress(WaitForScreenTimeout):
+                await op.pilot.pause(SETTLED_S)
             svg = op.app.export_screenshot(title="lashbench", simplify=True)
             if self.every is not None:
                 file = self.every / f"{name}-{size[0]}x{size[1]}-{theme}.svg"
@@ -90,17 +93,18 @@ async def sweep(op, camera) -> None:
 
 async def judge(op, camera) -> None:
     """Result, diagnosis, result once more, history."""
-    while "estimating" in op.screen or "contribution ratio r" not in op.screen:
-        await op.pilot.pause(0.5)
+    while op.app.desk.results.estimate is None:
+        assert "result" not in op.app.desk.results.faults, op.screen
+        await asyncio.sleep(0.5)
     if op.app.desk.results.diagnosis is None:
         await camera.take(op, "result-before")
         await op.press("6", "d")
         while not (op.app.analyses.progress.get("diagnosis", (0.0, ""))[0] > 0.3):
-            await op.pilot.pause(0.2)
+            await asyncio.sleep(0.2)
         await camera.take(op, "diagnosis-running")
         while op.app.desk.results.diagnosis is None:
             assert "diagnosis" not in op.app.desk.results.faults, op.screen
-            await op.pilot.pause(0.5)
+            await asyncio.sleep(0.5)
         await op.press("5")
     await op.sees("[5 Result]")
     op.app.screen.query_one("#bode").focus()
@@ -116,7 +120,7 @@ async def judge(op, camera) -> None:
     await op.press("v")
     await camera.take(op, "diagnosis-plots")
     await op.press("v", "7")
-    await op.sees("[7 Report]", "session")
+    await op.sees("[7 Report]", "session", within_s=PATIENCE_S)
     await camera.take(op, "history")
     await op.press("f1")
     await camera.take(op, "help")
@@ -124,14 +128,14 @@ async def judge(op, camera) -> None:
 
 
 async def take(docs: Path, every: Path | None, db: Path) -> None:
-    """Everything, or what a history has already."""
+    """Everything, or the judgement of what a history has already."""
     camera, known = Camera(docs, every), db.exists()
     async with operated(db, SHOWN[0], analyses=Analyses(), find=nothing_found) as op:
         if known:
             await op.press("7")
-            await op.sees("[7 Report]", "complete")
+            await op.sees("[7 Report]", "complete", within_s=PATIENCE_S)
             await op.press("enter")
-            await op.sees("[5 Result]")
+            await op.sees("[5 Result]", within_s=PATIENCE_S)
         else:
             await sweep(op, camera)
         await judge(op, camera)

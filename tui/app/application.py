@@ -36,6 +36,7 @@ from tui.app.state.background import Beside
 from tui.app.state.desk import Desk
 from tui.app.state.session_keeper import SessionKeeper
 from tui.app.state.sessions import one_session
+from tui.app.state.undo import Undo
 from tui.app.step_screen import STEPS, StepScreen
 from tui.app.style import STYLE
 from tui.app.system_commands import system_commands
@@ -93,6 +94,7 @@ class BenchApp(TerminalApp):
     ) -> None:
         super().__init__()
         self.desk = Desk(db, bench=bench)
+        self.undo = Undo(self.desk)
         self.keeper = SessionKeeper(self)
         self.analyses = AnalysisKeeper(self, analyses or Analyses())
         self.beside = Beside(self)
@@ -121,17 +123,16 @@ class BenchApp(TerminalApp):
         """Put a step on top, if what it needs is there; else say what is missing."""
         if not 1 <= step <= len(STEPS) or isinstance(self.screen, ModalScreen):
             return
-        screen = self.screen
-        on = isinstance(screen, StepScreen) and step > screen.STEP and step != 7
-        unread = screen.unread() if isinstance(screen, StepScreen) and on else ""
-        missing = unread or self._missing(step)
+        missing = self._missing(step)
         if missing:
             self.notify(missing, severity="warning")
         elif self.screen is not self.get_screen(STEPS[step - 1]):
             self.switch_screen(STEPS[step - 1])
 
     def _missing(self, step: int) -> str:
-        desk = self.desk
+        desk, here = self.desk, self.screen
+        if isinstance(here, StepScreen) and here.STEP < step != 7 and (unread := here.unread()):
+            return unread
         if step > 1 and step != 7 and desk.unit is None:
             return "choose a unit first"
         if step == 3 and desk.identity is None:
@@ -234,7 +235,6 @@ class BenchApp(TerminalApp):
         return f"The log has it all: {self._log_file}" if self._log_file else "Please report it."
 
     def _fatal_error(self) -> None:
-        # Textual would print the whole trace; the log has it, a line is for people.
         error = self._exception
         _LOG.critical("the screen ended by a fault", exc_info=error)
         self.keeper.stop_now()
@@ -251,6 +251,7 @@ class BenchApp(TerminalApp):
         self.desk.run.take(event)
         if isinstance(event, Finished):
             self.keeper.settle(event)
+            self.undo.settle()
         if isinstance(event, PointStored | RunIn):
             self._stale = True
         else:
@@ -341,7 +342,7 @@ class BenchApp(TerminalApp):
         self.redraw_now()
 
     def on_analysis_failed(self, message: messages.AnalysisFailed) -> None:
-        """The same."""
+        """As well."""
         self.analyses.failed(message)
         self.redraw_now()
 
@@ -390,8 +391,7 @@ class BenchApp(TerminalApp):
     def redraw_now(self) -> None:
         """Draw the step on top."""
         self._stale = False
-        screens = [screen for screen in self.screen_stack if isinstance(screen, StepScreen)]
-        for screen in screens[-1:]:
+        for screen in [one for one in self.screen_stack if isinstance(one, StepScreen)][-1:]:
             if screen.is_mounted and screen.query("#banner"):
                 screen.show()
 

@@ -6,6 +6,8 @@ next, and redraws itself from the desk when the application tells it to.
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, ClassVar, cast
 
 from textual.app import ComposeResult
@@ -18,6 +20,8 @@ from textual.style import Style
 from textual.widgets import Footer
 
 from daq.analyser import SourceState
+from tui.app.command_lines import commands_of
+from tui.app.dialogs.dialogs import CommandDialog
 from tui.app.widgets.plain import Caption, Field, Words
 
 if TYPE_CHECKING:
@@ -30,7 +34,7 @@ STEPS = ("unit", "instrument", "check", "sweep", "result", "diagnosis", "history
 """The steps in order; `_TITLES` are their names for people."""
 _TITLES = ("Unit", "Instrument", "Check", "Sweep", "Result", "Diagnosis", "Report")
 _WIDE = 100
-_SIDE = 120
+_SIDE = 140
 """Columns from which on master and detail stand side by side."""
 
 _TALL = 34
@@ -49,6 +53,22 @@ class StepScreen(Screen[None]):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("ctrl+n", "next", "Next", id="step.next", tooltip="Go on to the next step"),
         Binding("escape", "back", "Back", id="step.back", tooltip="Go back one step", show=False),
+        Binding(
+            "z,ctrl+z",
+            "undo",
+            "Undo",
+            id="step.undo",
+            show=False,
+            tooltip="Undo the last entry: unit, remarks, bench, address, plan",
+        ),
+        Binding(
+            "f2",
+            "command",
+            "Command",
+            id="step.command",
+            show=False,
+            tooltip="The lashbench commands that do the same",
+        ),
     ]
 
     @property
@@ -142,11 +162,41 @@ class StepScreen(Screen[None]):
         self.set_focus(others[0] if others else None)
         return True
 
+    def action_undo(self) -> None:
+        """Put back what stood before the last entry; nothing that was measured is touched."""
+        bench = self.bench
+        if bench.keeper.busy:
+            self.notify("a session is under way; its entries stay", severity="warning")
+            return
+        unit, url = self.desk.unit, self.desk.url
+        undone = bench.undo.back()
+        if not undone:
+            self.notify("there is no entry to undo")
+            return
+        if self.desk.unit is not unit:
+            bench.put_away()
+        if self.desk.url != url:
+            self.desk.identity, self.desk.link_fault = None, ""
+        self.notify(f"undone: {', '.join(undone)}")
+        self.arrive()
+        self.show()
+
+    def action_command(self) -> None:
+        """Show the commands of a shell that do what this step does."""
+        desk = replace(self.desk)
+
+        def tell(lines: list[str]) -> None:
+            self.app.push_screen(CommandDialog("The same on the command line", lines))
+
+        work = partial(commands_of, self.STEP, desk)
+        self.bench.beside.do("command", work, tell, "There is no command")
+
     def unread(self) -> str:
         """What was typed on this step and not taken yet; the way on waits for it."""
         return ""
 
     def _show_frame(self) -> None:
+        self.bench.undo.note()
         self.query_one("#step-bar", Words).update(_trail(self.STEP))
         banner = self.query_one("#banner", Words)
         banner.update(self.bench.banner_text())

@@ -6,6 +6,8 @@ toast and not here.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
@@ -13,11 +15,12 @@ from textual.screen import ModalScreen
 
 from tui.app.widgets.plain import Passage, Push, Words
 
-__all__ = ["KEYS", "Dialog", "ErrorDialog", "HelpDialog", "QuestionDialog"]
+__all__ = ["KEYS", "CommandDialog", "Dialog", "ErrorDialog", "HelpDialog", "QuestionDialog"]
 
 KEYS = """Everywhere: Ctrl+X stops the source at once (a software stop, no emergency stop).
 Ctrl+N next step, Esc back, 1 to 7 go to a step, Ctrl+P all commands, Ctrl+Y copies what is
-shown, Ctrl+Q quits. Tab moves between fields, Enter chooses."""
+shown, Z undoes the last entry (Ctrl+Z in a field), F2 shows the lashbench commands that do the
+same, Ctrl+Q quits. Tab moves between fields, Enter chooses."""
 """The keys that hold on every screen, for its help."""
 
 
@@ -107,3 +110,12 @@ class HelpDialog(Dialog):
         """The text."""
         yield Passage(self.text, id="text")
         yield Words("Enter or Esc closes", id="keys")
+
+
+class CommandDialog(ErrorDialog):
+    """Commands for a shell, one a line, to be copied."""
+
+    BINDINGS = [Binding("f2", "answer(True)", "Close", priority=True)]
+
+    def __init__(self, title: str, lines: Sequence[str]) -> None:
+        super().__init__(title, "\n".join(lines))

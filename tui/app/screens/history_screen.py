@@ -33,6 +33,9 @@ __all__ = ["HistoryScreen"]
 _SHOWN = 200
 _WIDE = ("", "#", "started", "unit", "state", "points", "r", "b1/deg", "b2/deg")
 _NARROW = ("#", "started", "serial", "points", "r", "b1/deg", "b2/deg")
+_ROOM = 98
+"""Columns that the wide headings take."""
+
 _SHORT = 8
 """Characters of a serial number on a narrow screen; the words below have all of it."""
 
@@ -117,7 +120,8 @@ before stays in its audit trail, which A shows.
         self.show()
 
     def _headings(self) -> tuple[str, ...]:
-        return _NARROW if self.has_class("-narrow") else _WIDE
+        room = self.query_one("#list").size.width or self.size.width
+        return _NARROW if room < _ROOM else _WIDE
 
     def _add_columns(self) -> None:
         self._columns = self._headings()

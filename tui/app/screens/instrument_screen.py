@@ -103,6 +103,7 @@ Connecting asks who is there and what the source does. It drives nothing.
     def arrive(self) -> None:
         """The address may have come with a session that is to be resumed."""
         self.query_one("#url", Field).value = self.desk.url
+        self.query_one("#bench", Field).value = self.desk.bench
         self._list()
 
     def unread(self) -> str:

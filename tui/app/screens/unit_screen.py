@@ -135,6 +135,11 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
             return f"Typing: {field}.  Enter: next.  Esc leaves the fields.  Ctrl+N: instrument"
         return "Enter: choose it, then type its serial number.  Ctrl+N: on to the instrument"
 
+    def action_undo(self) -> None:
+        """As every step; a path that was typed belongs to the unit that is put back."""
+        self.query_one("#file", Field).value = ""
+        super().action_undo()
+
     def unread(self) -> str:
         """A unit file that was typed and not read."""
         name = self.query_one("#file", Field).value.strip()
