@@ -18,6 +18,8 @@ __all__ = ["model_features"]
 
 NOTABLE_SCATTER = 1.25
 """Residuals beyond this many stated errors are worth a flag."""
+_VAGUE_DB, _VAGUE_DAMPING = 3.0, 1.0 / 3.0
+"""Errors of gain and, as a share of it, of damping from which on noise may have made a feature."""
 _SHARE = 0.5
 """The lowest pair that rises by this share of what the strongest one does is the level's."""
 
@@ -49,6 +51,11 @@ def model_features(
         std = math.sqrt(max(0.0, float(c[i, i] + c[j, j] - 2.0 * c[i, j])))
     said = [
         *_missing(arf, rf, reading, candidates),
+        *(
+            f"{name}: noise may have made it: its gain is known to {one.feature.gain_std_db:.2g} dB"
+            for name, one in (("arf", arf), ("rf", rf))
+            if one is not None and _is_vague(one)
+        ),
         *flags,
         *_others(pairs, (arf, rf)),
         *(
@@ -93,8 +100,22 @@ def _pairs(made: Sequence[Read]) -> list[_Pair]:
     return found
 
 
+def _is_vague(one: Read) -> bool:
+    """Whether neither its depth nor its damping is known, as of one that noise makes."""
+    feature = one.feature
+    if feature.gain_std_db < _VAGUE_DB:
+        return False
+    zeta, std = feature.damping_ratio, feature.damping_std
+    return zeta is None or std is None or std > _VAGUE_DAMPING * zeta
+
+
 def _leading(pairs: Sequence[_Pair]) -> _Pair:
-    """The lowest whole pair that is not far weaker than the strongest; else what there is."""
+    """The lowest whole pair that is not far weaker than the strongest; else what there is.
+
+    What noise may have made comes last: it keeps no clear feature from being reported.
+    """
+    clear = [pair for pair in pairs if not all(_is_vague(one) for one in pair if one is not None)]
+    pairs = clear or pairs
     whole = [(low, high) for low, high in pairs if low is not None and high is not None]
     if whole:
         rises = [high.feature.gain_db - low.feature.gain_db for low, high in whole]
@@ -117,8 +138,14 @@ def _missing(
     flags = []
     valley, hill = candidates
     if arf is None:
+        vague = [one.feature for one in reading.found if one.sign < 0 and one.made]
         bare = [one.feature.frequency_hz for one in reading.found if one.sign < 0 and not one.made]
-        flags.append(f"arf: {_why(bare, valley, 'least', 'zeros', 'minimum')}")
+        if vague:
+            # Of no leading pair.
+            at = ", ".join(f"{one.frequency_hz:.6g}" for one in vague)
+            flags.append(f"arf: noise may have made the minimum at {at} Hz")
+        else:
+            flags.append(f"arf: {_why(bare, valley, 'least', 'zeros', 'minimum')}")
     if rf is None:
         below = [
             one.feature.frequency_hz

@@ -398,3 +398,37 @@ def test_json_has_the_promised_fields():
     assert level["difference_hz"]["value"] == pytest.approx(
         level["rf"]["frequency_hz"] - level["arf"]["frequency_hz"]
     )
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_minimum_that_noise_makes_hides_no_resonance(seed):
+    """A resonance and then the noise floor, in which a pair of zeros often fits."""
+    rng = np.random.default_rng(seed)
+    f = np.geomspace(20.0, 400.0, 60)
+    h = 1 / pair(f, 60.0, 0.05) / (1 + 1j * f / 150.0) ** 2
+    share, floor = rng.normal(size=(2, 2, f.size))
+    h = h * (1 + 0.01 * (share[0] + 1j * share[1])) + 0.01 * (floor[0] + 1j * floor[1])
+    std_db = np.hypot(0.01, 0.01 / np.abs(h)) * DB_PER_NEPER
+    (level,) = extract(FrequencyResponse.from_arrays(f, 2.0, h, unit="X", gain_std_db=std_db))
+    assert level.rf is not None, level.flags
+    assert level.rf.frequency_hz == pytest.approx(60.0, rel=0.02)
+    for pairs in level.pairs:
+        if pairs.arf is not None and level.arf is None:
+            assert any(flag.startswith("arf: noise may have made") for flag in level.flags)
+
+
+@pytest.mark.parametrize("zeta", [0.0005, 0.002])
+def test_a_sharp_anti_resonance_whose_depth_is_not_known_is_still_one(zeta):
+    """On a coarse grid nothing tells how deep it is; where it is stays known."""
+    for seed in range(5):
+        truth = Truth(zeta_zero=zeta, step=3.0)
+        f, rng = truth.f, np.random.default_rng(seed)
+        noise = rng.normal(size=(2, f.size))
+        h = truth.response(f)
+        size = 0.02 * np.abs(h).max()
+        h = h + size * (noise[0] + 1j * noise[1])
+        std_db = size / np.abs(h) * DB_PER_NEPER
+        (level,) = extract(FrequencyResponse.from_arrays(f, 2.0, h, unit="X", gain_std_db=std_db))
+        assert level.arf is not None, level.flags
+        assert level.arf.frequency_hz == pytest.approx(40.0, rel=0.05)
+        assert level.rf is not None
