@@ -77,11 +77,10 @@ class Effect:
     `site` says whether the fault sits in the mechanics ("plant") or in the
     measuring chain ("chain"), `check` how to make sure of it by other means.
     Exactly one of `on_unit` and `on_drivetrain` is given. `added_inertia`, of
-    what is linear and acts on the load alone: by how much the load is felt to
-    have more inertia at an angular frequency (rad/s), kg.m^2, complex where it
-    brakes or swings. `resonance`: the parameter that is the frequency in Hz at which it
-    does, empty where there is none. `rare`: nobody would suspect it first, so that it is
-    looked for last, and alone.
+    what is linear and acts on the load alone: the inertia that it adds at an
+    angular frequency (rad/s), kg.m^2, complex where it brakes or swings.
+    `resonance`: the parameter that is the frequency in Hz at which it swings,
+    empty where there is none. `rare`: a less likely cause than the others.
     """
 
     id: str

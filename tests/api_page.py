@@ -21,18 +21,18 @@ FLOORS = ("daq", "sim", "analysis", "tui")
 _HEAD = """\
 # The interface
 
-What scripts may rely on: the modules that each package names in its `__all__`,
-and in them the names of theirs. What stands here is taken away only after a version
-that says so in the [CHANGELOG](../CHANGELOG.md); anything else is the inside of the
-house and may change without a word. `tui` is the
-[command line](index.md#commands) and the screens, whose interface are the verbs;
-only what runs a session without a screen is of use in Python. This page is made by
-`python tests/api_page.py`; whole descriptions, with units, shapes and errors, are in
-the docstrings (`python -m pydoc sim.response`). Scripts that use it:
+The interface for scripts: the modules in the `__all__` of each package, and the names in theirs.
+They change only after a version that says so in the [CHANGELOG](../CHANGELOG.md). Results have
+`.to_json()`, the document of their verb, and `.summary()`, lines of text. Units, shapes and errors are in
+the docstrings (`python -m pydoc sim.response`). Examples:
 [headless](examples/headless.py), [replay](examples/replay.py),
 [own unit](examples/own_unit.py), [own effect](examples/own_effect.py),
-[fleet](examples/fleet.py).
+[fleet](examples/fleet.py). `python tests/api_page.py` makes this page.
 """
+
+
+_USUAL = ("to_json", "summary", "close")
+"""Methods that say what they do by their name."""
 
 
 def page() -> str:
@@ -81,7 +81,7 @@ def _entry(name: str, thing: object) -> Iterator[str]:
     yield f"- `{name}{'' if plain else _parameters(thing)}`: {_summary(thing)}"
     for member, value in sorted(_members(thing).items()):
         function = value.__func__ if isinstance(value, classmethod) else value
-        if member.startswith("_"):
+        if member.startswith("_") or member in _USUAL:
             continue
         if isinstance(value, property):
             yield f"  - `.{member}`: {_summary(value)}"

@@ -1,8 +1,9 @@
 """How well a prediction explains an observation.
 
-Owns one likelihood: Student's t for every channel, with the scatter of single
-runs, the noise of the reading, the logarithm of both, and datasheet tolerances
-as priors that are fitted away. Heavy tails because a point with chaotic motion
+Owns the likelihood of an estimate (that of a diagnosis is `analysis.emulation.kernels.agree`) and
+the temperature of both: Student's t for every channel, with the scatter of single
+runs, the noise of the reading, and the logarithm of both. Datasheet deviations are fitted, with the
+tolerances as priors. Heavy tails because a point with chaotic motion
 can lie far out; the log-variance term because without it a machine whose
 simulation scatters most would explain everything. And because the motion
 may keep to one of several branches over a stretch of the sweep, the likelihood

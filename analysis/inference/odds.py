@@ -1,6 +1,7 @@
 """Posterior odds of a set of causes: the network's probability times a power of the likelihood.
 
-Owns the weight of the two. Refinement and verdict rank sets by it alone. It names nothing.
+Owns the weight of the two. Refinement and verdict rank sets by it; which of
+tied ones leads is decided in `analysis.selection.verdict`. It names nothing.
 """
 
 from __future__ import annotations

@@ -38,15 +38,14 @@ Word = Literal["consistent", "explained", "ambiguous", "unexplained"]
 
 _RARE = TEMPERATURE * float(np.log(10.0))
 """Lead of a common cause over a rare one: it is taken for ten times less likely. That
-says which of two that do alike is named first; no belief about benches rules the other out as a
-rival."""
+says which of two that do alike is named first. The less common one stays a rival."""
 
 FALSE_ALARM = 20.0
-"""By so much must a cause beat the baseline beyond its costs."""
+"""By so much must a cause beat the baseline."""
 
 _FURTHER = 5.0
-"""By so much must a further cause beat a part that has it not, beyond its costs: what it brings in
-the part's own runs asks for the rest. Friction behind a filter's corner was 3.5 standard deviations
+"""By so much must a further cause beat a part that has it not: what it brings in the part's own
+runs asks for the rest. Friction behind a filter's corner was 3.5 standard deviations
 beyond chance, and led by 34 where some 38 were asked with 10."""
 
 _SURE = 3.0 * TEMPERATURE
@@ -56,8 +55,7 @@ Sets further behind are not held against runs of their own, which takes seconds 
 nothing; the baseline always is, and so are parts of the leader."""
 
 _BY_CHANCE = 0.04
-"""Share of the baseline's own runs, with nothing hidden, that a cause may explain better by as
-much, or of a part's that a further cause may."""
+"""In at most this share of replicates of the simpler model may the larger one gain as much."""
 
 _BEYOND = 2.0
 """So many standard deviations must a further cause bring beyond what it brings in runs of a part
@@ -318,8 +316,8 @@ def _ask(judged: Sequence[Judged], rng: np.random.Generator) -> tuple[Judged, ..
 def _leader(judged: Sequence[Judged]) -> Judged:
     """The best set of those that have not been shown to owe their lead to chance.
 
-    Where it fits worse than replicates of this model and another that ties with it does, it
-    is the other that is believed; and so is one that says the same with fewer sizes.
+    If something speaks against the first and nothing against another within `_TIE`, that one leads.
+    So does one that says the same with fewer sizes.
     """
     left = [one for one in judged if one.objection != NO_GAIN]
     tied = [one for one in left if one.score > left[0].score - _TIE and one.adequate]

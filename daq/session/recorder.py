@@ -1,7 +1,7 @@
 """A session's side of the store: the measurement it writes, and what an earlier session left.
 
-Owns which lines the journal holds and how the traces of a lost point are
-found again. It measures nothing.
+Owns the check of the plan against the limits, which lines the journal holds, and how the traces
+of a lost point are found again. It measures nothing.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a session says to whoever stands by to switch the source off in its place.
+"""The session's interface to its watchdog.
 
 Owns that interface, and the one for instruments that need nobody: those that live and die with the
 session. It starts no process.

@@ -25,7 +25,14 @@ from sim.loopback import Loopback
 from sim.models import models
 
 ROOT = Path(daq.__file__).parents[1]
-INSTRUMENTS = ("daq.hp35670a", "daq.sr785", "sim.analyser35670a", "sim.sr785")
+INSTRUMENTS = (
+    "daq.hp35670a",
+    "daq.sr785",
+    "daq.sampled",
+    "sim.analyser35670a",
+    "sim.sr785",
+    "sim.sampled",
+)
 """How modules of instruments begin."""
 
 
