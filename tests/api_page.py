@@ -23,8 +23,8 @@ _HEAD = """\
 
 The interface for scripts: the modules in the `__all__` of each package, and the names in theirs.
 They change only after a version that says so in the [CHANGELOG](../CHANGELOG.md). Results have
-`.to_json()`, the document of their verb, and `.summary()`, lines of text. Units, shapes and errors are in
-the docstrings (`python -m pydoc sim.response`). Examples:
+`.to_json()`, the document of their verb, and `.summary()`, lines of text. Units,
+shapes and errors are in the docstrings (`python -m pydoc sim.response`). Examples:
 [headless](examples/headless.py), [replay](examples/replay.py),
 [own unit](examples/own_unit.py), [own effect](examples/own_effect.py),
 [fleet](examples/fleet.py). `python tests/api_page.py` makes this page.

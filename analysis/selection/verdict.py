@@ -333,15 +333,13 @@ def _part_that_will_do(
 ) -> Judged | None:
     """The part of a set that does nearly as well, if any: a further cause must earn its name.
 
-    The set must lead it by more, too, than it does in runs of the part alone.
+    The set must lead it by more than it does in runs of the part alone.
     """
     for one in judged:
         part = one.effects and set(one.effects) < set(best.effects)
         if not part or not one.adequate:
             continue
-        if one.score > best.score - _FURTHER or not _exceeds_chance_gain(
-            best.candidate, one.candidate, rng
-        ):
+        if not _exceeds_chance_gain(best.candidate, one.candidate, rng):
             return one
     return None
 

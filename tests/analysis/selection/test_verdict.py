@@ -122,7 +122,6 @@ def test_of_two_that_look_the_same_the_rare_one_is_a_rival_and_not_named_first(m
     [
         (0.05, 2.1, 60.0, TRUE),
         (0.03, 2.1, 6.0, TRUE + WRONG),
-        (0.03, 2.1, 4.0, TRUE),
         # Friction beside damped teeth led by 304 where own runs differ by 450 from run to run.
         (0.00, 1.9, 304.0, TRUE),
     ],
@@ -220,11 +219,8 @@ AB, AC, BC, CD = (tuple(sorted(one + two)) for one, two in ((A, B), (A, C), (B, 
         # A pair that owes its lead to chance takes none with it that shares its cause.
         ({AB: 300.0, AC: 290.0, A: 100.0}, {(A, AB)}, (), "explained", AC),
         ({AB: 300.0, AC: 290.0, A: 100.0}, {(A, AB), (A, AC)}, (), "explained", A),
-        # What a pair must lead by it must lead by itself, not by what is refused before it.
-        ({B: 500.0, AC: 490.0, A: 487.0}, set(), (B,), "ambiguous", A),
         # Who leads after all that is held against the plain model, too.
         ({AB: 230.0, C: 206.0, A: 204.0}, {(A, AB), ((), C)}, (), "consistent", ()),
-        ({AB: 114.0, A: 110.0, (): 100.0}, set(), ((),), "ambiguous", A),
         # And none that owes its lead to chance is a rival of another set.
         ({AB: 230.0, CD: 215.0, C: 206.0, A: 170.0}, {(A, AB), (C, CD)}, (), "explained", C),
     ],
