@@ -31,6 +31,9 @@ shapes and errors are in the docstrings (`python -m pydoc sim.response`). Exampl
 """
 
 
+_FIELDS = 6
+"""Fields of a class that are listed; its docstring has all of them."""
+
 _USUAL = ("to_json", "summary", "close")
 """Methods that say what they do by their name."""
 
@@ -121,6 +124,8 @@ def _parameters(thing: object) -> str:
             shown.append("*")
         starred |= parameter.kind in (parameter.KEYWORD_ONLY, parameter.VAR_POSITIONAL)
         shown.append(str(parameter))
+    if inspect.isclass(thing) and len(shown) > _FIELDS:
+        shown = [*shown[:_FIELDS], "..."]
     return f"({', '.join(shown)})"
 
 
