@@ -8,6 +8,7 @@ from daq.driving.entry import Driver, Wire
 
 if TYPE_CHECKING:
     from daq.analyser import Analyser
+    from daq.driving.first_day import Check
     from daq.plan import SweepPlan
     from daq.transports.base import Transport
 
@@ -52,6 +53,12 @@ def _load_nidaq() -> None:
     import daq.sampled.nidaq  # noqa: F401
 
 
+def _first_day() -> tuple[Check, ...]:
+    from daq.sampled.first_day import CHECKS
+
+    return CHECKS
+
+
 DRIVER = Driver(
     "sampled bench",
     "sampled",
@@ -59,5 +66,6 @@ DRIVER = Driver(
     _check,
     ("SAMPLED",),
     12,
+    _first_day,
     wires={"sound": Wire(_open_sound, _load_sound), "nidaq": Wire(_open_nidaq, _load_nidaq)},
 )

@@ -178,7 +178,8 @@ def test_only_an_answer_that_is_offered_is_taken(tries):
 
 
 @pytest.mark.parametrize(
-    ("scheme", "asks"), [("", "after the last point"), ("sr785", "output switch")]
+    ("scheme", "asks"),
+    [("", "after the last point"), ("sr785", "output switch"), ("sampled", "ramp")],
 )
 def test_a_question_that_nobody_answers_does_not_keep_the_source_driving(monkeypatch, scheme, asks):
     """The check is given up, the source made safe, and that is said."""
