@@ -138,8 +138,9 @@ $(READY): pyproject.toml requirements.lock
 	@echo "compiling the engine, once" >&2
 	@$(BIN)/python -c "from daq.plan import SweepPlan; from sim.unit import load_unit; \
 	  from sim.response import Servo, simulate_cycles; \
-	  plan = SweepPlan((500.0,), (1.0,), settle_cycles=1, integrate_cycles=1); \
-	  [simulate_cycles([Servo.of(load_unit('adss'), 0.5)], plan, single=s) for s in (False, True)]; \
+	  at = lambda *hz: SweepPlan(hz, (1.0,), settle_cycles=1, integrate_cycles=1, from_rest=True); \
+	  [simulate_cycles([Servo.of(load_unit('adss'), 0.5)], at(*range(500, 500 + n)), single=s, \
+	    workers=1) for s in (False, True) for n in (1, 20)]; \
 	  from analysis.emulation.kernel_data import compile_all; compile_all()"
 	@touch $@
 

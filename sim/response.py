@@ -12,8 +12,9 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
-from itertools import count
+from itertools import chain, count
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,7 @@ from daq.plan import SweepPlan
 from sim.effects import EffectSetting
 from sim.engine.effort import spend
 from sim.engine.engine import HARMONICS, LONGEST_STEP_S, Motion, Stretch, carry
+from sim.engine.freely import dealt_out, goes_freely, step_freely
 from sim.engine.stepping import Asking, shared_out, step_together
 from sim.engine.system import Law, PiecewiseLinearSystem
 from sim.reading import PERIODIC_SCATTER, response_of_cycles, scatter_of_cycles
@@ -41,6 +43,9 @@ __all__ = [
     "simulate",
     "simulate_cycles",
 ]
+
+_Begun = tuple[NDArray[np.float64], NDArray[np.float64]]
+_Swept = tuple[NDArray[np.complex128], float]
 
 _DEAR = 2.2
 """Steps of a shaft that hardens take so many times as long as others, which are within a third of
@@ -144,36 +149,50 @@ def simulate_cycles(
         If a motion grew without bound, at the last of the steps.
     """
     levels, workers = len(plan.levels_vpk), workers or _cores()
+    points = np.asarray(plan.frequencies_hz)
     # Points that start from rest do not depend on each other: sharing those out among the cores
     # leaves the lanes full.
-    apart = plan.from_rest and not shorter_steps_s
-    groups = list(_groups(servos, levels, 1 if apart else workers))
-    shares = _shares(plan, workers) if apart and len(groups) < workers else [slice(None)]
-    points = np.asarray(plan.frequencies_hz)
+    groups = list(_groups(servos, levels, 1 if plan.from_rest else workers))
+    lanes = levels * max(map(len, groups), default=1)
+    freely = goes_freely(lanes, len(groups) * (len(points) if plan.from_rest else 1), single)
+    shares = [slice(None)]
+    if plan.from_rest and freely:
+        shares = [slice(i, i + 1) for i in range(len(points))]
+    elif plan.from_rest and len(groups) < workers:
+        shares = _shares(plan, workers)
     steps_s = longest_step_s, *shorter_steps_s
 
-    def swept(number: int) -> Asking[tuple[NDArray[np.complex128], float]]:
-        group, share = [servos[i] for i in tasks[number][0]], tasks[number][1]
+    @cache
+    def begun(number: int) -> _Begun:
+        group = [servos[i] for i in groups[number]]
+        return parameters_of(group, levels), states_at_start(group, levels)
+
+    def swept(number: int, share: slice) -> Asking[_Swept]:
+        group, begin = [servos[i] for i in groups[number]], begun(number)
         part = replace(plan, frequencies_hz=tuple(points[share].tolist()))
         # What grows at every step may have begun further back than it was gone through again from.
         for at in range(len(shorter_steps_s)):
             with suppress(AnalysisError):
-                return (yield from _sweep(group, part, steps_s[at:], single, point_done))
-        return (yield from _sweep(group, part, steps_s[-1:], single, point_done))
+                return (yield from _sweep(group, part, steps_s[at:], single, point_done, begin))
+        return (yield from _sweep(group, part, steps_s[-1:], single, point_done, begin))
 
-    tasks = [(group, share) for group in groups for share in shares]
-    lanes = levels * max(map(len, groups), default=1)
+    tasks = [(number, share) for share in shares for number in range(len(groups))]
     lots = shared_out([0] * len(tasks), workers, lanes, single)
+    if freely:
+        lots = dealt_out(len(tasks), workers)
+
+    def stepped(lot: Sequence[int]) -> list[_Swept]:
+        askers = [swept(*tasks[i]) for i in lot]
+        return step_freely(askers) if freely else step_together(askers)
+
     with ThreadPoolExecutor(workers) as pool:
-        parts = pool.map(lambda lot: step_together([swept(number) for number in lot]), lots)
-        # All are of one kind, and stay in order.
-        done = [one for part in parts for one in part]
-    spend(len(servos) * plan.duration_s, sum(steps for _, steps in done) * longest_step_s)
+        done = dict(zip(chain(*lots), chain(*pool.map(stepped, lots)), strict=True))
+    spend(len(servos) * plan.duration_s, sum(d[1] for d in done.values()) * longest_step_s)
     shape = (levels, len(points), plan.integrate_cycles, HARMONICS)
     results = [np.empty(shape, dtype=complex) for _ in servos]
-    for (group, share), (cycles, _) in zip(tasks, done, strict=True):
-        for position, index in enumerate(group):
-            results[index][:, share] = cycles[position]
+    for i, (number, share) in enumerate(tasks):
+        for position, index in enumerate(groups[number]):
+            results[index][:, share] = done[i][0][position]
     return results
 
 
@@ -251,12 +270,14 @@ def _sweep(
     steps_s: Sequence[float],
     single: bool,
     point_done: Callable[[], None],
-) -> Asking[tuple[NDArray[np.complex128], float]]:
+    begun: _Begun,
+) -> Asking[_Swept]:
     """(servos, levels, points, cycles, 4) of servos that share their linear part.
 
     And how many steps of a plain unit take as long as theirs.
 
     `steps_s`: longest steps, each taken where the one before lets a motion grow without bound.
+    `begun`: parameters of their laws and states at the start.
     """
     levels = np.asarray(plan.levels_vpk, dtype=float)
     amplitude = np.tile(levels, len(servos))
@@ -268,7 +289,7 @@ def _sweep(
         for f in visited
     ]  # fmt: skip
     system = servos[0].system
-    parameters, start = parameters_of(servos, len(levels)), states_at_start(servos, len(levels))
+    parameters, start = begun
 
     def carried(some: Sequence[Stretch]) -> Asking[list[Motion]]:
         return carry(system, parameters, start, some, steps_s, single, point_done)

@@ -16,7 +16,7 @@ stops the motion at the end of a step or turns where the velocity passes zero.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -30,7 +30,7 @@ from sim.engine.solving import kinds_of, law_coefficients, law_parameters, order
 from sim.engine.stepping import Asking, Steps, step_together
 from sim.engine.system import PiecewiseLinearSystem
 
-__all__ = ["HARMONICS", "LONGEST_STEP_S", "Motion", "Stretch", "advance", "carry"]
+__all__ = ["HARMONICS", "LONGEST_STEP_S", "Motion", "Stretch", "advance", "carry", "carry_each"]
 
 HARMONICS = 4
 """Fourier coefficients kept per cycle: 0 (mean), 1, 2 and 3."""
@@ -150,16 +150,47 @@ def carry(
     AnalysisError
         If a motion grew without bound, at the last of the steps.
     """
-    longest, *shorter = steps_s
     moving = _Moving(system, find_modes(system), single)
+    return _carry(moving, parameters, state, stretches, steps_s, done)
+
+
+def carry_each(
+    system: PiecewiseLinearSystem,
+    parameters: NDArray[np.float64],
+    state: NDArray[np.float64],
+    stretches: Iterable[Stretch],
+    steps_s: Sequence[float],
+    single: bool = False,
+    done: Callable[[], None] = lambda: None,
+) -> Iterator[Asking[list[Motion]]]:
+    """Carry trajectories through each of some stretches from the same state, see `carry`.
+
+    Yields
+    ------
+    Asking
+        One for each stretch, which gives a list of one motion.
+    """
+    moving = _Moving(system, find_modes(system), single)
+    for stretch in stretches:
+        yield _carry(moving, parameters, state, [stretch], steps_s, done)
+
+
+def _carry(
+    moving: _Moving,
+    parameters: NDArray[np.float64],
+    state: NDArray[np.float64],
+    stretches: Sequence[Stretch],
+    steps_s: Sequence[float],
+    done: Callable[[], None],
+) -> Asking[list[Motion]]:
+    longest, *shorter = steps_s
     motions: list[Motion] = []
     grew = 0
     while len(motions) < len(stretches):
         begin = motions[-1].state if motions else state
         if grew > _SELDOM * len(stretches):
             rest = stretches[len(motions) :]
-            again = carry(system, parameters, begin, rest, shorter, single, done)
-            return motions + (yield from again)
+            return motions + (yield from _carry(moving, parameters, begin, rest, shorter, done))
         stretch = stretches[len(motions)]
         motion = yield from _dwell(moving, parameters, begin, stretch, longest)
         if np.all(np.isfinite(motion.coefficients)):
@@ -168,7 +199,9 @@ def carry(
             back = max(len(motions) - 1, 0)
             begin = motions[back - 1].state if back else state
             some = stretches[back : len(motions) + 1]
-            motions[back:] = yield from carry(system, parameters, begin, some, shorter, single)
+            motions[back:] = yield from _carry(
+                moving, parameters, begin, some, shorter, lambda: None
+            )
             grew += 1
         else:
             raise AnalysisError(

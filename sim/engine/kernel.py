@@ -28,7 +28,7 @@ from sim.engine.layout import PAIR, STEPS_SEEN, STRIBECK, SUMS, Layout, Structur
 from sim.engine.machine_code import architecture, compiled, multiplies_and_adds
 from sim.engine.system import Law
 
-__all__ = ["MOST_VECTORS", "Program", "step_cycles"]
+__all__ = ["FIRST_SWEEPS", "MOST_VECTORS", "Program", "step_cycles"]
 
 MOST_VECTORS = 4
 """Vectors that one call steps at most: registers suffice for no more."""
@@ -37,7 +37,7 @@ _LAWS_BESIDE = 4 if VECTOR_BYTES == 64 else 2
 """Vectors whose laws are solved side by side: machines with narrower ones have half as many
 registers, and what does not fit goes by way of memory."""
 
-_FIRST_SWEEPS = 8
+FIRST_SWEEPS = 8
 """How often laws are gone through in the first step, which knows no last forces to start from."""
 
 _WAVES = 8
@@ -126,15 +126,19 @@ class Program:
         self._sweeps = self._emit.alloca(_INT)
         # Aligns the stack with it: a vector that lies across two lines of the cache costs twice.
         self._sweeps.align = VECTOR_BYTES
-        self._emit.store(_INT(_FIRST_SWEEPS), self._sweeps)
-        cycles = self._emit.add(settle, kept)
-        with self._code.without_denormals(architecture), self._times(cycles) as cycle:
-            self._cycle(self._emit.sub(cycle, settle))
+        self._emit.store(_INT(FIRST_SWEEPS), self._sweeps)
+        with self._code.without_denormals(architecture):
+            self._run(settle, kept)
         self._emit.ret_void()
 
     def text(self) -> str:
         """The program in the compiler's own language."""
         return str(self._module)
+
+    def _run(self, settle: Any, kept: Any) -> None:
+        """All cycles."""
+        with self._times(self._emit.add(settle, kept)) as cycle:
+            self._cycle(self._emit.sub(cycle, settle))
 
     def _cycle(self, number: Any) -> None:
         """All steps of a cycle; the output is looked at if it is kept, one of number 0 or more."""
@@ -194,7 +198,7 @@ class Program:
 
     def _driven(self, j: int, at: Any, vectors: Sequence[int]) -> Lanes:
         """What the drive alone makes law j, or the output, see."""
-        cosine, sine = (self._wave(at, k, len(vectors)) for k in (0, 1))
+        cosine, sine = (self._wave(at, k, vectors) for k in (0, 1))
         turning = self._load("waves", 3 * j, vectors) * sine
         there = self._load("waves", 3 * j + 1, vectors) * cosine + turning.lanes()
         return there + self._load("waves", 3 * j + 2, vectors) if self._steady else there
@@ -298,7 +302,7 @@ class Program:
         """Add the output to the sums of its cycle, and keep its largest magnitude."""
         self._store("sums", 0, self._load("sums", 0, self._all) + output, self._all)
         for k in range(SUMS - 1):
-            share = self._wave(at, k, len(self._all)) * output
+            share = self._wave(at, k, self._all) * output
             more = share + self._load("sums", k + 1, self._all)
             self._store("sums", k + 1, more, self._all)
         largest = self._load("peak", 0, self._all)
@@ -365,7 +369,7 @@ class Program:
         loads = [self._emit.load(self._emit.gep(self._coefficients, [one])) for one in found]
         return Lanes(self._code, [self._code.everywhere(one) for one in loads])
 
-    def _wave(self, at: Any, k: int, count: int) -> Lanes:
-        """One wave of the table, the same in so many vectors."""
+    def _wave(self, at: Any, k: int, vectors: Sequence[int]) -> Lanes:
+        """One wave of the table, the same in some vectors."""
         place = self._emit.gep(self._table, [self._emit.add(at, _INT(k))])
-        return Lanes(self._code, [self._code.everywhere(self._emit.load(place))] * count)
+        return Lanes(self._code, [self._code.everywhere(self._emit.load(place))] * len(vectors))

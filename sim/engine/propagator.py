@@ -14,6 +14,7 @@ eigenvectors; it keeps its own coordinates and a full matrix.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,9 +80,15 @@ class Propagator:
 
 def find_modes(system: PiecewiseLinearSystem) -> Modes:
     """Eigenmodes of a system with every mesh closed, or its states where it has no good ones."""
+    return _modes_of(system.A.tobytes(), len(system.b))
+
+
+@lru_cache(maxsize=64)
+def _modes_of(matrix: bytes, n: int) -> Modes:
+    A = np.frombuffer(matrix).reshape(n, n)
     # Stiffness over inertia makes entries of 1e9 beside entries of 1; balancing
     # keeps eigenvectors and exponentials accurate.
-    balanced, (scale, _) = matrix_balance(system.A, permute=False, separate=True)
+    balanced, (scale, _) = matrix_balance(A, permute=False, separate=True)
     rates, vectors = np.linalg.eig(balanced)
     upper, real = np.flatnonzero(rates.imag > 0.0), np.flatnonzero(rates.imag == 0.0)
     order = np.concatenate([np.repeat(upper, 2), real])
