@@ -58,13 +58,15 @@ def test_the_verbs_refuse_it_at_once(verb, more, tmp_path, capsys):
     assert "phase" not in error
 
 
-def test_a_report_shows_it_without_an_estimate(tmp_path):
+@pytest.mark.parametrize("more", [[], ["--as-is"]])
+def test_a_report_shows_it_without_an_estimate(more, tmp_path):
     path, out = tmp_path / "r.csv", tmp_path / "r.html"
     write_response(response_to("noise"), path)
-    assert main(["report", str(path), "--unit", "adss", "--out", str(out)]) == 0
+    assert main(["report", str(path), "--unit", "adss", "--out", str(out), *more]) == 0
     text = out.read_text()
     assert "No estimate was made" in text
     assert "not from a stepped sine" in text
+    assert "--as-is" not in text
 
 
 @pytest.mark.parametrize("said", ["a stepped sine", "Swept Sine", "", None])

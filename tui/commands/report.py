@@ -72,6 +72,7 @@ def report(
     as_is
         Estimate and diagnose a response as it stands, also if it looks like a mistake.
     """
+    from analysis.observation.excitation import excitation_doubt
     from analysis.observation.input_check import check_inputs
     from analysis.observation.joint import unit_doubts
     from daq.formats.atomic import checked_target
@@ -101,10 +102,12 @@ def report(
     if said:
         remarks["input"] = "; ".join(said)
         console.note(f"warning: {remarks['input']}")
-    refused = bool(said) and not as_is
+    is_final = bool(excitation_doubt(response))
+    refused = bool(said) and (is_final or not as_is)
+    why = remarks.get("input", "") + ("" if is_final else f"; {_WAY_ON}")
     estimate = None if kept is None else kept.estimate
     if estimate is None and refused:
-        remarks["estimate"] = f"No estimate was made: {remarks['input']}; {_WAY_ON}."
+        remarks["estimate"] = f"No estimate was made: {why}."
     elif estimate is None:
         estimate = _estimate(response, subject, remarks, kept, console)
     diagnosis: Diagnosed | None = None
@@ -115,7 +118,7 @@ def report(
     elif diagnose is False:
         remarks["diagnosis"] = "No diagnosis was made: it was left out on request."
     elif refused:
-        remarks["diagnosis"] = f"No diagnosis was made: {remarks['input']}; {_WAY_ON}."
+        remarks["diagnosis"] = f"No diagnosis was made: {why}."
     else:
         diagnosis = _diagnose(response, subject, unit, remarks, kept, console)
     from analysis.report import write_report
