@@ -333,10 +333,16 @@ def load_unit(name_or_path: str) -> Unit:
     Raises
     ------
     ConfigurationError
-        If the file is not there, is not TOML, or any value in it is wrong.
+        If the file is not there, is not TOML, or any value in it is wrong or cannot be.
     """
+    from sim.datasheet.plausibility import find_impossible
+
     path = config_path("units", name_or_path)
-    return unit_from_mapping(read_toml(path), source=str(path))
+    unit = unit_from_mapping(read_toml(path), source=str(path))
+    impossible = find_impossible(unit)
+    if impossible:
+        raise ConfigurationError(f"{path}: values that cannot be: {'; '.join(impossible)}")
+    return unit
 
 
 def _lists_as_tuples(value: Any) -> Any:

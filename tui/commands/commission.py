@@ -10,9 +10,10 @@ from pathlib import Path
 
 from daq.errors import InputError
 from tui.executors import executor_at
-from tui.options import Cluster, Json, Tolerance, UnitName, tolerance_shares
+from tui.options import Cluster, Json, Tolerance, UnitName
 from tui.reading_options import NO_OPTIONS, ReadingOptions, read_files
 from tui.text.output import Injected
+from tui.unit_under_test import read_unit
 
 __all__ = ["commission"]
 
@@ -65,7 +66,7 @@ def commission(
     from daq.configs import config_path
     from sim.unit import load_unit
 
-    subject = load_unit(unit).with_tolerance(tolerance_shares(tolerance))
+    subject = read_unit(unit, console, tolerance)
     responses = read_files([file, *further], given, console)
     for text in check_inputs(responses, subject, as_is):
         console.note(f"warning: {text}")

@@ -19,12 +19,12 @@ from tui.options import (
     Tolerance,
     UnitName,
     directory_to_fill,
-    tolerance_shares,
 )
 from tui.places import cache_folder
 from tui.reading_options import NO_OPTIONS, ReadingOptions, read_files
 from tui.text.output import Console, Injected, readers_may_leave
 from tui.text.shell_quote import proposing
+from tui.unit_under_test import read_unit
 
 if TYPE_CHECKING:
     from analysis.diagnosis import Diagnosis
@@ -70,13 +70,12 @@ def diagnose(
     if paper == (file is not None):
         raise InputError("nothing to diagnose; give either a response or --paper" if not paper
                          else f"{file}: give either a response or --paper, not both")  # fmt: skip
-    from sim.unit import load_unit
 
     if paper and given != NO_OPTIONS:
         raise InputError("--paper reads no file that an option could complete; leave it out")
     if paper and cluster is not None:
         raise InputError("--cluster is for responses; the paper's numbers are diagnosed here")
-    subject = load_unit(unit).with_tolerance(tolerance_shares(tolerance))
+    subject = read_unit(unit, console, tolerance)
     with directory_to_fill(plots):
         if file is None:
             _diagnose_paper(subject, unit, plots, json, console)

@@ -6,20 +6,20 @@ its uncertainty are the analysis's.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.errors import InputError
 from tui.executors import executor_at
-from tui.options import Cluster, Json, Real, Tolerance, UnitName, tolerance_shares
+from tui.options import Cluster, Json, Real, Tolerance, UnitName
 from tui.places import cache_folder
 from tui.reading_options import NO_OPTIONS, ReadingOptions, read_files
 from tui.text.output import Injected
+from tui.unit_under_test import read_unit
 
 if TYPE_CHECKING:
-    from sim.unit import Unit
+    pass
 
 __all__ = ["estimate"]
 
@@ -72,7 +72,7 @@ def estimate(
                 "--total-backlash-unknown needs a response at several source levels; "
                 "two frequencies cannot tell it"
             )
-        subject = _unit(unit, tolerance)
+        subject = read_unit(unit, console, tolerance)
         from analysis.estimate import estimate_features
 
         result = estimate_features(arf_hz, rf_hz, subject, progress=console.progress)
@@ -80,7 +80,7 @@ def estimate(
     else:
         if arf_hz is not None or rf_hz is not None:
             raise InputError(f"{file}: give either a response or --arf-hz and --rf-hz, not both")
-        subject = _unit(unit, tolerance)
+        subject = read_unit(unit, console, tolerance)
         responses = read_files([file, *further], given, console)
         from analysis.estimate import estimate_response
         from analysis.observation.input_check import check_inputs
@@ -110,9 +110,3 @@ def estimate(
         advice = advise(accept_model(result.to_json()), subject)
         told = [*(f"warning: {text}" for text in warnings), *advice.lines()]
         console.data("\n".join([*result.summary(), *(f"  {text}" for text in told)]))
-
-
-def _unit(name_or_path: str, tolerance: Sequence[str] | None) -> Unit:
-    from sim.unit import load_unit
-
-    return load_unit(name_or_path).with_tolerance(tolerance_shares(tolerance))

@@ -16,6 +16,7 @@ from daq.errors import InputError, LimitError, MeasurementError
 from tui.entry import INTERRUPTED
 from tui.options import Json, Real, UnitName
 from tui.text.output import Console, Injected, readers_may_leave
+from tui.unit_under_test import read_unit
 
 if TYPE_CHECKING:
     from tui.first_day.run import FirstDayRun
@@ -56,7 +57,6 @@ def first_day(
         Drive hardware without asking; needed where there is no terminal.
     """
     from daq.drivers import driver_at, is_simulated, parse_instrument
-    from sim.unit import load_unit
     from tui.first_day.folder import Folder
     from tui.first_day.run import FirstDayRun
 
@@ -66,7 +66,7 @@ def first_day(
     driver, _ = driver_at(instrument)
     if driver.first_day is None:
         raise InputError(f"{instrument}: there are no first-day checks for {driver.name}")
-    subject = load_unit(unit)
+    subject = read_unit(unit, console)
     with Folder(out) as folder:
         is_real = not is_simulated(instrument)
         if is_real:

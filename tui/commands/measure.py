@@ -22,6 +22,7 @@ from tui.options import Json, Real, UnitName, Whole
 from tui.places import history_path
 from tui.text.output import Console, Injected, readers_may_leave
 from tui.text.shell_quote import pasted
+from tui.unit_under_test import read_unit
 
 if TYPE_CHECKING:
     from daq.session_events import Finished, SessionEvent
@@ -115,13 +116,11 @@ def measure(
     yes
         Drive hardware without asking; needed where there is no terminal.
     """
-    from sim.unit import load_unit
-
     options = PlanOptions(
         tuple(level or ()), start, stop, points, spacing, direction,
         settle_cycles, integrate_cycles, offset, adaptive,
     )  # fmt: skip
-    subject = load_unit(unit)
+    subject = read_unit(unit, console)
     is_given, db = db is not None, history_path(db, create=not dry_run)
     request = session_request(
         options, unit, subject, instrument, db,

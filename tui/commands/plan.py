@@ -9,8 +9,9 @@ from pathlib import Path
 
 from daq.errors import InputError
 from tui.executors import executor_at
-from tui.options import Cluster, Json, Real, Tolerance, UnitName, tolerance_shares
+from tui.options import Cluster, Json, Real, Tolerance, UnitName
 from tui.text.output import Injected
+from tui.unit_under_test import read_unit
 
 __all__ = ["plan"]
 
@@ -46,9 +47,8 @@ def plan(
     if out is not None and checked_target(out).exists():
         raise InputError(f"{out}: is there already and is left as it is; give another name")
     from analysis.planning import plan_sweep
-    from sim.unit import load_unit
 
-    subject = load_unit(unit).with_tolerance(tolerance_shares(tolerance))
+    subject = read_unit(unit, console, tolerance)
     with executor_at(cluster) as executor:
         found = plan_sweep(subject, minutes, executor=executor, progress=console.progress)
     if out is not None:

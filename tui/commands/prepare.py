@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Literal, cast
 from daq.errors import InputError, LashbenchError
 from tui.executors import executor_at
 from tui.measure_options import PlanOptions, swept_plan
-from tui.options import Cluster, Json, Real, Tolerance, UnitName, Whole, tolerance_shares
+from tui.options import Cluster, Json, Real, Tolerance, UnitName, Whole
 from tui.places import cache_folder
 from tui.reading_options import NO_LAYOUT, LayoutOptions, ReadingOptions, read_file
 from tui.text.output import Console, Injected
+from tui.unit_under_test import read_unit
 
 if TYPE_CHECKING:
     from analysis.observation.observation import Observation
@@ -84,13 +85,11 @@ def prepare(
     recipe
         Sweep recipe, by name or path: values for what is left out above.
     """
-    from sim.unit import load_unit
-
     options = PlanOptions(
         tuple(level or ()), start, stop, points, spacing, direction,
         settle_cycles, integrate_cycles, offset,
     )  # fmt: skip
-    subject = load_unit(unit).with_tolerance(tolerance_shares(tolerance))
+    subject = read_unit(unit, console, tolerance)
     if file is None and not options.given and recipe is None:
         _train(subject, _MACHINES if machines is None else machines, cluster, json, console)
         return

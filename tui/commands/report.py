@@ -16,11 +16,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from daq.errors import InputError, LashbenchError
-from tui.options import Tolerance, UnitName, tolerance_shares
+from tui.options import Tolerance, UnitName
 from tui.places import cache_folder, history_path
 from tui.reading_options import NO_OPTIONS, ReadingOptions, read_file
 from tui.text.output import Console, Injected
 from tui.text.shell_quote import proposing
+from tui.unit_under_test import read_unit
 
 if TYPE_CHECKING:
     from analysis.diagnosis import Diagnosis
@@ -76,12 +77,11 @@ def report(
     from analysis.observation.input_check import check_inputs
     from analysis.observation.joint import unit_doubts
     from daq.formats.atomic import checked_target
-    from sim.unit import load_unit
 
     if out.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{out}: a report is HTML; give a name that ends in .html")
     checked_target(out, source, unit, history_path(db))
-    subject = load_unit(unit).with_tolerance(tolerance_shares(tolerance))
+    subject = read_unit(unit, console, tolerance)
     remarks: dict[str, str] = {}
     kept: _Kept | None = None
     if not _is_identifier(source, db):

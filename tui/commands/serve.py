@@ -14,6 +14,7 @@ from cyclopts import Parameter
 from daq.errors import InputError
 from tui.options import Real, UnitName, Whole
 from tui.text.output import Injected
+from tui.unit_under_test import read_unit
 
 __all__ = ["serve"]
 
@@ -91,7 +92,6 @@ def serve(
     from sim.models import Bench, model_named
     from sim.response import SteppedServo
     from sim.serve import Server
-    from sim.unit import load_unit
 
     kind = model_named(model)
     if serial_pty and not kind.has_serial:
@@ -100,7 +100,7 @@ def serve(
         raise InputError(f"--options {options}: model {kind.name} lists no options")
     faults = [kind.parse_fault(text) for text in fault or []]
     effects = tuple(parse_effect(text) for text in effect or [])
-    servo = SteppedServo(load_unit(unit), ratio, effects, seed=seed)
+    servo = SteppedServo(read_unit(unit, console), ratio, effects, seed=seed)
     # The first dwell may compile the engine, for longer than a client waits for a reply.
     servo.dwell(1000.0, 1.0, 0.0, 0, 1)
     servo.rest()

@@ -15,6 +15,7 @@ from cyclopts import Parameter
 from daq.errors import InputError
 from tui.options import Real, UnitName, Whole, parameter_settings
 from tui.text.output import Injected
+from tui.unit_under_test import read_unit
 
 __all__ = ["simulate"]
 
@@ -85,7 +86,6 @@ def simulate(
     from daq.plan import SweepPlan, spaced_frequencies
     from sim.effects import parse_effect
     from sim.response import simulate as simulated
-    from sim.unit import load_unit
 
     check_writable(out, unit)
     if seed < 0:
@@ -95,7 +95,7 @@ def simulate(
             f"{points} points of {integrate_cycles} cycles at {len(level)} levels are more than "
             f"{_MOST_CYCLES} cycles; give fewer"
         )
-    subject = load_unit(unit).with_parameters(**parameter_settings(set_ or []))
+    subject = read_unit(unit, console, settings=parameter_settings(set_ or []))
     plan = SweepPlan(
         frequencies_hz=spaced_frequencies(start, stop, points, spacing),
         levels_vpk=tuple(level),

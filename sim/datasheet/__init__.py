@@ -1,0 +1,18 @@
+"""Datasheet values before anything is simulated: catalogue units, plausibility, the chain in words.
+
+Owns what a person who fills in a unit file is told. It simulates no motion.
+"""
+
+from sim.datasheet.catalogue_units import CatalogueUnit, parse_quantity, units_of
+from sim.datasheet.chain import describe_chain, natural_frequencies
+from sim.datasheet.plausibility import find_impossible, find_unusual
+
+__all__ = [
+    "CatalogueUnit",
+    "describe_chain",
+    "find_impossible",
+    "find_unusual",
+    "natural_frequencies",
+    "parse_quantity",
+    "units_of",
+]

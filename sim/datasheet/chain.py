@@ -1,0 +1,105 @@
+"""The chain from motor to load as a person checks it: ratios, inertias, natural frequencies.
+
+Owns the undamped linear modes of a unit and its description in words. It steps no motion and
+judges nothing (`sim.datasheet.plausibility`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.drivetrain import paper_drivetrain
+from sim.elements import Inertia, Mesh, Spring
+from sim.engine.system import Assembly
+from sim.unit import Unit
+
+__all__ = ["NaturalFrequencies", "describe_chain", "inertias_at_motor", "natural_frequencies"]
+
+
+@dataclass(frozen=True, slots=True)
+class NaturalFrequencies:
+    """Undamped modes with every mesh closed and no friction, Hz, lowest first.
+
+    Backlash lowers the frequencies that a sweep shows.
+    """
+
+    anti_resonances_hz: tuple[float, ...]
+    """With the motor held: zeros of the response of the motor's speed."""
+    resonances_hz: tuple[float, ...]
+    """With the motor free."""
+
+
+def natural_frequencies(unit: Unit) -> NaturalFrequencies:
+    """Linear anti-resonances and resonances of a unit's mechanics."""
+    assembly = Assembly()
+    for element in paper_drivetrain(unit, 1.0).elements.values():
+        if isinstance(element, (Inertia, Spring, Mesh)):
+            element.enter(assembly)
+    energy = assembly.build(output={"th_m": 1.0}).energy
+    n = len(assembly.inertias)
+    stiffness, inertia = energy[:n, :n], np.diag(energy)[n:]
+    held = [i for i, name in enumerate(assembly.inertias) if name != "th_m"]
+    return NaturalFrequencies(
+        _modes_hz(stiffness[np.ix_(held, held)], inertia[held]),
+        _modes_hz(stiffness, inertia)[1:],  # the first is the turning of the whole
+    )
+
+
+def inertias_at_motor(unit: Unit) -> dict[str, float]:
+    """Inertia of each part as the motor feels it, kg.m^2, from motor to load."""
+    stage1, first, whole = unit.stage1, unit.stage1.N_1, unit.stage1.N_1 * unit.output_ratio
+    parts = {
+        "motor": unit.motor.J_m,
+        "gear 1": stage1.J_g1 / first**2,
+        "shaft 1": stage1.J_s1 / first**2,
+    }
+    if stage1.J_p2 is not None:
+        parts["pinion 2"] = stage1.J_p2 / first**2
+    return parts | {"load": unit.load.J_L / whole**2}
+
+
+def describe_chain(unit: Unit) -> list[str]:
+    """The drive from motor to load in lines of text of at most 80 characters."""
+    stage1, stage2, ratio = unit.stage1, unit.stage2, unit.stage1.N_1 * unit.output_ratio
+    lines = [
+        f"motor      J_m {unit.motor.J_m:.4g} kg.m^2",
+        f"  stage 1  {stage1.N_1:.5g} : 1, mesh k_g1 {stage1.k_g1:.4g} N.m/rad",
+        f"shaft 1    k_s1 {stage1.k_s1:.4g} N.m/rad",
+    ]
+    if stage2 is not None:
+        lines.append(f"  stage 2  {stage2.N:.5g} : 1, mesh k_2 {stage2.k_2:.4g} N.m/rad")
+    lines.append(f"load       J_L {unit.load.J_L:.4g} kg.m^2")
+    parts = inertias_at_motor(unit)
+    total, play = sum(parts.values()), unit.backlash.b_t_deg
+    lines += [
+        "",
+        f"ratio from motor to load: {ratio:.5g}",
+        "inertia that the motor turns:",
+        *(f"  {part:<9}{J:.3e} kg.m^2 {100.0 * J / total:5.1f} %" for part, J in parts.items()),
+        f"  {'total':<9}{total:.3e} kg.m^2",
+        f"total backlash: {play:.4g} deg at the load, {play * ratio:.4g} deg at the motor",
+        *_frequency_lines(unit),
+    ]
+    return lines
+
+
+def _frequency_lines(unit: Unit) -> list[str]:
+    found, limits = natural_frequencies(unit), unit.limits
+    further = (*found.anti_resonances_hz[1:], *found.resonances_hz[1:])
+    lines = [
+        "linear, meshes closed and undamped (backlash lowers both):",
+        f"  ARF {found.anti_resonances_hz[0]:.4g} Hz, RF {found.resonances_hz[0]:.4g} Hz",
+    ]
+    if further:
+        lines.append(f"  further ones from {min(further):.4g} Hz")
+    return [*lines, f"limits: {limits.start_hz:g} to {limits.stop_hz:g} Hz, "
+            f"{limits.source_vpk:g} V peak"]  # fmt: skip
+
+
+def _modes_hz(stiffness: NDArray[np.float64], inertia: NDArray[np.float64]) -> tuple[float, ...]:
+    scale = 1.0 / np.sqrt(inertia)
+    squares = np.linalg.eigvalsh(scale[:, None] * stiffness * scale)
+    return tuple(float(w) for w in np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi))

@@ -1,0 +1,344 @@
+"""Values of a unit file that cannot be, or that are unusual, before anything is simulated.
+
+Owns the plausible ranges and the search for a catalogue unit that explains a value outside them.
+It changes no value, and simulates no motion.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from sim.datasheet.catalogue_units import unit_in_files, units_of
+
+if TYPE_CHECKING:
+    from sim.unit import Unit
+
+__all__ = ["KEYS", "find_impossible", "find_unusual", "impossible_among", "unusual_among"]
+
+Values = Mapping[str, float]
+
+_SECTIONS = {
+    "motor": ("L_a", "R_m", "k_b", "k_t", "J_m", "B_m", "T_f_m"),
+    "electronics": ("k_a", "k_ts", "filter_numerator", "filter_denominator"),
+    "stage1": ("N_1", "k_g1", "J_g1", "k_s1", "J_s1", "J_p2"),
+    "stage2": ("N", "k_2"),
+    "load": ("J_L", "T_f_L"),
+    "backlash": ("b_t_deg",),
+    "limits": ("source_vpk", "source_offset_v", "start_hz", "stop_hz"),
+}
+KEYS = {symbol: f"{name}.{symbol}" for name, symbols in _SECTIONS.items() for symbol in symbols}
+"""Where a value stands in a unit file, by symbol."""
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """What a quantity can be.
+
+    Parameters
+    ----------
+    needs
+        Symbols that it is calculated from, the one most likely to be wrong first.
+    usual, possible
+        Least and greatest value; outside `usual` is worth a look, outside `possible` cannot be.
+    of
+        The quantity from values by symbol; the first of `needs` itself if left out.
+    means
+        What it is, with ``{value}``; only for a quantity that is calculated.
+    unit
+        Of the quantity, for the range in messages.
+    remedy
+        What to look at if no unit of measurement explains it.
+    """
+
+    needs: tuple[str, ...]
+    usual: tuple[float, float]
+    possible: tuple[float, float]
+    of: Callable[[Values], float] | None = None
+    means: str = ""
+    unit: str = ""
+    remedy: str = ""
+
+    def value(self, values: Values) -> float:
+        """The quantity of some values."""
+        return values[self.needs[0]] if self.of is None else self.of(values)
+
+
+def _single(
+    symbol: str, usual: tuple[float, float], possible: tuple[float, float], remedy: str = ""
+) -> Range:
+    return Range((symbol,), usual, possible, unit=unit_in_files(symbol), remedy=remedy)
+
+
+_INERTIA = ((1e-12, 1e5), (1e-16, 1e9))
+_STIFFNESS = ((1e-3, 1e10), (1e-7, 1e14))
+_STAGE = ((1.05, 400.0), (0.02, 1e5))
+_TURNED = "it is turns of the faster side per turn of the slower one, above 1"
+
+# From motors of 4 mm diameter to drives of antennas.
+_SINGLES = (
+    _single("L_a", (1e-6, 0.3), (1e-9, 20.0)),
+    _single("R_m", (5e-3, 500.0), (1e-6, 1e6)),
+    _single("k_b", (1e-4, 30.0), (1e-7, 1e4)),
+    _single("k_t", (1e-4, 30.0), (1e-7, 1e4)),
+    _single("J_m", *_INERTIA),
+    _single("B_m", (0.0, 10.0), (0.0, 1e5)),
+    _single("T_f_m", (0.0, 100.0), (0.0, 1e5)),
+    _single("k_a", (1e-3, 1e3), (1e-7, 1e7)),
+    _single("k_ts", (1e-5, 1e3), (1e-10, 1e8)),
+    _single("N_1", *_STAGE, remedy=_TURNED),
+    _single("k_g1", *_STIFFNESS),
+    _single("J_g1", *_INERTIA),
+    _single("k_s1", *_STIFFNESS),
+    _single("J_s1", (0.0, 1e5), (0.0, 1e9)),
+    _single("J_p2", (0.0, 1e5), (0.0, 1e9)),
+    _single("N", *_STAGE, remedy=f"{_TURNED}; a drive with one stage has no [stage2]"),
+    _single("k_2", *_STIFFNESS),
+    _single("J_L", (1e-10, 1e7), (1e-16, 1e10)),
+    _single("T_f_L", (0.0, 1e5), (0.0, 1e8)),
+    _single("b_t_deg", (0.0, 3.0), (0.0, 45.0)),
+    _single("source_vpk", (1e-3, 100.0), (1e-7, 1e5)),
+    _single("source_offset_v", (0.0, 100.0), (0.0, 1e5)),
+    _single("start_hz", (1e-4, 1e4), (1e-7, 1e7)),
+    _single("stop_hz", (1e-2, 1e5), (1e-6, 1e8)),
+)
+
+
+def _total(v: Values) -> float:
+    return v["N_1"] * v.get("N", 1.0)
+
+
+def _stall_torque(v: Values) -> float:
+    return v["k_t"] * v["k_a"] * (v["source_vpk"] + v["source_offset_v"]) / v["R_m"]
+
+
+def _friction(v: Values) -> float:
+    return (v["T_f_m"] + v["T_f_L"] / _total(v)) / _stall_torque(v)
+
+
+def _part_at_motor(symbol: str) -> Range:
+    return Range(
+        (symbol, "J_m", "N_1"), (0.0, 30.0), (0.0, 1e3),
+        lambda v: v[symbol] / v["N_1"] ** 2 / v["J_m"],
+        f"{symbol} seen by the motor is {{value}} times J_m",
+    )  # fmt: skip
+
+
+_DRIVEN = ("k_t", "k_a", "R_m", "source_vpk", "source_offset_v", "N_1")
+_COMBINED = (
+    Range(
+        ("k_b", "k_t"), (0.7, 1.4), (0.25, 4.0), lambda v: v["k_b"] / v["k_t"],
+        "{value} times k_t; in SI units both are equal in a DC motor",
+        remedy="constants of AC motors depend on the convention (rms, phase to phase)",
+    ),
+    Range(
+        ("L_a", "R_m"), (1e-7, 0.1), (1e-11, 1.0), lambda v: v["L_a"] / v["R_m"],
+        "L_a/R_m, the electrical time constant, is {value} s", "s",
+        "are inductance and resistance in each other's place?",
+    ),
+    Range(
+        ("J_m", "k_t", "k_b", "R_m"), (1e-5, 10.0), (1e-8, 100.0),
+        lambda v: v["J_m"] * v["R_m"] / (v["k_t"] * v["k_b"]),
+        "J_m R_m/(k_t k_b), the mechanical time constant of the motor, is {value} s", "s",
+    ),
+    Range(
+        ("J_L", "J_m", "N_1"), (1e-3, 100.0), (1e-7, 1e4),
+        lambda v: v["J_L"] / _total(v) ** 2 / v["J_m"],
+        "the load seen by the motor is {value} times J_m",
+        remedy="see whether the inertias and the ratios are right",
+    ),
+    _part_at_motor("J_g1"),
+    _part_at_motor("J_s1"),
+    _part_at_motor("J_p2"),
+    Range(
+        ("B_m", "J_m"), (0.0, 3e3), (0.0, 1e8), lambda v: v["B_m"] / v["J_m"],
+        "B_m/J_m, the rate at which viscous friction stops the motor, is {value} 1/s", "1/s",
+    ),
+    Range(
+        ("T_f_m", *_DRIVEN), (0.0, 0.5), (0.0, 5.0), lambda v: v["T_f_m"] / _stall_torque(v),
+        "it is {value} times the motor's torque at the highest source level of [limits]",
+        remedy="friction holds the motor still at every level; raise limits.source_vpk",
+    ),
+    Range(
+        ("T_f_L", "T_f_m", *_DRIVEN), (0.0, 0.5), (0.0, 5.0), _friction,
+        "friction of motor and load is {value} times the motor's torque at the highest source "
+        "level of [limits]",
+        remedy="friction holds the drive still at every level; raise limits.source_vpk",
+    ),
+    Range(
+        ("k_ts", "k_a", "k_b", "source_vpk"), (0.0, 2000.0), (0.0, 1e9),
+        lambda v: v["k_a"] * v["k_ts"] / v["k_b"] * v["source_vpk"],
+        "the tachometer gives {value} V at the highest source level of [limits]", "V",
+    ),
+    Range(
+        ("filter_numerator", "filter_denominator"), (1e-3, 1e3), (1e-9, 1e9),
+        lambda v: v["filter_numerator"] / v["filter_denominator"],
+        "the filter's gain at low frequency is {value}",
+        remedy="numerator and last coefficient of the denominator are usually equal",
+    ),
+    Range(
+        ("filter_denominator", "start_hz"), (1.0, math.inf), (1e-3, math.inf),
+        lambda v: v["corner_hz"] / v["start_hz"],
+        "the filter's corner is {value} times limits.start_hz",
+        remedy="coefficients are in rad/s: omega^2 = (2 pi f)^2",
+    ),
+    Range(
+        ("filter_denominator",), (0.02, 20.0), (0.0, 1e6), lambda v: v["filter_damping"],
+        "the filter's damping ratio is {value}",
+        remedy="the coefficients are 1, 2 zeta omega and omega^2",
+    ),
+    Range(
+        ("start_hz", "stop_hz"), (0.0, 0.9), (0.0, 0.999), lambda v: v["start_hz"] / v["stop_hz"],
+        "it is {value} times limits.stop_hz",
+        remedy="the limits leave no band for a sweep",
+    ),
+)  # fmt: skip
+
+
+def find_impossible(unit: Unit) -> list[str]:
+    """What a unit's values cannot be: key, value, what is plausible, and the likely slip each."""
+    values = _values(unit)
+    return list(impossible_among(values)) or _resonances(unit, beyond=20.0)
+
+
+def find_unusual(unit: Unit) -> list[str]:
+    """What is unusual in a unit's values and can be all the same, in the same form."""
+    return list(unusual_among(_values(unit))) or _resonances(unit, beyond=1.0)
+
+
+def impossible_among(values: Values) -> Iterator[str]:
+    """The same of values by symbol, of which some may be missing."""
+    return _beyond(values, lambda given: given.possible)
+
+
+def unusual_among(values: Values) -> Iterator[str]:
+    """The same."""
+    return _beyond(values, lambda given: given.usual)
+
+
+def _beyond(values: Values, bounds: Callable[[Range], tuple[float, float]]) -> Iterator[str]:
+    """A sentence for each quantity outside its bounds, but one only for each suspected value."""
+    told: set[str] = set()
+    for given in _checks(values):
+        if _is_within(given.value(values), bounds(given)) or told.intersection(given.needs):
+            continue
+        told.add(given.needs[0])
+        told.update(symbol for symbol, _, _ in _slips(given, values))
+        yield _sentence(given, values)
+
+
+def _checks(values: Values) -> Iterator[Range]:
+    for given in (*_SINGLES, *_COMBINED):
+        if all(symbol in values for symbol in given.needs):
+            yield given
+
+
+def _is_within(value: float, bounds: tuple[float, float]) -> bool:
+    return bounds[0] <= value <= bounds[1]
+
+
+def _sentence(given: Range, values: Values) -> str:
+    symbol = given.needs[0]
+    number = f"{values[symbol]:.4g}"
+    in_file = unit_in_files(symbol)
+    quantity = f"{given.value(values):.3g}"
+    what = "" if not given.means else f": {given.means.format(value=quantity)}"
+    plausible = _range_text(given)
+    slips = [
+        f"if {name} is in {written}, give {converted:.4g}"
+        for name, written, converted in _slips(given, values)[:2]
+    ]
+    remedy = given.remedy or ("" if slips else "see whether it is in SI units")
+    look = "; otherwise ".join(part for part in (", or ".join(slips), remedy) if part)
+    return (
+        f"{KEYS[symbol]} {number} {in_file}".rstrip() + f"{what} (plausible: {plausible}); {look}"
+    )
+
+
+def _range_text(given: Range) -> str:
+    least, most = given.usual
+    unit = f" {given.unit}" if given.unit else ""
+    if least == 0.0:
+        return f"at most {most:g}{unit}"
+    if math.isinf(most):
+        return f"at least {least:g}{unit}"
+    return f"{least:g} to {most:g}{unit}"
+
+
+def _slips(given: Range, values: Values) -> list[tuple[str, str, float]]:
+    """Symbol, catalogue unit and converted value, for each that makes the quantity usual.
+
+    Only those that leave the fewest other quantities unusual. The first is the likeliest.
+    """
+    found: dict[tuple[str, float], tuple[int, int, float, int, str, str, float]] = {}
+    singles = {one.needs[0]: one.usual for one in _SINGLES}
+    for place, symbol in enumerate(given.needs):
+        for rank, unit in enumerate(units_of(symbol)[1:]):
+            if values[symbol] == 0.0:
+                continue
+            converted = unit.convert(values[symbol])
+            if 0.4 < converted / values[symbol] < 2.5:
+                continue  # no slip of units explains so little
+            changed = {**values, symbol: converted}
+            quantity = given.value(changed)
+            if _is_within(converted, singles[symbol]) and _is_within(quantity, given.usual):
+                left = sum(not _is_within(one.value(changed), one.usual) for one in _checks(values))
+                distance = _distance(quantity, given.usual)
+                entry = (left, place, distance, rank, symbol, unit.name, converted)
+                found.setdefault((symbol, converted), entry)
+    fewest = min((entry[0] for entry in found.values()), default=0)
+    return [entry[4:] for entry in sorted(found.values()) if entry[0] == fewest]
+
+
+def _distance(value: float, bounds: tuple[float, float]) -> float:
+    if bounds[0] <= 0.0 or value <= 0.0 or math.isinf(bounds[1]):
+        return 0.0
+    return abs(math.log(value / math.sqrt(bounds[0] * bounds[1])))
+
+
+def _values(unit: Unit) -> dict[str, float]:
+    first, second, third = unit.electronics.filter_denominator
+    omega = math.sqrt(third / first)
+    limits = unit.limits
+    return unit.parameters | {
+        "filter_denominator": third,
+        "corner_hz": omega / (2.0 * math.pi),
+        "filter_damping": second / (2.0 * first * omega),
+        "source_vpk": limits.source_vpk,
+        "source_offset_v": limits.source_offset_v,
+        "start_hz": limits.start_hz,
+        "stop_hz": limits.stop_hz,
+    }
+
+
+def _resonances(unit: Unit, beyond: float) -> list[str]:
+    """Linear ARF and RF outside the limits by more than a factor; backlash lowers both."""
+    arf, rf = _arf_and_rf(unit)
+    limits = unit.limits
+    if arf <= limits.stop_hz * beyond and rf * beyond >= limits.start_hz:
+        return []
+    side, key = ("above", "stop_hz") if arf > limits.stop_hz else ("below", "start_hz")
+    return [
+        f"limits.{key} {getattr(limits, key):.4g} Hz: the linear ARF {arf:.4g} Hz and RF "
+        f"{rf:.4g} Hz are {side} it, and no allowed sweep shows them; {_resonance_slip(unit)}"
+    ]
+
+
+def _resonance_slip(unit: Unit) -> str:
+    values = unit.parameters
+    for symbol in ("k_s1", "J_L", "k_g1", "k_2"):
+        for other in units_of(symbol)[1:] if symbol in values else ():
+            converted = other.convert(values[symbol])
+            arf, rf = _arf_and_rf(unit.with_parameters(**{symbol: converted}))
+            if arf >= 2.0 * unit.limits.start_hz and rf <= unit.limits.stop_hz / 2.0:
+                return f"if {symbol} is in {other.name}, give {converted:.4g}"
+    return "see whether stiffnesses (N.m/rad), inertias (kg.m^2) and the limits are right"
+
+
+def _arf_and_rf(unit: Unit) -> tuple[float, float]:
+    from sim.datasheet.chain import natural_frequencies
+
+    found = natural_frequencies(unit)
+    return found.anti_resonances_hz[0], found.resonances_hz[0]

@@ -1,0 +1,51 @@
+"""The unit that ``--unit`` names, as every verb reads it.
+
+Owns that what is unusual in a unit file is told once, before the work. It judges nothing itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from tui.options import tolerance_shares
+
+if TYPE_CHECKING:
+    from sim.unit import Unit
+    from tui.text.output import Console
+
+__all__ = ["read_unit"]
+
+
+def read_unit(
+    name_or_path: str,
+    console: Console,
+    tolerance: Sequence[str] | None = None,
+    settings: Mapping[str, float] | None = None,
+) -> Unit:
+    """Read a unit, and tell what is unusual in it.
+
+    Parameters
+    ----------
+    tolerance
+        Texts of ``--tolerance``.
+    settings
+        Parameters to change, by symbol; what these cannot be is told and not refused.
+
+    Raises
+    ------
+    ConfigurationError
+        If there is no such unit, or a value in it is wrong or cannot be.
+    InputError
+        If a tolerance is no share.
+    """
+    from sim.datasheet import find_impossible, find_unusual
+    from sim.unit import load_unit
+
+    unit = load_unit(name_or_path)
+    if settings:
+        unit = unit.with_parameters(**settings)
+    unit = unit.with_tolerance(tolerance_shares(tolerance))
+    for text in find_impossible(unit) or find_unusual(unit):
+        console.note(f"warning: unit {unit.name}: {text}")
+    return unit
