@@ -53,6 +53,7 @@ VERBS = {
     "export": ("tui.commands.files.export:export", "Write a stored measurement to a file."),
     "convert": ("tui.commands.files.convert:convert", "Write a response in another file format."),
     "frf": ("tui.commands.files.frf:frf", "Estimate a response from a record over time."),
+    "plot": ("tui.commands.files.plot:plot", "Draw responses, with the model beside them."),
     "report": ("tui.commands.report:report", "Write a report that prints, as one HTML file."),
     "new-unit": ("tui.commands.new_unit:new_unit", "Write a unit file to fill in."),
     "serve": ("tui.commands.serve:serve", "Serve a simulated 35670A, SR785 or sampled bench."),
