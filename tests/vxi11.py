@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import time
 from collections.abc import Callable
 
 from sim.instrument.pace import Fast
@@ -109,3 +110,21 @@ class Gateway(Vxi11Instrument):
         if procedure == CLEAR and not self.errors.get(CLEAR):
             self._box.device_clear()
         return super()._procedure(procedure, body)
+
+
+class RestartingGateway(Gateway):
+    """A gateway that starts anew in a sweep: it hangs up, and for a while on everybody."""
+
+    def __init__(self, box, away_s, point=3):
+        super().__init__(box)
+        self._away_s, self._point = away_s, point
+        self._back_s: float | None = None
+
+    def feed(self, data):
+        if self._back_s is None and self._box.points_begun >= self._point:
+            self._back_s = time.monotonic() + self._away_s
+        if self._back_s is not None and time.monotonic() < self._back_s:
+            self._bytes.clear()
+            self._message, self._reply = b"", b""
+            return None
+        return super().feed(data)

@@ -106,15 +106,18 @@ def regress(drawn: Round, measured: Vector, proposal: Gaussian, prior: Gaussian)
     spare = max(families - basis.shape[1], 1)
     leverage = basis_at @ np.linalg.solve(share * basis.T @ basis, basis_at)
     scatter = share * errors.T @ errors / spare * (1.0 + leverage)
-    regressed = Gaussian(at, scatter)
-    posterior = _corrected(regressed, _standardised(proposal), _standardised(prior, proposal))
+    size = np.sqrt(np.mean(left**2, axis=1))
+    own = float(np.sqrt(np.mean(remainder**2)))
+    misfit = own / float(np.median(size))
+    posterior = _corrected(
+        Gaussian(at, scatter), _standardised(proposal), _standardised(prior, proposal),
+        max(misfit, 1.0),
+    )  # fmt: skip
     std = proposal.std
     found = Gaussian(
         proposal.mean + posterior.mean * std, posterior.covariance * np.outer(std, std)
     )
-    size = np.sqrt(np.mean(left**2, axis=1))
-    own = float(np.sqrt(np.mean(remainder**2)))
-    return Regressed(found, own / float(np.median(size)), float(np.mean(size < own)))
+    return Regressed(found, misfit, float(np.mean(size < own)))
 
 
 def expected_std(
@@ -175,8 +178,11 @@ def _standardised(one: Gaussian, by: Gaussian | None = None) -> Gaussian:
     return Gaussian((one.mean - by.mean) / by.std, one.covariance / np.outer(by.std, by.std))
 
 
-def _corrected(found: Gaussian, proposal: Gaussian, prior: Gaussian) -> Gaussian:
+def _corrected(found: Gaussian, proposal: Gaussian, prior: Gaussian, birge: float) -> Gaussian:
     """The posterior under a prior, of one under a proposal: what the data say is their ratio.
+
+    Where they fit worse than simulated drives do, their errors are larger by as much: the Birge
+    ratio (Birge 1932).
 
     What the data say is no negative information; directions in which chance makes it so are left
     to the prior.
@@ -184,13 +190,13 @@ def _corrected(found: Gaussian, proposal: Gaussian, prior: Gaussian) -> Gaussian
     under, drawn = np.linalg.inv(found.covariance), np.linalg.inv(proposal.covariance)
     # In the eigenvectors of the data's information relative to the proposal.
     values, vectors = eigh(under - drawn, drawn)
-    told = np.maximum(values, 0.0)
+    told = np.maximum(values, 0.0) / birge**2
     # eigh: V^T drawn V = 1, so drawn V is the inverse of V^T.
     back = drawn @ vectors
     information = (back * told) @ back.T
     # The mean that the data alone say, by the same directions.
     shift = vectors.T @ (under @ found.mean - drawn @ proposal.mean)
-    pull = back @ np.where(values > 0.0, shift, 0.0)
+    pull = back @ np.where(values > 0.0, shift, 0.0) / birge**2
     own = np.linalg.inv(prior.covariance)
     factor = cho_factor(information + own)
     covariance = cho_solve(factor, np.eye(len(own)))

@@ -9,7 +9,7 @@ from contextlib import suppress
 import pytest
 from bench_server import simulated
 from fake_analyser import known_gain
-from vxi11 import CLEAR, READ_STB, WRITE, Gateway, Vxi11Instrument
+from vxi11 import CLEAR, READ_STB, WRITE, Gateway, RestartingGateway, Vxi11Instrument
 from wire import ByteServer, lines_of
 
 from daq.analyser import PointSettings, SourceState
@@ -221,6 +221,27 @@ def test_a_gateway_without_poll_or_clear_is_measured_through_and_told(store, dri
     notes = " ".join(event.text for event in store.events(1) if "wire: " in event.text)
     for lack in analyser.wire_lacks:
         assert f"no {lack}" in notes
+
+
+@pytest.mark.parametrize("driver", DRIVERS, ids=lambda driver: driver.scheme or "preset")
+def test_a_gateway_that_starts_anew_ends_the_session_with_the_source_off(store, driver):
+    box = simulated(driver.scheme, LinearPlant(known_gain))
+    lead = f"{driver.scheme}:" if driver.scheme else ""
+    plan = SweepPlan(
+        spaced_frequencies(120.0, 160.0, 11), (1.0,), settle_cycles=2, integrate_cycles=3
+    )
+    with ByteServer(RestartingGateway(box, away_s=1.0).feed) as server:
+        url = f"{lead}TCPIP::127.0.0.1,{server.port}::inst0::INSTR"
+        header = MeasurementHeader("ADSS", "7", plan, url, "lashbench test")
+        request = SessionRequest(header=header, limits=(Limits("bench"),))
+        session = Session(open_analyser(url), store, request, reopen=lambda: open_analyser(url))
+        # The Python back end tells a connection that ends in a serial poll as a time-out.
+        with pytest.raises((LinkError, BenchTimeout)):
+            list(session.run())
+        assert box.driven_v == 0.0
+        assert session.finished.source_state is SourceState.CONFIRMED_OFF
+    for stored in store.points(1):
+        assert stored.point.gain == pytest.approx(known_gain(stored.requested_hz), rel=1e-4)
 
 
 def test_an_instrument_that_another_client_locked_is_told(vxi11):

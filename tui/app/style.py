@@ -37,6 +37,8 @@ FooterKey .footer-key--key, FooterKey .footer-key--description { color: $foregro
 FooterKey .footer-key--key { text-style: bold; }
 Input > .input--placeholder { color: $foreground 80%; }
 OptionList > .option-list--option-highlighted { color: $foreground; background: $panel; }
+DataTable > .datatable--cursor { background: $foreground; color: $background; }
+DataTable > .datatable--header { color: $foreground; background: $panel; }
 OptionList:focus > .option-list--option-highlighted { text-style: reverse bold; }
 ToastRack { dock: top; align: right top; margin-top: 2; }
 #info { height: auto; max-height: 4; }

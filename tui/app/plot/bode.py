@@ -233,8 +233,6 @@ class BodePlot(Vertical, can_focus=True):
             self._draw_gain(gain)
             self._draw_phase(phase)
             words = legend(self.traces, self.predictions) or "no points yet"
-            if names := dict.fromkeys(label for _, label in self._lines if label):
-                words += f"  \u2502 {', '.join(names)}"
             if self.view_hz is not None:
                 words += f"  \u2502 zoom {self.view_hz[0]:.4g} to {self.view_hz[1]:.4g} Hz"
             self.query_one("#legend-line", Words).update(words)

@@ -12,10 +12,13 @@ import numpy as np
 
 from tui.app.plot.chart import Chart, Drawing
 from tui.app.plot.layers import Band, Bars, Curve, Layer, Line, Marks
-from tui.app.plot.scales import linear_scale
+from tui.app.plot.scales import Scale, linear_scale
 from tui.app.plot.traces import LEVEL_MARKS
 
 __all__ = ["index_drawing", "trend_drawing"]
+
+_FEWEST = 5
+"""Sessions that an axis has room for, however few there are."""
 
 _APART = (8, 16)
 """Columns between two ticks."""
@@ -48,6 +51,15 @@ def index_drawing(chart: Chart, curve: Mapping[str, Any] | None) -> Drawing | No
     )  # fmt: skip
 
 
+def _sessions(count: int, width: int) -> Scale:
+    """Sessions from 1 on, five at least, with a tick for every one, or for 2, 5, 10 and so on."""
+    shown = max(count, _FEWEST)
+    steps = (part * ten for ten in (1, 10, 100, 1000) for part in (1, 2, 5))
+    step = next((one for one in steps if shown / one * _APART[0] <= width), shown)
+    ticks = tuple(float(number) for number in range(step, shown + 1, step))
+    return Scale(0.5, shown + 0.5, width, ticks)
+
+
 def trend_drawing(chart: Chart, ratios: Sequence[Mapping[str, Any]]) -> Drawing | None:
     """Contribution ratios of sessions in order, with bars of one standard error."""
     if not ratios:
@@ -62,9 +74,7 @@ def trend_drawing(chart: Chart, ratios: Sequence[Mapping[str, Any]]) -> Drawing 
         Bars(place, value - std, value + std, palette.colour(0)),
         Marks(place, value, [LEVEL_MARKS[0]] * len(ratios), colours),
     ]
-    count = float(len(ratios))
     return Drawing(
-        "contribution ratio r", "session",
-        linear_scale(0.5, count + 0.5, width, _APART, [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0]),
+        "contribution ratio r", "session", _sessions(len(ratios), width),
         linear_scale(0.0, 1.0, height), layers,
     )  # fmt: skip

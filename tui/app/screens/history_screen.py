@@ -7,6 +7,7 @@ here: a session gets one when its result is opened.
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,10 +32,13 @@ if TYPE_CHECKING:
 __all__ = ["HistoryScreen"]
 
 _SHOWN = 200
-_WIDE = ("", "#", "started", "unit", "state", "points", "r", "b1/deg", "b2/deg")
-_NARROW = ("#", "started", "serial", "points", "r", "b1/deg", "b2/deg")
-_ROOM = 98
-"""Columns that the wide headings take."""
+_ANSWERS = {"r": 11, "b1/deg": 13, "b2/deg": 13}
+_WIDE = {"": 3, "#": 6, "started": 12, "unit": 26, "state": 12, "points": 10, **_ANSWERS}
+_NARROW = {"#": 7, "started": 12, "serial": 9, "points": 8, **_ANSWERS}
+"""Columns with their widths, a gap included."""
+
+_ROOM = sum(_WIDE.values()) + 2
+"""Columns that the wide table and its scroll bar take."""
 
 _SHORT = 8
 """Characters of a serial number on a narrow screen; the words below have all of it."""
@@ -89,7 +93,7 @@ before stays in its audit trail, which A shows.
         self._every_unit = self._audit = False
         self._trends: list[str] = []
         self._trails: dict[int, list[str]] = {}
-        self._columns: tuple[str, ...] = ()
+        self._columns: Mapping[str, int] = {}
 
     def body(self) -> ComposeResult:
         """Table, plot, words; the plot beside the others where there is room."""
@@ -102,14 +106,14 @@ before stays in its audit trail, which A shows.
                 yield BodePlot()
 
     def on_mount(self) -> None:
-        """Columns; gain alone where there is little room."""
+        """Columns."""
         self._add_columns()
-        self.query_one(BodePlot).set_class(self.size.height < 40, "-gain-only")
         super().on_mount()
         self.query_one("#sessions", Table).focus()
 
     def on_resize(self) -> None:
-        """Columns and plots are for a width."""
+        """Columns and plots are for a size."""
+        self.query_one(BodePlot).set_class(self.size.height < 40, "-gain-only")
         self.call_after_refresh(self._fit)
 
     def _fit(self) -> None:
@@ -119,14 +123,17 @@ before stays in its audit trail, which A shows.
             self._fill()
         self.show()
 
-    def _headings(self) -> tuple[str, ...]:
+    def _headings(self) -> Mapping[str, int]:
         room = self.query_one("#list").size.width or self.size.width
         return _NARROW if room < _ROOM else _WIDE
 
     def _add_columns(self) -> None:
         self._columns = self._headings()
         table = self.query_one("#sessions", Table)
-        table.add_columns(*self._columns)
+        # Without padding each width has its gap; the table's own widths come too late.
+        table.cell_padding = 0
+        for heading in self._columns:
+            table.add_column(heading, width=self._columns[heading])
 
     def arrive(self) -> None:
         """Sessions as they are now; those of before stay until they are read."""

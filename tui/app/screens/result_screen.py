@@ -13,11 +13,12 @@ from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical, VerticalScroll
 
+from analysis.execution.pace import Pace, duration
 from tui.app.plot.bode import BodePlot
 from tui.app.plot.chart import Chart
 from tui.app.plot.curves import index_drawing
 from tui.app.plot.predictions import Which, predictions_of
-from tui.app.plot.traces import Prediction, traces_of_response
+from tui.app.plot.traces import LEVEL_MARKS, Prediction, traces_of_response
 from tui.app.step_screen import StepScreen
 from tui.app.widgets.plain import Words
 
@@ -77,13 +78,14 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
     ResultScreen #index, ResultScreen #index-words { display: none; }
     ResultScreen.-index #index, ResultScreen.-index #index-words { display: block; }
     ResultScreen.-index BodePlot { display: none; }
-    ResultScreen #words { height: auto; max-height: 60%; }
+    ResultScreen #words { height: auto; max-height: 45%; }
     ResultScreen.-short #words { max-height: 9; }
     """
 
     def __init__(self) -> None:
         super().__init__()
         self._model: Which | None = "extended"
+        self._pace = Pace()
 
     def body(self) -> ComposeResult:
         """Plot above, words below; side by side where there is room."""
@@ -96,10 +98,14 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
                 yield Words("", id="text")
 
     def on_mount(self) -> None:
-        """Gain alone where there is little room."""
-        self.query_one(BodePlot).set_class(self.size.height < 40, "-gain-only")
+        """The plot has the keys."""
         super().on_mount()
         self.query_one(BodePlot).focus()
+
+    def on_resize(self) -> None:
+        """Gain alone where there is little room."""
+        self.query_one(BodePlot).set_class(self.size.height < 40, "-gain-only")
+        self.call_after_refresh(self.show)
 
     def arrive(self) -> None:
         """Begin what is not there yet."""
@@ -113,8 +119,8 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
         plot = self.query_one(BodePlot)
         traces = [] if results.response is None else traces_of_response(results.response)
         features = [
-            (feature.frequency_hz, name)
-            for level in results.features
+            (feature.frequency_hz, f"{LEVEL_MARKS[at % len(LEVEL_MARKS)]}{name}")
+            for at, level in enumerate(results.features)
             for name, feature in (("ARF", level.arf), ("RF", level.rf))
             if feature is not None
         ]
@@ -190,22 +196,25 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
 
         desk, results = self.desk, self.desk.results
         lines: list[str] = []
+        below: list[str] = []
         if results.estimate is not None and desk.unit is not None:
             diagnosis = None if results.diagnosis is None else results.diagnosis.to_json()
             lines += answer_lines(results.estimate, diagnosis, desk.unit)
-            lines += believed_lines(results.estimate)
             if diagnosis is None:
-                lines += [f"warning: {text}" for text in results.estimate.get("warnings", ())]
+                below += [f"warning: {text}" for text in results.estimate.get("warnings", ())]
+            below += believed_lines(results.estimate)
         elif "result" in self.bench.analyses.progress:
             fraction, text = self.bench.analyses.progress["result"]
-            lines.append(f"estimating {100 * fraction:3.0f} %  {text}")
+            left_s = self._pace.remaining_s(fraction)
+            left = "" if left_s is None else f", {duration(left_s)} left"
+            lines.append(f"estimating {100 * fraction:3.0f} %{left}  {text}")
         elif "result" in results.faults:
             lines.append(f"NO ESTIMATE: {results.faults['result']}")
         head = f"measurement {desk.measurement}" + (", SIMULATED" if desk.simulated else "")
         if results.features:
             wide = not self.has_class("-narrow") and not self.has_class("-side")
             lines += [head, *(summary(results.features) if wide else _brief(results.features))]
-        return lines or [f"reading {head}"]
+        return [*lines, *below] or [f"reading {head}"]
 
 
 def _shown(asked: Which | None, document: Mapping[str, Any]) -> Which | None:
