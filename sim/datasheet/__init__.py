@@ -5,14 +5,21 @@ Owns what a person who fills in a unit file is told. It simulates no motion.
 
 from sim.datasheet.catalogue_units import CatalogueUnit, parse_quantity, units_of
 from sim.datasheet.chain import describe_chain, natural_frequencies
-from sim.datasheet.plausibility import find_impossible, find_unusual
+from sim.datasheet.plausibility import (
+    find_impossible,
+    find_unusual,
+    impossible_among,
+    unusual_among,
+)
 
 __all__ = [
     "CatalogueUnit",
     "describe_chain",
     "find_impossible",
     "find_unusual",
+    "impossible_among",
     "natural_frequencies",
     "parse_quantity",
     "units_of",
+    "unusual_among",
 ]

@@ -176,7 +176,7 @@ _SPELLINGS = {
 _TURNED = (("inozf", "ozin"), ("inoz", "ozin"), ("inlbf", "lbin"), ("inlb", "lbin"),
            ("ftlbf", "lbft"), ("ftlb", "lbft"), ("ozfin", "ozin"), ("lbfin", "lbin"),
            ("lbfft", "lbft"), ("kgcm/A", "kgfcm/A"))  # fmt: skip
-_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
 
 def units_of(symbol: str) -> tuple[CatalogueUnit, ...]:
@@ -210,7 +210,7 @@ def parse_quantity(symbol: str, text: str) -> tuple[float, CatalogueUnit]:
     """
     text = text.strip()
     found = _NUMBER.match(text)
-    if not text.isprintable() or found is None:
+    if not text.isprintable() or found is None or text[found.end() :].startswith(","):
         raise ValueError(f"{text!r} is not a number; give one with a decimal point, as in 0.25")
     value, rest = float(found.group()), text[found.end() :].strip()
     choices = units_of(symbol)

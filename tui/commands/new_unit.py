@@ -1,4 +1,4 @@
-"""``lashbench new-unit``: a commented unit file to fill in.
+"""``lashbench new-unit``: a commented unit file to fill in, filled in by questions, or checked.
 
 Owns the options of the verb and that nothing is overwritten. The files are
 templates that come with lashbench.
@@ -6,11 +6,12 @@ templates that come with lashbench.
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Literal
 
-from daq.errors import InputError
-from tui.text.output import Injected
+from daq.errors import ConfigurationError, InputError
+from tui.text.output import Console, Injected
 
 __all__ = ["new_unit"]
 
@@ -19,12 +20,14 @@ _TEMPLATES = {1: "one-stage", 2: "two-stage"}
 
 def new_unit(
     *,
-    out: Path,
+    out: Path | None = None,
     name: str | None = None,
-    stages: Literal[1, 2] = 2,
+    stages: Literal[1, 2] | None = None,
+    ask: bool = False,
+    check: Path | None = None,
     console: Injected,
 ) -> None:
-    """Write a unit file with example numbers and what each of them means.
+    """Write a unit file with example numbers and what each of them means, or check one.
 
     Parameters
     ----------
@@ -33,25 +36,87 @@ def new_unit(
     name
         Name of the unit; that of the file if left out.
     stages
-        Gear stages between motor and load.
+        Gear stages between motor and load; 2 if left out.
+    ask
+        Ask for each value at the terminal, in units of catalogues, and convert it.
+    check
+        Unit file to describe instead: chain, inertias, linear resonances and warnings.
     """
-    import json
-    import shlex
-
-    from daq.configs import config_path
+    if check is not None:
+        if out is not None or name is not None or stages is not None or ask:
+            raise InputError(f"--check {check} writes nothing; leave out the other options")
+        _describe(check, console)
+        return
+    if out is None:
+        raise InputError("nothing to do; give --out FILE to write or --check FILE to look at")
     from daq.formats.atomic import checked_target, write_text
-    from sim.unit import load_unit
 
     title = out.stem.upper() if name is None else name
     if not title.strip() or len(title) > 64 or not title.isprintable():
         raise InputError(f"unit name {title!r}: give 1 to 64 characters on one line")
     if checked_target(out).exists():
         raise InputError(f"{out}: is there already and is left as it is; give another name")
-    template = config_path("templates", _TEMPLATES[stages]).read_text(encoding="utf-8")
-    heading, rest = template.split("\n", 1)
+    text = _asked(stages, console) if ask else _template(2 if stages is None else stages)
+    write_text(out, _named(text, title, out))
+    _tell_of(out, ask, console)
+
+
+def _template(stages: int) -> str:
+    from daq.configs import config_path
+
+    return config_path("templates", _TEMPLATES[stages]).read_text(encoding="utf-8")
+
+
+def _named(text: str, title: str, out: Path) -> str:
+    """The text of a template with the unit's name, and the file's in its commands."""
+    import json
+    import shlex
+
+    heading, rest = text.split("\n", 1)
     shown = shlex.quote(str(out)) if str(out).isprintable() else "FILE"
     quoted = json.dumps(title, ensure_ascii=False)
     rest = rest.replace('name = "NAME"', f"name = {quoted}", 1).replace("FILE", shown, 1)
-    write_text(out, f"{heading.replace('NAME', title, 1)}\n{rest}")
-    load_unit(str(out))
+    return f"{heading.replace('NAME', title, 1)}\n{rest}"
+
+
+def _asked(stages: int | None, console: Console) -> str:
+    from tui.unit_questions import HELP, ask_for_values, ask_stages
+
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        raise InputError("--ask needs a terminal; leave it out and edit the file that is written")
+    console.prompt(HELP)
+    count = ask_stages(console.prompt, _read_line) if stages is None else stages
+    text = ask_for_values(_template(count), console.prompt, _read_line)
+    return text.replace("EVERY NUMBER BELOW IS AN EXAMPLE. Put in", "EVERY NUMBER BELOW IS AN "
+                        "EXAMPLE where it was not given. Put in", 1)  # fmt: skip
+
+
+def _read_line() -> str:
+    # Whatever a terminal sends: a sign that is no UTF-8 is an answer to ask for again.
+    return sys.stdin.buffer.readline().decode("utf-8", "replace")
+
+
+def _tell_of(out: Path, asked: bool, console: Console) -> None:
+    from sim.datasheet import find_unusual
+    from sim.unit import load_unit
+
+    try:
+        unit = load_unit(str(out))
+    except ConfigurationError as error:
+        raise ConfigurationError(f"wrote {out}, to be corrected in an editor: {error}") from error
+    for text in find_unusual(unit):
+        console.note(f"warning: {text}")
+    if asked:
+        console.note(f"wrote {out}; what follows from it: lashbench new-unit --check {out}")
+        return
     console.note(f"wrote {out}; every number in it is an example: put in those of your drive")
+
+
+def _describe(path: Path, console: Console) -> None:
+    from sim.datasheet import describe_chain, find_unusual
+    from sim.unit import load_unit
+
+    unit = load_unit(str(path))
+    warnings = [f"warning: {text}" for text in find_unusual(unit)]
+    lines = [f"unit {unit.name}", *describe_chain(unit), *(warnings or ["no warnings"])]
+    console.data("\n".join(lines))
