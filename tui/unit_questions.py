@@ -17,11 +17,11 @@ from sim.datasheet import impossible_among, parse_quantity, units_of, unusual_am
 
 __all__ = ["HELP", "ask_for_values", "ask_stages"]
 
-HELP = (
-    "Give each value as the catalogue prints it, with its unit: 3.6 V/krpm, 86 gcm2. Without a "
-    "unit the first one listed is meant.\nA ratio may be teeth: 72/12. Further answers: - takes "
-    "the example, < goes back one question.\n"
-)
+HELP = """\
+Give each value as the catalogue prints it, with its unit: 3.6 V/krpm, 86 gcm2.
+Without a unit, the first one listed is meant. A ratio may be teeth: 72/12.
+Further answers: - takes the example, < goes back one question.
+"""
 _VALUE = re.compile(r"^(?P<symbol>\w+) = (?P<value>[\d.eE+-]+)(?P<gap> +)# (?P<comment>.*)$")
 _FILTER = ("filter_numerator", "filter_denominator")
 _SKIPPED = ("schema", *_FILTER, "default")
