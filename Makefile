@@ -72,9 +72,10 @@ FIRST_DAY ?= first-day
 first-day: $(READY)
 	@$(BIN)/lashbench first-day --instrument '$(INSTRUMENT)' --out '$(FIRST_DAY)'
 
-# The pictures of the screen that the documentation shows, made by today's code: some minutes.
+# Every step of the screen in three sizes, dark and light, in build/pictures, and those that the
+# documentation shows: some minutes.
 pictures: $(READY)
-	@$(BIN)/python tests/screen_pictures.py docs/pictures
+	@$(BIN)/python tests/screen_pictures.py docs/pictures --every build/pictures
 
 MACHINES ?= 200000
 

@@ -60,6 +60,12 @@ def test_the_history_shows_every_answer_whole(db, size):
             table, chart = op.app.screen.query_one("#sessions"), op.app.screen.query_one("#trend")
             beside = chart.region.x >= table.region.right
             assert beside == (size[0] >= 140)
+            op.app.theme = "textual-light"
+            await op.pilot.pause()
+            # The plot has the colours of the theme that was chosen while it was shown.
+            (title, *_) = chart.render_line(0)
+            assert title.style.bgcolor.name == chart.palette.background.lower()
+            assert title.style.bgcolor.name != "#121212"
 
     run(way)
 
@@ -100,7 +106,9 @@ def test_on_a_small_screen_a_key_changes_between_words_and_plots(db):
             screen = await op.sees("VERDICT", "NEXT:", "0.55  load-inertia")
             assert "measured -" not in screen
             await op.press("v")
-            assert "VERDICT" not in await op.sees("measured - plain model", "before (plain model)")
+            screen = await op.sees("measured - model with the cause", "before (plain model)")
+            assert "VERDICT" not in screen
+            assert "measured - plain model" not in screen
             await op.press("v")
             await op.sees("VERDICT")
 

@@ -97,9 +97,14 @@ class StepScreen(Screen[None]):
         yield from ()
 
     def on_mount(self) -> None:
-        """First drawing."""
+        """First drawing; what is drawn has the colours of the theme."""
+        self.app.theme_changed_signal.subscribe(self, lambda _: self._redraw_if_on_top())
         self.arrive()
         self.show()
+
+    def _redraw_if_on_top(self) -> None:
+        if self.is_current:
+            self.show()
 
     def on_screen_resume(self) -> None:
         """Back on top."""

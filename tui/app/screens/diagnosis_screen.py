@@ -33,6 +33,10 @@ from tui.app.words import clock_in, plan_words
 __all__ = ["DiagnosisScreen"]
 
 
+_ROOM_FOR_THREE = 30
+"""Lines from which on three plots stand below each other."""
+
+
 class DiagnosisScreen(StepScreen):
     """Residual before and after, causes, rivals, the next measurement."""
 
@@ -95,7 +99,6 @@ H tells what a simulated bench hid, where the measurement is of one that hides s
         """The words have the focus, to be scrolled."""
         super().on_mount()
         self.query_one("#scroll").focus()
-        self.app.theme_changed_signal.subscribe(self, lambda _: self.show())
 
     def on_resize(self) -> None:
         """Plots are drawn for a size."""
@@ -127,6 +130,10 @@ H tells what a simulated bench hid, where the measurement is of one that hides s
             drawn = None if document is None else drawing(chart, document)
             chart.display = drawn is not None
             chart.show(drawn)
+        # Two plots at most where there is little room: what is left goes before what was.
+        after = self.query_one("#residual-after", Chart)
+        if after.display and self.size.height < _ROOM_FOR_THREE:
+            self.query_one("#residual", Chart).display = False
 
     @property
     def _is_running(self) -> bool:
