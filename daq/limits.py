@@ -11,9 +11,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from datetime import date
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from daq.configs import config_path
 from daq.errors import LimitError
@@ -72,6 +73,31 @@ class BenchDrive(Section):
     channel2_range_vpk: Positive | None = None
 
 
+class BenchInstrument(Section):
+    """The ``[instrument]`` table of a bench: which one it is, and when it was calibrated."""
+
+    address: Annotated[str, Field(min_length=1, max_length=200)] | None = None
+    """Where it is reached, as for ``--instrument``."""
+    calibrated: date | None = None
+    calibration_due: date | None = None
+    certificate: Annotated[str, Field(max_length=200)] | None = None
+    """Number of its calibration certificate."""
+
+    @model_validator(mode="after")
+    def _is_in_order(self) -> Self:
+        if self.calibrated and self.calibration_due and self.calibrated > self.calibration_due:
+            raise ValueError(f"calibrated {self.calibrated} is after due {self.calibration_due}")
+        return self
+
+
+class BenchReport(Section):
+    """The ``[report]`` table of a bench: whose certificates it writes."""
+
+    organisation: Annotated[str, Field(max_length=200)] | None = None
+    logo: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
+    """A PNG, JPEG or SVG file, relative to the bench file."""
+
+
 class Bench(Section):
     """A place where units are measured."""
 
@@ -79,6 +105,8 @@ class Bench(Section):
     name: Annotated[str, Field(min_length=1, max_length=64)]
     limits: BenchLimits
     drive: BenchDrive
+    instrument: BenchInstrument = BenchInstrument()
+    report: BenchReport = BenchReport()
 
     def bounds(self) -> Limits:
         """What this bench allows."""

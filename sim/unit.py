@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError,
 from daq.configs import config_path
 from daq.errors import ConfigurationError
 from daq.untrusted.toml_files import read_toml
+from sim.acceptance import Acceptance
 from sim.tolerance import Share, believed_shares, find_fault
 
 __all__ = ["StageBacklash", "Unit", "load_unit", "stage_backlash", "unit_from_mapping"]
@@ -156,6 +157,10 @@ class Commissioning(_Section):
         return self
 
 
+_NO_PHYSICS = {"schema_", "schema", "name", "limits", "acceptance", "tolerance", "commissioning"}
+"""Sections of a unit that do not decide how it moves."""
+
+
 class Unit(_Section):
     """A geared servo under test. Symbols are the paper's; SI units, degrees for backlash."""
 
@@ -170,6 +175,8 @@ class Unit(_Section):
     load: Load
     backlash: Backlash
     limits: Limits
+    acceptance: Acceptance | None = None
+    """What `--judge` decides by, with ``b1_deg`` and ``b2_deg`` of the limits."""
     tolerance: Mapping[str, Share] | None = None
     """One standard deviation of datasheet values, as a share, by symbol or ``default``."""
     commissioning: Commissioning | None = None
@@ -192,6 +199,8 @@ class Unit(_Section):
             raise ValueError("[stage2] is required by stage1.J_p2; a one-stage drive has neither")
         if self.stage2 is None and self.limits.b2_deg is not None:
             raise ValueError("limits.b2_deg limits stage 2, and there is none; leave it out")
+        if self.stage2 is None and self.acceptance is not None and self.acceptance.b2_deg:
+            raise ValueError("acceptance.b2_deg limits stage 2, and there is none; leave it out")
         return self
 
     @property
@@ -274,9 +283,7 @@ class Unit(_Section):
 
         Whatever is stored of a unit, and every seed, depends on this alone.
         """
-        return self.model_dump(
-            mode="json", exclude={"schema_", "name", "limits", "tolerance", "commissioning"}
-        )
+        return self.model_dump(mode="json", exclude=_NO_PHYSICS)
 
     def with_parameters(self, **changes: float) -> Unit:
         """A copy with some parameters changed by symbol, checked like a file.
@@ -295,11 +302,9 @@ class Unit(_Section):
                     f"use one of: {', '.join(sorted(known))}"
                 )
             for name, section in document.items():
-                if (
-                    name not in ("tolerance", "commissioning")
-                    and isinstance(section, dict)
-                    and symbol in section
-                ):
+                if name in _NO_PHYSICS or not isinstance(section, dict):
+                    continue
+                if symbol in section:
                     section[symbol] = float(value)
         changed = unit_from_mapping(document, source=f"unit {self.name}")
         changed._override = dict(self._override)

@@ -47,6 +47,7 @@ VERBS = {
     ),
     "reproduce": ("tui.commands.reproduce:reproduce", "Compute the paper's tables and figures."),
     "measure": ("tui.commands.measure:measure", "Measure a unit on the bench."),
+    "line": ("tui.commands.line:line", "Measure and judge unit after unit, by serial number."),
     "prepare": ("tui.commands.prepare:prepare", "Train a posterior, or simulate a sweep ahead."),
     "history": ("tui.commands.history:history", "List a bench's measurements and their trend."),
     "correct": ("tui.commands.correct:correct", "Correct what was said of a measurement."),

@@ -21,6 +21,7 @@ from daq.errors import InputError
 __all__ = [
     "Cluster",
     "Json",
+    "JudgeBy",
     "Plots",
     "Real",
     "Tolerance",
@@ -96,6 +97,16 @@ Tolerance = Annotated[
     ),
 ]
 """What is believed of the datasheet, see `tolerance_shares`."""
+
+JudgeBy = Annotated[
+    str | None,
+    Parameter(
+        name="--judge",
+        help="Decide PASS, FAIL or UNDECIDED by a file with an [acceptance] table: a file of "
+        "limits or a unit file. Exit code 0, 6 or 7.",
+    ),
+]
+"""Limits by which a unit is accepted, see `analysis.acceptance`."""
 
 Plots = Annotated[Path | None, Parameter(name="--plots", help="Directory for figures (PNG).")]
 """Where figures go, made if it is not there."""

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from analysis.acceptance import Judgement
 from analysis.resonance import LevelFeatures
 from analysis.resonance.records import to_json
 from daq.frf import FrequencyResponse
@@ -62,6 +63,7 @@ def report_data(
     diagnosis: Mapping[str, Any] | None,
     remarks: Mapping[str, str],
     made: datetime,
+    judgement: Judgement | None = None,
 ) -> dict[str, Any]:
     """Put the document together; whatever is not a finite number is null."""
     known = dict(response.provenance)
@@ -87,6 +89,7 @@ def report_data(
         "features": to_json(features),
         "estimate": estimate,
         "diagnosis": diagnosis,
+        "judgement": None if judgement is None else judgement.to_json(),
         "remarks": dict(remarks),
         "response": columns,
         "provenance": {

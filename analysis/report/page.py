@@ -14,10 +14,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Protocol
 
+from analysis.acceptance import Judgement
 from analysis.advice import Advice, advise
 from analysis.answer import Answer, accept_model
 from analysis.diagnosis import Diagnosis
 from analysis.report import sections
+from analysis.report.certificate import judgement_section
 from analysis.report.document import Origin, report_data
 from analysis.report.html import Markup, data_block, element, joined
 from analysis.report.style import STYLE
@@ -53,6 +55,7 @@ def write_report(
     estimate: Mapping[str, Any] | None = None,
     diagnosis: Diagnosed | None = None,
     remarks: Mapping[str, str] | None = None,
+    judgement: Judgement | None = None,
     made: datetime | None = None,
 ) -> Path:
     """Write a report.
@@ -76,6 +79,8 @@ def write_report(
     remarks
         Why there is no ``"estimate"`` or ``"diagnosis"``; ``"input"``, what the response looks
         like, is the first line of the page; further keys are free.
+    judgement
+        What limits say of the unit; None leaves the section out.
     made
         Moment of the report; now, if left out.
 
@@ -98,12 +103,14 @@ def write_report(
         None if diagnosis is None else diagnosis.to_json(),
         remarks or {},
         made or datetime.now(UTC),
+        judgement,
     )
     pictures = diagnosis_svgs(diagnosis) if isinstance(diagnosis, Diagnosis) else ()
     answer = accept_model(data["estimate"], data["diagnosis"])
     advice = advise(answer, unit)
     body = joined(
         sections.summary_section(data, _actions(data, unit, answer, advice)),
+        judgement_section(judgement),
         sections.facts_section(data),
         sections.features_section(data, bode_svg(response, features)),
         sections.backlash_section(

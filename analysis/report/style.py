@@ -32,6 +32,10 @@ tbody th { font-weight: 600; }
 .actions li:first-child { font-weight: 600; }
 .simulated { background: #fbe6d9; border-left: 4px solid #d55e00; padding: .5rem .8rem;
   font-weight: 600; }
+.verdict { padding: .1rem .5rem; border: 2px solid; }
+.verdict.pass { color: #00583f; }
+.verdict.fail { color: #a33c00; }
+.verdict.undecided { color: #4d4d4d; border-style: dashed; }
 .notes, figcaption, .small { color: #555; font-size: .8rem; }
 ul.notes { columns: 24rem; }
 figure { margin: .6rem 0; }

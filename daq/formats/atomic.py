@@ -7,6 +7,7 @@ old file before the new one is complete.
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
 from collections.abc import Iterator
@@ -17,7 +18,9 @@ from typing import BinaryIO
 
 from daq.errors import InputError, LashbenchError
 
-__all__ = ["checked_target", "file_stem", "keeping", "replacing", "write_text"]
+__all__ = ["append_line", "checked_target", "file_stem", "keeping", "replacing", "write_text"]
+
+_PIECE = 1 << 16
 
 
 @contextmanager
@@ -79,6 +82,64 @@ def write_text(path: Path, text: str) -> None:
     """Write a UTF-8 text file whole or not at all; raises as `replacing` does."""
     with replacing(path) as stream:
         stream.write(text.encode("utf-8"))
+
+
+def append_line(path: Path, text: str) -> None:
+    """Add a line to a UTF-8 text file; the disk has it when this returns.
+
+    The file is made if it is not there. What a cut has left of a last line is taken away first,
+    and a line that finds no room leaves the file as it was.
+
+    Raises
+    ------
+    InputError
+        If no file can be made at `path`, or something else is there.
+    LashbenchError
+        If the disk refuses the data.
+    """
+    target, line = checked_target(path), f"{text}\n".encode()
+    try:
+        flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | getattr(os, "O_NOFOLLOW", 0)
+        handle = os.open(target, flags, 0o644)
+    except OSError as error:
+        raise InputError(f"{path}: may not be written ({error.strerror})") from error
+    try:
+        _lock(handle)
+        end = _end_of_lines(handle)
+        os.ftruncate(handle, end)
+        try:
+            if os.write(handle, line) != len(line):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            os.fsync(handle)
+        except OSError:
+            os.ftruncate(handle, end)
+            raise
+        if end == 0:
+            _flush(target.parent)
+    except OSError as error:
+        raise LashbenchError(f"{path}: could not be written ({error.strerror or error})") from error
+    finally:
+        os.close(handle)
+
+
+def _lock(handle: int) -> None:
+    """Wait until nobody else adds a line; the system lets go when the file is closed."""
+    with suppress(ImportError):
+        import fcntl
+
+        fcntl.flock(handle, fcntl.LOCK_EX)
+
+
+def _end_of_lines(handle: int) -> int:
+    """Bytes up to the end of the last whole line."""
+    end = os.lseek(handle, 0, os.SEEK_END)
+    while end > 0:
+        start = max(0, end - _PIECE)
+        piece = os.pread(handle, end - start, start)
+        if (found := piece.rfind(b"\n")) >= 0:
+            return start + found + 1
+        end = start
+    return 0
 
 
 def file_stem(name: str) -> str:

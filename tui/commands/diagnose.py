@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING
 
 from daq.errors import InputError
 from tui.executors import executor_at
+from tui.judging import features_for, limits_to_judge_by, tell, tell_judged
 from tui.options import (
     Cluster,
     Json,
+    JudgeBy,
     Plots,
     Tolerance,
     UnitName,
@@ -27,6 +29,7 @@ from tui.text.shell_quote import proposing
 from tui.unit_under_test import read_unit
 
 if TYPE_CHECKING:
+    from analysis.acceptance import LimitSet
     from analysis.diagnosis import Diagnosis
     from analysis.execution.executor import Executor
     from analysis.paper_diagnosis import PaperDiagnosis
@@ -48,8 +51,9 @@ def diagnose(
     tolerance: Tolerance = None,
     cluster: Cluster = None,
     given: ReadingOptions = NO_OPTIONS,
+    judge: JudgeBy = None,
     console: Injected,
-) -> None:
+) -> int:
     """Show what the simulation gets wrong, name the cause and extend the model with it.
 
     Asks the posterior of the unit, which was trained over every cause of the catalogue, which
@@ -75,14 +79,17 @@ def diagnose(
         raise InputError("--paper reads no file that an option could complete; leave it out")
     if paper and cluster is not None:
         raise InputError("--cluster is for responses; the paper's numbers are diagnosed here")
+    if paper and judge is not None:
+        raise InputError("--paper is about no unit of a bench; leave out --judge")
+    limits = limits_to_judge_by(judge)
     subject = read_unit(unit, console, tolerance)
     with directory_to_fill(plots):
         if file is None:
             _diagnose_paper(subject, unit, plots, json, console)
-        else:
-            _diagnose_files(
-                [file, *further], subject, unit, plots, json, as_is, cluster, given, console
-            )
+            return 0
+        return _diagnose_files(
+            [file, *further], subject, unit, plots, json, as_is, cluster, given, limits, console
+        )
 
 
 def _diagnose_files(
@@ -94,8 +101,9 @@ def _diagnose_files(
     as_is: bool,
     cluster: str | None,
     given: ReadingOptions,
+    limits: LimitSet | None,
     console: Console,
-) -> None:
+) -> int:
     response, *others = read_files(files, given, console)
     from analysis.diagnosis import diagnose_response
     from analysis.observation.input_check import check_inputs
@@ -110,6 +118,7 @@ def _diagnose_files(
     for doubt in doubts:
         # Now, as well as with the answer: it may be a slip, and the answer takes a minute.
         console.note(f"warning: {doubt}")
+    doubt = "; ".join(said)
     with executor_at(cluster) as executor:
         said += _settings((response, *others), subject, as_is, executor, console)
         result = diagnose_response(
@@ -119,12 +128,23 @@ def _diagnose_files(
     if said:
         result = replace(result, warnings=(*said, *result.warnings))
     result = proposing(result, unit, (response, *others))
-    _tell(result, json, console, _advice(result, subject))
+    code = 0
+    if limits is None:
+        _tell(result, json, console, _advice(result, subject))
+    else:
+        from analysis.acceptance import judge as judged_by
+
+        document = result.to_json()
+        lines = [*result.summary(), *(f"  {text}" for text in _advice(result, subject))]
+        features = features_for(limits, (response, *others))
+        judgement = judged_by(limits, features=features, diagnosis=document, doubt=doubt)
+        code = tell_judged(judgement, document, lines, json, console)
     if plots is not None:
         from analysis.diagnosis.figures import draw_diagnosis
 
         for path in draw_diagnosis(result, plots):
             console.note(f"wrote {path}")
+    return code
 
 
 def _settings(
@@ -178,7 +198,5 @@ def _tell(
     """The answer itself, before any picture of it: that may fail, and must not cost it."""
     # Who reads no more of it may still want the pictures.
     with readers_may_leave():
-        if json:
-            console.document(result.to_json())
-        else:
-            console.data("\n".join([*result.summary(), *(f"  {text}" for text in advice)]))
+        lines = [*result.summary(), *(f"  {text}" for text in advice)]
+        tell(result.to_json(), lines, json, console)

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 
 from daq.errors import InputError
 from tui.executors import executor_at
-from tui.options import Cluster, Json, Real, Tolerance, UnitName
+from tui.judging import features_for, limits_to_judge_by, tell, tell_judged
+from tui.options import Cluster, Json, JudgeBy, Real, Tolerance, UnitName
 from tui.places import cache_folder
 from tui.reading_options import NO_OPTIONS, ReadingOptions, read_files
 from tui.text.output import Injected
@@ -36,9 +37,10 @@ def estimate(
     tolerance: Tolerance = None,
     cluster: Cluster = None,
     given: ReadingOptions = NO_OPTIONS,
+    judge: JudgeBy = None,
     json: Json = False,
     console: Injected,
-) -> None:
+) -> int:
     """Estimate the contribution of stage 1 to the total backlash.
 
     Give either a response, or several of one unit, or the two frequencies read from one.
@@ -58,6 +60,7 @@ def estimate(
     as_is
         Take a response as it stands, also if it looks like a mistake.
     """
+    limits, doubt = limits_to_judge_by(judge), ""
     if file is None:
         if cluster is not None:
             raise InputError("--cluster is for responses; two frequencies take a moment here")
@@ -98,15 +101,23 @@ def estimate(
             )  # fmt: skip
         if said:
             result = replace(result, warnings=(*said, *result.warnings), refuted=True)
+            doubt = "; ".join(said)
+    document = result.to_json()
     if json:
-        document = result.to_json()
         for text in warnings:
             console.note(f"warning: {text}")
-        console.document(document | {"warnings": warnings + document["warnings"]})
-    else:
-        from analysis.advice import advise
-        from analysis.answer import accept_model
+    from analysis.advice import advise
+    from analysis.answer import accept_model
 
-        advice = advise(accept_model(result.to_json()), subject)
-        told = [*(f"warning: {text}" for text in warnings), *advice.lines()]
-        console.data("\n".join([*result.summary(), *(f"  {text}" for text in told)]))
+    advice = advise(accept_model(document), subject)
+    told = [*(f"warning: {text}" for text in warnings), *advice.lines()]
+    lines = [*result.summary(), *(f"  {text}" for text in told)]
+    whole = document | {"warnings": warnings + document["warnings"]}
+    if limits is None:
+        tell(whole, lines, json, console)
+        return 0
+    features = None if file is None else features_for(limits, responses)
+    from analysis.acceptance import judge as judged_by
+
+    judgement = judged_by(limits, features=features, estimate=document, doubt=doubt)
+    return tell_judged(judgement, whole, lines, json, console)

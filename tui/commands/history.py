@@ -10,6 +10,7 @@ from __future__ import annotations
 import json as json_text
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -19,6 +20,7 @@ from cyclopts import Parameter
 
 from daq.errors import AnalysisError, ConfigurationError, InputError, LashbenchError
 from tui.executors import executor_at
+from tui.judging import limits_to_judge_by
 from tui.measurements.history_rows import (
     QUANTITIES,
     Trends,
@@ -29,12 +31,13 @@ from tui.measurements.history_rows import (
     trend_lines,
 )
 from tui.measurements.reports import unit_as_measured
-from tui.options import Cluster, Json, Whole
+from tui.options import Cluster, Json, JudgeBy, Whole
 from tui.places import cache_folder, history_path
 from tui.text.layout import WIDTH, table_lines, wrapped
-from tui.text.output import Console, Injected, as_json
+from tui.text.output import Console, Injected, as_json, readers_may_leave
 
 if TYPE_CHECKING:
+    from analysis.acceptance import LimitSet, Verdict
     from analysis.execution.executor import Executor
     from daq.store import Store
     from daq.store_records import Answer, HistoryLine
@@ -58,9 +61,10 @@ def history(
     last: Whole | None = None,
     estimate: Literal["none", "some", "all"] = "some",
     cluster: Cluster = None,
+    judge: JudgeBy = None,
     json: Json = False,
     console: Injected,
-) -> None:
+) -> int:
     """List the measurements of a bench, oldest first, with the trend of r, b1 and b2.
 
     Complete measurements that were not estimated since their last point are
@@ -89,6 +93,7 @@ def history(
 
     if last is not None and last < 1:
         raise InputError(f"--last {last}: give 1 or more")
+    limits = limits_to_judge_by(judge)
     db = history_path(db)
     shown = last if last is not None or json else _SHOWN
     with Store(db, read_only=True) as store:
@@ -100,20 +105,26 @@ def history(
         with executor_at(cluster) as executor:
             loose = _estimates(db, lacking, estimate == "all", executor, console)
     with Store(db, read_only=True) as store:
+        making = _Rows(store, loose, limits)
         if json:
-            _write_json(store, name, serial, shown, loose, console)
-            return
-        rows = [_row(line, loose) for line in store.lines(name, serial, last=shown)]
+            # The exit code counts, whether or not all was read.
+            with readers_may_leave() if limits else nullcontext():
+                _write_json(store, name, serial, shown, making, console)
+            return making.exit_code
+        rows = [making.row(line) for line in store.lines(name, serial, last=shown)]
         if not rows:
             console.data("no measurements; lashbench measure --help says how to make one")
-            return
+            return making.exit_code
         whole = store.count(name, serial)
         trends = Trends(rows) if whole <= len(rows) else _whole_trends(store, rows, console)
         told = [part for line in trend_lines(trends.rows()) for part in wrapped(line, indent="  ")]
-        lines = [*_measured(rows), *_corrected(store, rows), *_estimated(rows), *told]
+        lines = [*_measured(rows), *_judged(rows), *_corrected(store, rows), *_estimated(rows)]
+        lines += told
     if whole > len(rows):
         console.note(f"the last {len(rows)} of {whole} measurements; --last N lists more")
-    console.data("\n".join(lines))
+    with readers_may_leave() if limits else nullcontext():
+        console.data("\n".join(lines))
+    return making.exit_code
 
 
 def _unit_name(unit: str | None, store: Store) -> str | None:
@@ -132,9 +143,35 @@ def _unit_name(unit: str | None, store: Store) -> str | None:
         raise InputError(f"{error}; units in this history: {names}") from error
 
 
-def _row(line: HistoryLine, loose: Mapping[int, Answer]) -> dict[str, Any]:
-    """A row, with the estimate that could not be kept if there is one."""
-    return measurement_row(replace(line, estimate=loose.get(line.id, line.estimate)))
+class _Rows:
+    """Rows, with the estimates that could not be kept, and judged where there are limits."""
+
+    def __init__(self, store: Store, loose: Mapping[int, Answer], limits: LimitSet | None) -> None:
+        self._store = store
+        self._loose = loose
+        self._limits = limits
+        self._verdicts: list[Verdict] = []
+
+    def row(self, line: HistoryLine) -> dict[str, Any]:
+        """A measurement as a row."""
+        line = replace(line, estimate=self._loose.get(line.id, line.estimate))
+        row = measurement_row(line)
+        if self._limits is not None:
+            from tui.measurements.judging import judge_line
+
+            judgement = judge_line(self._store, line, self._limits)
+            self._verdicts.append(judgement.verdict)
+            row["judgement"] = judgement.to_json()
+        return row
+
+    @property
+    def exit_code(self) -> int:
+        """0, or what the worst judgement means: 6 for FAIL, 7 for UNDECIDED."""
+        if self._limits is None:
+            return 0
+        from analysis.acceptance import EXIT_CODES, combine
+
+        return EXIT_CODES[combine(self._verdicts)]
 
 
 def _write_json(
@@ -142,7 +179,7 @@ def _write_json(
     unit: str | None,
     serial: str | None,
     last: int | None,
-    loose: Mapping[int, Answer],
+    making: _Rows,
     console: Console,
 ) -> None:
     """The document, put together on the disk: a history may be longer than the memory."""
@@ -150,7 +187,7 @@ def _write_json(
     with TemporaryFile("w+", encoding="utf-8") as out:
         out.write('{"measurements": [')
         for line in store.each_line(unit, serial, last=last):
-            row = _row(line, loose)
+            row = making.row(line)
             trends.add(row)
             if row["corrections"]:
                 row["corrections"] = [asdict(one) for one in store.corrections(line.id)]
@@ -244,6 +281,22 @@ def _measured(rows: Sequence[dict[str, Any]]) -> list[str]:
         ],
         may_wrap=(2, 3),
     )
+
+
+def _judged(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The verdict of each measurement, where there are limits, and what is wrong or open."""
+    lines = []
+    for row in rows:
+        judged = row.get("judgement")
+        if judged is not None:
+            what = [f"out of limits: {', '.join(judged['failed'])}"] if judged["failed"] else []
+            what += [f"undecided: {', '.join(judged['undecided'])}"] if judged["undecided"] else []
+            text = f"{judged['verdict']:9}  #{row['id']}  {'; '.join(what)}"
+            lines += wrapped(text.rstrip(), indent="  ")
+    if not lines:
+        return []
+    first = rows[0]["judgement"]
+    return ["", f"by limits {first['limits']['name']}", *lines]
 
 
 def _corrected(store: Store, rows: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -6,26 +6,27 @@ exit code. The session itself, and that it ends safe, is the engine's.
 
 from __future__ import annotations
 
-import math
-import sys
 from contextlib import closing, suppress
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from daq.errors import InputError, LashbenchError, MeasurementError
-from tui.entry import INTERRUPTED
+from daq.errors import MeasurementError
+from tui.judging import judgement_lines, limits_to_judge_by
 from tui.measure_options import PlanOptions, read_band, session_request
-from tui.options import Json, Real, UnitName, Whole
+from tui.options import Json, JudgeBy, Real, UnitName, Whole
 from tui.places import history_path
+from tui.session_words import complete_error, confirm_driving, contract_state, exit_code
+from tui.session_words import tell_event as _tell
 from tui.text.output import Console, Injected, readers_may_leave
 from tui.text.shell_quote import pasted
 from tui.unit_under_test import read_unit
 
 if TYPE_CHECKING:
-    from daq.session_events import Finished, SessionEvent
+    from analysis.acceptance import Judgement, LimitSet
+    from daq.session_events import Finished
     from daq.session_request import SessionRequest
     from sim.unit import Unit
 
@@ -58,6 +59,7 @@ def measure(
     transcript: Path | None = None,
     dry_run: bool = False,
     yes: bool = False,
+    judge: JudgeBy = None,
     json: Json = False,
     console: Injected,
 ) -> int:
@@ -120,7 +122,7 @@ def measure(
         tuple(level or ()), start, stop, points, spacing, direction,
         settle_cycles, integrate_cycles, offset, adaptive,
     )  # fmt: skip
-    subject = read_unit(unit, console)
+    subject, limits = read_unit(unit, console), limits_to_judge_by(judge)
     is_given, db = db is not None, history_path(db, create=not dry_run)
     request = session_request(
         options, unit, subject, instrument, db,
@@ -130,13 +132,26 @@ def measure(
     if dry_run:
         _show_plan(request, db, json, console)
         return 0
-    _confirm(instrument, request, db, yes)
+    confirm_driving(instrument, request, db, yes)
     again = ["lashbench", "measure", "--unit", unit, "--instrument", instrument]
     again += ["--db", str(db)] if is_given else []
     # Their limits, slew and ranges hold for what is left, too.
     again += [] if bench == "default" else ["--bench", bench]
     again += [] if recipe is None else ["--recipe", recipe]
-    return _run(instrument, subject, db, request, transcript, json, console, pasted(again))
+    again += [] if judge is None else ["--judge", judge]
+    told = _Told(db, limits, json, console, pasted(again))
+    return _run(instrument, subject, request, transcript, told)
+
+
+@dataclass(frozen=True, slots=True)
+class _Told:
+    """Where a measurement is kept, what it is judged by, and how its end is told."""
+
+    db: Path
+    limits: LimitSet | None
+    json: bool
+    console: Console
+    again: str
 
 
 def _show_plan(request: SessionRequest, db: Path, json: bool, console: Console) -> None:
@@ -159,47 +174,19 @@ def _show_plan(request: SessionRequest, db: Path, json: bool, console: Console) 
     )
 
 
-def _confirm(instrument: str, request: SessionRequest, db: Path, yes: bool) -> None:
-    """Insist on a word before hardware is driven.
-
-    Raises
-    ------
-    InputError
-        If it is not given.
-    """
-    from tui.bench import drives_hardware
-    from tui.measure_options import plan_of
-
-    if not drives_hardware(instrument) or yes:
-        return
-    if not (sys.stdin.isatty() and sys.stderr.isatty()):
-        raise InputError(
-            f"{instrument}: measuring would drive the source, and there is no terminal to ask at; "
-            "give --yes; nothing was sent"
-        )
-    plan = plan_of(request, db)
-    question = f"drive {instrument} with up to {max(plan.levels_vpk):g} V peak? [y/N] "
-    print(question, end="", file=sys.stderr, flush=True)  # noqa: T201
-    if sys.stdin.readline().strip().lower() not in ("y", "yes"):
-        raise InputError("not confirmed; nothing was sent")
-
-
 def _run(
     instrument: str,
     unit: Unit,
-    db: Path,
     request: SessionRequest,
     transcript: Path | None,
-    json: bool,
-    console: Console,
-    again: str,
+    told: _Told,
 ) -> int:
     from daq.control import SessionControl
     from daq.session_events import Finished
     from tui.bench import bench_session
     from tui.signals import listening
 
-    control, finished = SessionControl(), None
+    control, finished, console, db = SessionControl(), None, told.console, told.db
     with (
         listening(control, console.note),
         closing(bench_session(instrument, unit, db, request, control, transcript)) as events,
@@ -215,64 +202,49 @@ def _run(
         except Exception as error:
             if finished is None:
                 raise
-            _report(finished, json, console, again)
-            raise _complete(error, finished) from error
+            _report(finished, told)
+            raise complete_error(error, finished) from error
     if finished is None:
         raise MeasurementError("the session ended without a word; this is a fault of lashbench")
-    _report(finished, json, console, again)
-    return _exit_code(finished)
+    if told.limits is None or finished.state != "complete":
+        _report(finished, told)
+        return exit_code(finished)
+    return _judged(finished, told, told.limits)
 
 
-def _tell(event: SessionEvent, console: Console) -> None:
-    """Narrate one record; points only where a terminal is watched."""
-    from daq import session_events as kinds
+def _judged(finished: Finished, told: _Told, limits: LimitSet) -> int:
+    """Judge what was measured; a judgement that cannot be made does not cost its report."""
+    from tui.measurements.judging import judge_measurement
 
-    match event:
-        case kinds.Opened():
-            begun = f", {event.done} of them stored" if event.done else ""
-            console.note(
-                f"measurement {event.measurement}: {event.total} points{begun}, "
-                f"{event.duration_s:.0f} s of driving to come"
-            )
-        case kinds.CheckLine():
-            console.note(f"  {event.verdict:4}  {event.name}: {event.text}")
-        case kinds.LevelStarted():
-            console.note(f"sweeping {event.points} points at {event.source_vpk:g} V peak")
-        case kinds.PointStored():
-            point = event.stored.point
-            console.progress(
-                event.done / event.total,
-                f"{event.done}/{event.total}  {point.frequency_hz:.2f} Hz  {_decibels(point.gain)}",
-                event.remaining_s,
-            )
-        case kinds.Paused():
-            console.note(f"paused; source {event.source_state.value}")
-        case kinds.GoingOn():
-            console.note("going on")
-        case kinds.Warned():
-            console.note(f"warning: {event.text}")
-        case kinds.Finished() if event.state != "complete":
-            console.note(f"{event.state}: {event.reason}")
+    try:
+        judgement = judge_measurement(
+            told.db, finished.measurement, limits, progress=told.console.progress
+        )
+    except BaseException:
+        _report(finished, told)
+        raise
+    _report(finished, told, judgement)
+    # A source that is not proven off comes first.
+    return exit_code(finished) or judgement.exit_code
 
 
-def _decibels(gain: complex) -> str:
-    return f"{20 * math.log10(abs(gain)):.2f} dB" if abs(gain) > 0 else "no reading"
-
-
-def _report(finished: Finished, json: bool, console: Console, again: str) -> None:
+def _report(finished: Finished, told: _Told, judgement: Judgement | None = None) -> None:
     """Say how it ended; who reads no more must not keep the error and the exit code back."""
     with readers_may_leave():
-        _say_how_it_ended(finished, json, console, again)
+        _say_how_it_ended(finished, told, judgement)
 
 
-def _say_how_it_ended(finished: Finished, json: bool, console: Console, again: str) -> None:
-    if json:
+def _say_how_it_ended(finished: Finished, told: _Told, judgement: Judgement | None) -> None:
+    console = told.console
+    judged = {} if judgement is None else {"judgement": judgement.to_json()}
+    if told.json:
         console.document(
-            {
+            judged
+            | {
                 "id": finished.measurement,
                 "points": finished.points,
                 "flagged": finished.flagged,
-                "source_state": _contract_state(finished),
+                "source_state": contract_state(finished),
                 "elapsed_s": finished.elapsed_s,
                 "state": finished.state,
                 "reason": finished.reason,
@@ -284,29 +256,7 @@ def _say_how_it_ended(finished: Finished, json: bool, console: Console, again: s
         f"{finished.flagged} flagged; source {finished.source_state.value}; "
         f"{finished.elapsed_s:.1f} s"
     )
+    if judgement is not None:
+        console.data("\n".join(judgement_lines(judgement)))
     if finished.state == "interrupted":
-        console.note(f"go on with: {again} --resume {finished.measurement}")
-
-
-def _contract_state(finished: Finished) -> str:
-    # A source that reads back as driving after the recipe is not off, whatever was sent.
-    state = finished.source_state.value
-    return "unconfirmed" if state == "on" else state
-
-
-def _complete(error: Exception, finished: Finished) -> LashbenchError:
-    """The error, with the loud words where the source was not proven off."""
-    if not isinstance(error, LashbenchError):
-        error = MeasurementError(f"internal error: {type(error).__name__}: {error}")
-    state = _contract_state(finished)
-    kept = f"{finished.points} point{'' if finished.points == 1 else 's'} kept"
-    if state == "confirmed-off":
-        return type(error)(f"{error}; {kept}, source confirmed off")
-    return type(error)(f"{error}; {kept}; SOURCE OFF {state.upper()}: switch it off by hand")
-
-
-def _exit_code(finished: Finished) -> int:
-    state = _contract_state(finished)
-    if state != "confirmed-off":
-        raise MeasurementError(f"SOURCE OFF {state.upper()}: switch it off by hand")
-    return 0 if finished.state == "complete" else INTERRUPTED
+        console.note(f"go on with: {told.again} --resume {finished.measurement}")

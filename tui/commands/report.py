@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from daq.errors import InputError, LashbenchError
-from tui.options import Tolerance, UnitName
+from tui.judging import features_for, judgement_lines, limits_to_judge_by
+from tui.options import JudgeBy, Tolerance, UnitName
 from tui.places import cache_folder, history_path
 from tui.reading_options import NO_OPTIONS, ReadingOptions, read_file
-from tui.text.output import Console, Injected
+from tui.text.output import Console, Injected, readers_may_leave
 from tui.text.shell_quote import proposing
 from tui.unit_under_test import read_unit
 
@@ -50,9 +51,10 @@ def report(
     tolerance: Tolerance = None,
     diagnose: Annotated[bool | None, Parameter(negative="--no-diagnose")] = None,
     as_is: bool = False,
+    judge: JudgeBy = None,
     given: ReadingOptions = NO_OPTIONS,
     console: Injected,
-) -> None:
+) -> int:
     """Write a report on one measurement as a single HTML file that prints on A4.
 
     It holds the response, the backlash of each stage and what to do about it,
@@ -81,6 +83,7 @@ def report(
     if out.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{out}: a report is HTML; give a name that ends in .html")
     checked_target(out, source, unit, history_path(db))
+    limits = limits_to_judge_by(judge)
     subject = read_unit(unit, console, tolerance)
     remarks: dict[str, str] = {}
     kept: _Kept | None = None
@@ -123,10 +126,35 @@ def report(
         diagnosis = _diagnose(response, subject, unit, remarks, kept, console)
     from analysis.report import write_report
 
+    judgement = None
+    if limits is not None:
+        from analysis.acceptance import judge as judged_by
+
+        judgement = judged_by(
+            limits,
+            features=features_for(limits, [response]),
+            estimate=estimate,
+            diagnosis=None if diagnosis is None else diagnosis.to_json(),
+            doubt=_doubt(remarks, kept),
+        )
     write_report(
-        out, response, subject, origin, estimate=estimate, diagnosis=diagnosis, remarks=remarks
-    )
+        out, response, subject, origin, estimate=estimate, diagnosis=diagnosis, remarks=remarks,
+        judgement=judgement,
+    )  # fmt: skip
     console.note(f"wrote {out}")
+    if judgement is None:
+        return 0
+    with readers_may_leave():
+        console.data("\n".join(judgement_lines(judgement)))
+    return judgement.exit_code
+
+
+def _doubt(remarks: Mapping[str, str], kept: _Kept | None) -> str:
+    """Why the response is not to be judged; empty if nothing is known."""
+    doubts = [remarks["input"]] if "input" in remarks else []
+    if kept is not None and kept.measured.state != "complete":
+        doubts.append(f"the measurement is not complete: {kept.measured.state}")
+    return "; ".join(doubts)
 
 
 def _is_identifier(source: str, db: Path | None) -> bool:

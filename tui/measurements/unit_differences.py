@@ -25,8 +25,8 @@ def differing_values(
     Parameters
     ----------
     limits
-        Whether what a unit may be driven with, and may have as backlash, is compared, too, and
-        its tolerance.
+        Whether what a unit may be driven with, what it is accepted by and its tolerance are
+        compared, too.
     """
     ours, theirs = _values(one, limits), _values(other, limits)
     return {
@@ -58,8 +58,9 @@ def origin_words(unit: Unit, name: str) -> str:
 def _values(unit: Unit, limits: bool) -> dict[str, Value]:
     found: dict[str, Value] = {}
     for section, values in unit.model_dump().items():
-        if isinstance(values, dict) and (limits or section not in ("limits", "tolerance")):
-            # A tolerance bears the name of its value.
-            of = "tolerance of " if section == "tolerance" else ""
+        is_physics = section not in ("limits", "acceptance", "tolerance")
+        if isinstance(values, dict) and (limits or is_physics):
+            # A tolerance and a limit of acceptance bear the name of their value.
+            of = f"{section} of " if section in ("acceptance", "tolerance") else ""
             found |= {f"{of}{symbol}": value for symbol, value in values.items()}
     return found

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tui.options import Json
+from tui.judging import limits_to_judge_by, tell, tell_judged
+from tui.options import Json, JudgeBy
 from tui.reading_options import NO_OPTIONS, ReadingOptions, read_file
 from tui.text.output import Injected
 
@@ -20,9 +21,10 @@ def extract(
     /,
     *,
     given: ReadingOptions = NO_OPTIONS,
+    judge: JudgeBy = None,
     json: Json = False,
     console: Injected,
-) -> None:
+) -> int:
     """Read anti-resonance, resonance and damping out of a response, per source level.
 
     Parameters
@@ -30,16 +32,20 @@ def extract(
     file
         Response as csv, h5, uff, mat or the analyser's own sdf.
     """
+    limits = limits_to_judge_by(judge)
     response = read_file(file, given, console)
     from analysis.resonance import extract as features_of
     from analysis.resonance import summary, to_json
 
     features = features_of(response, console.progress)
-    if json:
-        console.document(to_json(features))
-    else:
-        console.data("\n".join(summary(features)))
     if not any(level.arf or level.rf for level in features):
         console.note(
             f"{file}: neither ARF nor RF was found at any level; the flags of each level say why"
         )
+    document, lines = to_json(features), summary(features)
+    if limits is None:
+        tell(document, lines, json, console)
+        return 0
+    from analysis.acceptance import judge as judged_by
+
+    return tell_judged(judged_by(limits, features=document), document, lines, json, console)

@@ -1,0 +1,228 @@
+"""One unit of a line: its session, its judgement and its result.
+
+Owns the mark by which a measurement is one of a line's, and which measurement still lacks its
+result. The session drives and ends with the source off; the limits decide.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from contextlib import closing, suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from daq.errors import LashbenchError, MeasurementError
+from tui.line.results import Result, Results, Word
+from tui.measure_options import PlanOptions, session_request
+from tui.session_words import complete_error, exit_code, tell_event
+from tui.text.output import Console
+
+if TYPE_CHECKING:
+    from analysis.acceptance import LimitSet
+    from daq.session_events import Finished
+    from daq.session_request import SessionRequest
+    from daq.store_records import Measurement
+    from sim.unit import Unit
+
+__all__ = ["Line", "Pending"]
+
+_MARK = "line"
+_LOOKED_AT = 20
+"""Newest measurements of a history among which one without a result is looked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pending:
+    """A measurement of a line that has no result yet."""
+
+    measurement: int
+    serial: str
+    attempt: int
+    points: int
+    planned: int
+    complete: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """What every unit of a line has in common.
+
+    Parameters
+    ----------
+    unit_name, unit
+        Name or path of the unit's file, and the unit.
+    instrument, recipe, bench, adaptive, operator
+        As for ``measure``.
+    db
+        The history.
+    limits
+        What is judged by; None to measure only.
+    diagnose
+        Diagnose where a limit asks for it.
+    """
+
+    unit_name: str
+    unit: Unit
+    instrument: str
+    recipe: str
+    bench: str
+    adaptive: bool
+    operator: str
+    db: Path
+    limits: LimitSet | None
+    diagnose: bool
+    console: Console
+
+    def request(self, serial: str, attempt: int, resume: int | None = None) -> SessionRequest:
+        """What a session is asked to do for a unit.
+
+        Raises
+        ------
+        InputError, LimitError
+            As `session_request`.
+        """
+        remarks = {"serial": serial, "operator": self.operator, "notes": ""}
+        request = session_request(
+            PlanOptions(adaptive=self.adaptive and resume is None), self.unit_name, self.unit,
+            self.instrument, self.db,
+            recipe=self.recipe, bench=self.bench, resume=resume, remeasure=None, run_in=None,
+            remarks=remarks if resume is None else dict.fromkeys(remarks, ""),
+        )  # fmt: skip
+        if request.header is None:
+            return request
+        mark = json.dumps({"attempt": attempt})
+        configurations = {**request.header.configurations, _MARK: mark}
+        return replace(request, header=replace(request.header, configurations=configurations))
+
+    def pending(self, results: Results) -> Pending | None:
+        """The newest measurement of a line, if it has no result."""
+        from daq.store import Store
+
+        if not self.db.exists():
+            return None
+        with Store(self.db, read_only=True) as store:
+            for line in reversed(list(store.lines(last=_LOOKED_AT))):
+                found = store.measurement(line.id)
+                if _MARK not in found.header.configurations:
+                    continue
+                judged = results.of_measurement(self.db, line.id) is not None
+                if judged or found.state == "aborted" or found.header.unit != self.unit.name:
+                    return None
+                return _pending(found)
+        return None
+
+    def measure(self, serial: str, attempt: int, resume: int | None = None) -> Result | None:
+        """Measure a unit, or go on with it, and judge it; None if it was ended on request.
+
+        Raises
+        ------
+        LashbenchError
+            If the instrument failed, or the source is not proven off. The measurement stays
+            pending.
+        """
+        began_s = time.monotonic()
+        finished, why = self._session(self.request(serial, attempt, resume))
+        if why:
+            return self._result(finished.measurement, serial, attempt, began_s, why)
+        if exit_code(finished) != 0:
+            return None
+        return self._result(finished.measurement, serial, attempt, began_s)
+
+    def judge(self, pending: Pending) -> Result:
+        """The result of a measurement that is complete already."""
+        return self._result(pending.measurement, pending.serial, pending.attempt, time.monotonic())
+
+    def _session(self, request: SessionRequest) -> tuple[Finished, str]:
+        """Run a session; how it ended, and what is wrong with the unit if that ended it."""
+        from daq.control import SessionControl
+        from daq.session_events import CheckLine, Finished
+        from tui.bench import bench_session
+        from tui.signals import listening
+
+        control, finished, why, console = SessionControl(), None, "", self.console
+        with (
+            listening(control, console.note),
+            closing(bench_session(self.instrument, self.unit, self.db, request, control)) as events,
+        ):
+            try:
+                with console.unhurried():
+                    for event in events:
+                        with suppress(BrokenPipeError):
+                            tell_event(event, console)
+                        if isinstance(event, CheckLine) and event.name == "trial point":
+                            why = event.text if event.verdict == "fail" else ""
+                        if isinstance(event, Finished):
+                            finished = event
+            except Exception as error:
+                if finished is None:
+                    raise
+                exit_code(finished)
+                if not why:
+                    raise complete_error(error, finished) from error
+        if finished is None:
+            raise MeasurementError("the session ended without a word; this is a fault of lashbench")
+        return finished, why
+
+    def _result(
+        self, measurement: int, serial: str, attempt: int, began_s: float, why: str = ""
+    ) -> Result:
+        from daq.store import Store
+        from tui.measurements.judging import judge_measurement
+
+        judgement, reasons = None, [f"not measured: {why}"] if why else []
+        if self.limits is not None and not why:
+            try:
+                judgement = judge_measurement(
+                    self.db, measurement, self.limits, diagnose=self.diagnose,
+                    progress=self.console.progress,
+                )  # fmt: skip
+            except LashbenchError as error:
+                reasons.append(f"not judged: {error}")
+        with Store(self.db, read_only=True) as store:
+            measured = store.measurement(measurement)
+        word: Word = "UNDECIDED" if self.limits is not None or why else "MEASURED"
+        if judgement is not None:
+            reasons += [item.line for item in judgement.items if item.verdict != "PASS"]
+        return Result(
+            serial=serial,
+            attempt=attempt,
+            verdict=judgement.verdict if judgement is not None else word,
+            unit=self.unit.name,
+            measurement=measurement,
+            history=str(self.db.resolve()),
+            started=measured.started,
+            ended=measured.ended,
+            operator=measured.header.operator,
+            failed=[] if judgement is None else judgement.failed,
+            undecided=[] if judgement is None else judgement.open,
+            reasons=reasons,
+            limits=None if self.limits is None else self.limits.name,
+            elapsed_s=round(time.monotonic() - began_s, 3),
+            judgement=None if judgement is None else judgement.to_json(),
+        )
+
+    def note(self, measurement: int, kind: str, text: str) -> None:
+        """Add to the journal of a measurement; a history that takes nothing costs no result."""
+        from daq.store import Store
+
+        with suppress(LashbenchError), Store(self.db) as store:
+            store.note(measurement, kind, text)
+
+    def noted(self, measurement: int, kind: str) -> bool:
+        """Whether its journal has a line of a kind."""
+        from daq.store import Store
+
+        with Store(self.db, read_only=True) as store:
+            return any(event.kind == kind for event in store.events(measurement))
+
+
+def _pending(found: Measurement) -> Pending:
+    attempt = 1
+    with suppress(ValueError, TypeError, KeyError):
+        attempt = max(1, int(json.loads(found.header.configurations[_MARK])["attempt"]))
+    return Pending(
+        found.id, found.header.serial, attempt, found.points, found.header.plan.points,
+        found.state == "complete",
+    )  # fmt: skip
