@@ -1,6 +1,6 @@
 """A production line on a simulated analyser: units with known answers, and the program on it.
 
-The units are linear devices whose anti-resonance says whether they are good.
+The units are servos without play; a load that is too heavy lowers the anti-resonance.
 """
 
 import json
@@ -12,12 +12,16 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 from bench_server import linear_analyser, served
 from fault_child import drives
 
 from daq.store import Store
+from sim.effects import drivetrain_with
+from sim.unit import load_unit
 
-GOOD_HZ, BAD_HZ, LIMIT_HZ = 138.0, 146.0, 142.0
+GOOD, BAD = 2.75e-3, 3.4e-3
+"""Inertia of the load of a good and of a bad unit, kg.m^2: ARF at 149 and at 134 Hz."""
 RECIPE = """
 schema = 1
 name = "ADSS"
@@ -29,31 +33,32 @@ points = 21
 settle_cycles = 2
 integrate_cycles = 3
 """
-LIMITS = f"""
+LIMITS = """
 schema = 1
 name = "outgoing"
 [acceptance]
-arf_hz = {{ lower = 100, upper = {LIMIT_HZ} }}
+arf_hz = { lower = 142, upper = 155 }
 """
 
 
 class Unit:
-    """What stands on the bench: a servo with an anti-resonance there and a resonance above it."""
+    """What stands on the bench."""
 
     def __init__(self) -> None:
-        self.arf_hz = GOOD_HZ
+        self.inertia = GOOD
         self.wait_s = 0.0
         self.is_dead = False
+        unit = load_unit("adss")
+        self._answers = {
+            inertia: drivetrain_with(unit.with_parameters(J_L=inertia), 0.4, ()).system().transfer
+            for inertia in (GOOD, BAD)
+        }
 
     def __call__(self, hz: float) -> complex:
         time.sleep(self.wait_s)
-        if self.is_dead:
+        if self.is_dead or hz <= 0.0:
             return 1e-9 + 0j
-
-        def pair(f0: float) -> complex:
-            return (1j * hz) ** 2 + 2 * 0.03 * f0 * 1j * hz + f0**2
-
-        return 0.3 * pair(self.arf_hz) / pair(self.arf_hz + 20.0)
+        return complex(self._answers[self.inertia](np.array([hz]))[0])
 
 
 class LineBench:
@@ -77,16 +82,16 @@ class LineBench:
             stderr=subprocess.PIPE, text=True, bufsize=1,
         )  # fmt: skip
 
-    def scan(self, process: subprocess.Popen, text: str, arf_hz: float = GOOD_HZ) -> str:
+    def scan(self, process: subprocess.Popen, text: str, inertia: float = GOOD) -> str:
         """Put a unit on the bench and scan it; its label."""
-        self.unit.arf_hz = arf_hz
+        self.unit.inertia = inertia
         process.stdin.write(f"{text}\n")
         return process.stdout.readline()
 
-    def kill_in_mid_unit(self, process: subprocess.Popen, text: str, arf_hz: float) -> None:
+    def kill_in_mid_unit(self, process: subprocess.Popen, text: str, inertia: float) -> None:
         """Scan a unit, and kill the program while the unit is swept."""
         number = self.measurements() + 1
-        self.unit.arf_hz, self.unit.wait_s = arf_hz, 0.05
+        self.unit.inertia, self.unit.wait_s = inertia, 0.05
         process.stdin.write(f"{text}\n")
         wait_until(lambda: 2 < self.points(number) < 18)
         os.kill(process.pid, signal.SIGKILL)
@@ -121,7 +126,7 @@ class LineBench:
 def line_bench(folder: Path):
     """A bench with the analyser served as long as the block lasts."""
     unit = Unit()
-    instrument = linear_analyser(unit, noise_v=0.5e-3)
+    instrument = linear_analyser(unit, noise_v=1e-5)
     with served(instrument) as address:
         yield LineBench(folder, address, unit, instrument)
 

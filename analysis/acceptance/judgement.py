@@ -178,6 +178,13 @@ class Judgement:
         return [item.name for item in self.items if item.verdict == "UNDECIDED"]
 
     @property
+    def headline(self) -> str:
+        """The verdict and what it rests on, in one sentence."""
+        what = [f"out of limits: {', '.join(self.failed)}"] if self.failed else []
+        what += [f"undecided: {', '.join(self.open)}"] if self.open else []
+        return f"{'; '.join([f'{self.verdict} by limits {self.limits.name}', *what])}."
+
+    @property
     def rule(self) -> str:
         """The decision rule in words."""
         k = self.limits.acceptance.coverage_factor

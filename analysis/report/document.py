@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from analysis.acceptance import Judgement
+from analysis.report.certificate import Certificate, certificate_data
 from analysis.resonance import LevelFeatures
 from analysis.resonance.records import to_json
 from daq.frf import FrequencyResponse
@@ -64,12 +65,13 @@ def report_data(
     remarks: Mapping[str, str],
     made: datetime,
     judgement: Judgement | None = None,
+    certificate: Certificate | None = None,
 ) -> dict[str, Any]:
     """Put the document together; whatever is not a finite number is null."""
     known = dict(response.provenance)
     configurations = {k: str(v) for k, v in dict(known.get("configurations") or {}).items()}
     columns = response_columns(response)
-    content = {
+    content: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
         "made": made.isoformat(timespec="seconds"),
@@ -104,6 +106,7 @@ def report_data(
             },
         },
     }
+    content["certificate"] = certificate_data(certificate or Certificate(), content)
     plain: dict[str, Any] = _plain(content)
     return plain
 

@@ -14,7 +14,7 @@ from daq.untrusted.visible_text import visible
 
 __all__ = ["Markup", "data_block", "element", "joined", "table"]
 
-_VOID = frozenset({"meta", "br", "hr", "col"})
+_VOID = frozenset({"meta", "br", "hr", "col", "img"})
 
 
 class Markup(str):

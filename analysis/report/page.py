@@ -19,7 +19,13 @@ from analysis.advice import Advice, advise
 from analysis.answer import Answer, accept_model
 from analysis.diagnosis import Diagnosis
 from analysis.report import sections
-from analysis.report.certificate import judgement_section
+from analysis.report.certificate import (
+    Certificate,
+    approval_section,
+    conformity_section,
+    logo_picture,
+    page_style,
+)
 from analysis.report.document import Origin, report_data
 from analysis.report.html import Markup, data_block, element, joined
 from analysis.report.style import STYLE
@@ -56,6 +62,7 @@ def write_report(
     diagnosis: Diagnosed | None = None,
     remarks: Mapping[str, str] | None = None,
     judgement: Judgement | None = None,
+    certificate: Certificate | None = None,
     made: datetime | None = None,
 ) -> Path:
     """Write a report.
@@ -81,6 +88,8 @@ def write_report(
         like, is the first line of the page; further keys are free.
     judgement
         What limits say of the unit; None leaves the section out.
+    certificate
+        Number, calibration, environment, approver and logo.
     made
         Moment of the report; now, if left out.
 
@@ -104,13 +113,16 @@ def write_report(
         remarks or {},
         made or datetime.now(UTC),
         judgement,
+        certificate,
     )
     pictures = diagnosis_svgs(diagnosis) if isinstance(diagnosis, Diagnosis) else ()
     answer = accept_model(data["estimate"], data["diagnosis"])
     advice = advise(answer, unit)
+    logo = "" if certificate is None else certificate.logo
     body = joined(
-        sections.summary_section(data, _actions(data, unit, answer, advice)),
-        judgement_section(judgement),
+        logo_picture(logo),
+        sections.summary_section(data, _actions(data, unit, answer, advice, judgement)),
+        conformity_section(judgement),
         sections.facts_section(data),
         sections.features_section(data, bode_svg(response, features)),
         sections.backlash_section(
@@ -118,9 +130,10 @@ def write_report(
         ),
         sections.diagnosis_section(data, pictures),
         sections.provenance_section(data),
+        approval_section(data),
         data_block(data, "lashbench-report"),
     )
-    write_text(path, _page(f"Backlash report: {unit.name}", body))
+    write_text(path, _page(f"Backlash report: {unit.name}", body, page_style(data), bool(logo)))
     return path
 
 
@@ -150,16 +163,24 @@ def stored_origin(store: Store, measurement: int) -> Origin:
     )
 
 
-def _actions(data: Mapping[str, Any], unit: Unit, answer: Answer, advice: Advice) -> list[str]:
+def _actions(
+    data: Mapping[str, Any],
+    unit: Unit,
+    answer: Answer,
+    advice: Advice,
+    judgement: Judgement | None,
+) -> list[str]:
     """What to do, most important first."""
     diagnosis = data["diagnosis"]
     doubt = data["remarks"].get("input")
-    lines = [f"This response looks like a mistake: {doubt}."] if doubt else []
+    lines = [] if judgement is None else [judgement.headline]
+    lines += [f"This response looks like a mistake: {doubt}."] if doubt else []
     lines += [advice.before] if advice.before else []
     lines += [] if answer.state == "none" else [advice.headline]
     if answer.models:
         lines += [stage.line for stage in advice.stages if stage.verdict is not None]
-        if all(getattr(unit.limits, f"b{n}_deg") is None for n in range(1, unit.stages + 1)):
+        without = all(getattr(unit.limits, f"b{n}_deg") is None for n in range(1, unit.stages + 1))
+        if without and judgement is None:
             lines.append(
                 "No limits are set; b1_deg and b2_deg under [limits] of the unit file would say "
                 "whether a stage passes."
@@ -193,13 +214,14 @@ def _other_unit(text: str, unit: Unit) -> bool:
         return True
 
 
-def _page(title: str, body: Markup) -> str:
+def _page(title: str, body: Markup, paper: Markup, has_logo: bool) -> str:
+    policy = f"{_POLICY}; img-src data:" if has_logo else _POLICY
     head: Sequence[Markup] = (
         element("meta", charset="utf-8"),
-        element("meta", http_equiv="Content-Security-Policy", content=_POLICY),
+        element("meta", http_equiv="Content-Security-Policy", content=policy),
         element("meta", name="viewport", content="width=device-width, initial-scale=1"),
         element("title", title),
-        element("style", Markup(STYLE)),
+        element("style", Markup(STYLE + paper)),
     )
     page = element("html", element("head", head), element("body", element("main", body)), lang="en")
     return f"<!DOCTYPE html>\n{page}\n"

@@ -14,6 +14,7 @@ from analysis.answer import Answer, model_name
 from analysis.ensemble.datasheet_belief import believed_lines
 from analysis.inference.exclusion import describe_unseen, head_unseen
 from analysis.observation.joint import sweep_lines
+from analysis.report.certificate import head_rows
 from analysis.report.html import Markup, element, joined, table
 from analysis.resonance.records import with_error
 from analysis.selection.wording import verdict_words
@@ -66,6 +67,7 @@ def facts_section(data: Data) -> Markup:
         sweep += f", {min(frequencies):g} to {max(frequencies):g} Hz"
     sweep += f", {how['direction']}" if how["direction"] else ""
     rows = [
+        *head_rows(data),
         ("Unit", data["unit"]["name"]),
         ("Serial number", words.get("serial")),
         ("Operator", words.get("operator")),

@@ -7,7 +7,7 @@ fetched.
 __all__ = ["STYLE"]
 
 STYLE = """
-@page { size: A4; margin: 14mm 14mm 16mm 14mm; }
+@page { size: A4; margin: 14mm 14mm 18mm 14mm; font: 8px/1.4 Verdana, Arial, sans-serif; }
 * { box-sizing: border-box; }
 html { font: 15px/1.4 system-ui, "DejaVu Sans", Verdana, Arial, sans-serif; color: #1a1a1a; }
 body { max-width: 60rem; margin: 0 auto; padding: 1.2rem; background: #fff;
@@ -42,10 +42,24 @@ figure { margin: .6rem 0; }
 figure svg { width: 100%; height: auto; display: block; }
 svg * { stroke-linejoin: round; stroke-linecap: butt; }
 code { font-family: ui-monospace, "DejaVu Sans Mono", monospace; font-size: .85em; }
+.simulated, .actions { clear: right; }
+.logo { float: right; max-height: 3.2rem; max-width: 12rem; margin-left: 1rem; }
+.signs { display: flex; gap: 2rem; }
+.sign { flex: 1; }
+.sign .name { min-height: 3.4rem; margin: 0; }
+.sign .line { border-top: 1px solid #555; padding-top: .2rem; }
+@media (max-width: 40rem) {
+  body { padding: .7rem; }
+  table { display: block; overflow-x: auto; }
+  .facts th { width: 8rem; }
+  figure { overflow-x: auto; }
+  figure svg { min-width: 34rem; }
+  .signs { flex-direction: column; gap: .5rem; }
+}
 @media print {
   html { font-size: 11.5px; }
   body { max-width: none; padding: 0; }
-  figure, table, .actions { break-inside: avoid; }
+  figure, table, .actions, .approval, tr { break-inside: avoid; }
   h2, h3 { break-after: avoid; }
   * { -webkit-print-color-adjust: exact; print-color-adjust: exact; }
 }

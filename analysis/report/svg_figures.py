@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import matplotlib
@@ -20,12 +21,15 @@ from analysis.diagnosis import Diagnosis
 from analysis.diagnosis.figures import probability_figure, residual_figure
 from analysis.report.html import Markup
 from analysis.resonance import LevelFeatures
+from analysis.resonance.records import with_error
 from analysis.response_figure import draw_response
 from daq.frf import FrequencyResponse
 
 __all__ = ["backlash_svg", "bode_svg", "diagnosis_svgs", "figure_svg"]
 
 _BLUE, _GREY, _RED = "#0072b2", "#999999", "#d55e00"
+_MOST_READINGS = 2000
+"""Of a response whose readings tell their numbers: each takes 200 bytes twice."""
 _NAMED = re.compile(r'(\bid="|\bhref="#|url\(#)')
 _STYLE = re.compile(r"<style\b.*?</style>", re.DOTALL)
 _METADATA = re.compile(r"<metadata>.*?</metadata>", re.DOTALL)
@@ -37,7 +41,39 @@ def bode_svg(response: FrequencyResponse, features: Sequence[LevelFeatures]) -> 
     # The page names the unit; a title that holds any text might be read as a formula.
     figure.axes[0].set_title("")
     figure.set_size_inches(7.6, 4.9)
-    return figure_svg(figure, "bode", "Gain and phase over frequency at every source level")
+    told = "Gain and phase over frequency at every source level"
+    return figure_svg(figure, "bode", told, _readings(figure, response))
+
+
+@dataclass(frozen=True, slots=True)
+class _Reading:
+    """A place in a picture, in points from its upper left, and what is said of it."""
+
+    x: float
+    y: float
+    text: str
+
+
+def _readings(figure: Figure, response: FrequencyResponse) -> Callable[[], Iterator[_Reading]]:
+    """Every reading of gain and phase with its numbers, once the figure is laid out."""
+
+    def find() -> Iterator[_Reading]:
+        if len(response) > _MOST_READINGS:
+            return
+        height = figure.bbox.height
+        gain, phase = figure.axes[:2]
+        for number, hz in enumerate(response.frequency_hz):
+            level = response.source_vpk[number]
+            place = f"{hz:.6g} Hz" + (f", {level:g} V" if np.isfinite(level) else "")
+            for axes, value, error, unit in (
+                (gain, response.gain_db[number], response.gain_std_db[number], "dB"),
+                (phase, response.phase_deg[number], response.phase_std_deg[number], "deg"),
+            ):
+                if np.isfinite(value):
+                    x, y = axes.transData.transform((hz, value))
+                    yield _Reading(x, height - y, f"{place}: {with_error(value, error)} {unit}")
+
+    return find
 
 
 def backlash_svg(
@@ -88,8 +124,18 @@ def _draw_index(axes: Any, curve: Mapping[str, Any]) -> None:
     axes.grid(alpha=0.3)
 
 
-def figure_svg(figure: Figure, name: str, description: str) -> Markup:
-    """A figure as one ``<svg>`` element; its names begin with `name`, the same at every run."""
+def figure_svg(
+    figure: Figure,
+    name: str,
+    description: str,
+    readings: Callable[[], Iterable[_Reading]] = tuple,
+) -> Markup:
+    """A figure as one ``<svg>`` element; its names begin with `name`, the same at every run.
+
+    What `readings` gives shows its text where a pointer rests on it.
+    """
+    # Points of the picture are those of its axes.
+    figure.set_dpi(72.0)
     stream = io.StringIO()
     # Letters stay letters: they can be searched and copied, and take little room.
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": name, "font.size": 8.0}):
@@ -99,7 +145,13 @@ def figure_svg(figure: Figure, name: str, description: str) -> Markup:
     # Its style sheet would hold for the whole page.
     text = _METADATA.sub("", _STYLE.sub("", text))
     text = _NAMED.sub(lambda found: f"{found.group(1)}{name}-", text)
-    return Markup(text.replace("<svg", f'<svg role="img" aria-label="{description}"', 1).strip())
+    spots = "".join(
+        f'<circle cx="{spot.x:.1f}" cy="{spot.y:.1f}" r="4" fill="none" pointer-events="all">'
+        f"<title>{spot.text}</title></circle>"
+        for spot in readings()
+    )
+    text = text.replace("<svg", f'<svg role="img" aria-label="{description}"', 1).strip()
+    return Markup(text.removesuffix("</svg>") + spots + "</svg>")
 
 
 def diagnosis_svgs(diagnosis: Diagnosis) -> list[tuple[Markup, str]]:

@@ -8,7 +8,7 @@ import sys
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from line_bench import BAD_HZ, GOOD_HZ, ended, line_bench
+from line_bench import BAD, GOOD, ended, line_bench
 
 from daq.errors import FileFormatError, InputError, LashbenchError
 from daq.formats.atomic import append_line
@@ -46,14 +46,14 @@ def test_a_line_is_judged_rightly_though_it_is_killed_twice(tmp_path):
     with line_bench(tmp_path) as bench:
         process = bench.start(*hook)
         assert bench.scan(process, "\x02]C1SN1\t\r").startswith("PASS       SN1  ADSS  ")
-        assert bench.scan(process, "SN2", BAD_HZ).startswith("FAIL       SN2  ")
-        bench.kill_in_mid_unit(process, "SN3", BAD_HZ)
+        assert bench.scan(process, "SN2", BAD).startswith("FAIL       SN2  ")
+        bench.kill_in_mid_unit(process, "SN3", BAD)
         process = bench.start(*hook)
         assert process.stdout.readline().startswith("FAIL       SN3  ADSS  measurement 3")
         # Whoever does not know that it was gone on with scans it again: it is no retest.
         process.stdin.write("SN3\n")
         assert bench.scan(process, "SN4").startswith("PASS       SN4  ")
-        bench.kill_in_mid_unit(process, "SN5", GOOD_HZ)
+        bench.kill_in_mid_unit(process, "SN5", GOOD)
         process = bench.start(*hook)
         assert process.stdout.readline().startswith("PASS       SN5  ")
         code, out, _ = ended(process)
@@ -77,7 +77,7 @@ def test_a_line_is_judged_rightly_though_it_is_killed_twice(tmp_path):
 def test_what_was_not_written_is_judged_from_the_history_and_a_retest_is_marked(tmp_path):
     with line_bench(tmp_path) as bench:
         process = bench.start("--on-result", "false")
-        assert bench.scan(process, "A", BAD_HZ).startswith("FAIL")
+        assert bench.scan(process, "A", BAD).startswith("FAIL")
         assert "retest 1" in bench.scan(process, "A")
         assert bench.scan(process, "B").startswith("PASS")
         code, out, err = ended(process)

@@ -11,11 +11,13 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from daq.errors import InputError, LashbenchError
+from tui.certificate_options import NO_CERTIFICATE, CertificateOptions, is_pdf
 from tui.judging import features_for, judgement_lines, limits_to_judge_by
 from tui.options import JudgeBy, Tolerance, UnitName
 from tui.places import cache_folder, history_path
@@ -52,10 +54,11 @@ def report(
     diagnose: Annotated[bool | None, Parameter(negative="--no-diagnose")] = None,
     as_is: bool = False,
     judge: JudgeBy = None,
+    certificate: CertificateOptions = NO_CERTIFICATE,
     given: ReadingOptions = NO_OPTIONS,
     console: Injected,
 ) -> int:
-    """Write a report on one measurement as a single HTML file that prints on A4.
+    """Write a report on one measurement as a single HTML file that prints on A4, or as PDF.
 
     It holds the response, the backlash of each stage and what to do about it,
     the diagnosis, where everything came from, and a copy for programs.
@@ -66,7 +69,7 @@ def report(
         Response as csv, h5, uff, mat or the analyser's own sdf, or the
         identifier of a measurement as `history` lists it.
     out
-        HTML file to write.
+        HTML file to write, or a PDF, which Chromium or WeasyPrint prints.
     db
         File of the bench's history that the identifier is looked up in; yours, if left out.
     diagnose
@@ -80,9 +83,13 @@ def report(
     from analysis.observation.joint import unit_doubts
     from daq.formats.atomic import checked_target
 
-    if out.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"{out}: a report is HTML; give a name that ends in .html")
+    if out.suffix.lower() not in (".html", ".htm", ".pdf"):
+        raise InputError(f"{out}: a report is HTML or PDF; give a name that ends in .html or .pdf")
     checked_target(out, source, unit, history_path(db))
+    if is_pdf(out):
+        from analysis.report.pdf import find_printer
+
+        find_printer()
     limits = limits_to_judge_by(judge)
     subject = read_unit(unit, console, tolerance)
     remarks: dict[str, str] = {}
@@ -99,6 +106,7 @@ def report(
     else:
         kept = _stored(history_path(db), int(source), subject)
         response, origin = kept.response, kept.origin
+    issued = certificate.certificate(response.provenance.get("configurations") or {})
     for doubt in unit_doubts([response], subject):
         console.note(f"warning: {doubt}")
     said = check_inputs([response], subject, as_is=True)
@@ -137,16 +145,31 @@ def report(
             diagnosis=None if diagnosis is None else diagnosis.to_json(),
             doubt=_doubt(remarks, kept),
         )
-    write_report(
-        out, response, subject, origin, estimate=estimate, diagnosis=diagnosis, remarks=remarks,
-        judgement=judgement,
-    )  # fmt: skip
+    with _page_for(out) as page:
+        write_report(
+            page, response, subject, origin, estimate=estimate, diagnosis=diagnosis,
+            remarks=remarks, judgement=judgement, certificate=issued,
+        )  # fmt: skip
     console.note(f"wrote {out}")
     if judgement is None:
         return 0
     with readers_may_leave():
         console.data("\n".join(judgement_lines(judgement)))
     return judgement.exit_code
+
+
+@contextmanager
+def _page_for(out: Path) -> Iterator[Path]:
+    """Where the page is written: the file itself, or one that is printed as PDF then."""
+    if not is_pdf(out):
+        yield out
+        return
+    from analysis.report.pdf import print_pdf
+
+    with TemporaryDirectory() as folder:
+        page = Path(folder) / "report.html"
+        yield page
+        print_pdf(page, out)
 
 
 def _doubt(remarks: Mapping[str, str], kept: _Kept | None) -> str:
