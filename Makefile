@@ -9,7 +9,7 @@ READY := .venv/.ready
 
 LOWEST := .venv/lowest
 
-.PHONY: help demo test tests check lowest clients first-day pictures train training bench blind faults fuzz soak docs audit lock clean
+.PHONY: help demo line test tests check lowest clients first-day pictures train training bench blind faults fuzz soak docs audit lock clean
 
 help:
 	@echo "make demo    the whole job without hardware; results in demo/"
@@ -24,6 +24,7 @@ help:
 	@echo "make faults  hundreds of sessions with something going wrong in each; half an hour"
 	@echo "make fuzz    a million damaged inputs to everything that reads; an hour or two"
 	@echo "make soak    measure back to back for an hour and watch what is held on to"
+	@echo "make line    a production line of 50 simulated units, killed twice; some minutes"
 	@echo "make docs    everything that the documentation prints, in full; half an hour"
 	@echo "make audit   ask for known weaknesses of what is required; needs the network"
 	@echo "make lock    write down the installed versions in requirements.lock"
@@ -108,6 +109,9 @@ faults: $(READY)
 fuzz: $(READY)
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[fuzz]'
 	@$(BIN)/python tests/campaigns/fuzz.py
+
+line: $(READY)
+	@$(BIN)/python tests/campaigns/line.py
 
 soak: $(READY)
 	@$(BIN)/python tests/campaigns/soak.py

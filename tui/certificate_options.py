@@ -15,7 +15,7 @@ from cyclopts import Group, Parameter
 from daq.errors import ConfigurationError, InputError
 
 if TYPE_CHECKING:
-    from analysis.report import Certificate
+    from analysis.report.certificate import Certificate
     from daq.limits import Bench
 
 __all__ = ["NO_CERTIFICATE", "CertificateOptions"]
@@ -52,7 +52,7 @@ class CertificateOptions:
         InputError
             If an option has no such form, or the bench file or its logo is wrong.
         """
-        from analysis.report import Certificate
+        from analysis.report.certificate import Certificate
         from analysis.report.logo import logo_address
         from daq.configs import config_path
         from daq.limits import load_bench

@@ -56,6 +56,7 @@ VERBS = {
     "frf": ("tui.commands.files.frf:frf", "Estimate a response from a record over time."),
     "plot": ("tui.commands.files.plot:plot", "Draw responses, with the model beside them."),
     "report": ("tui.commands.report:report", "Write a report or certificate, as HTML or PDF."),
+    "index": ("tui.commands.index:index", "Write a page that lists a history and its reports."),
     "new-unit": ("tui.commands.new_unit:new_unit", "Write a unit file to fill in, or check one."),
     "serve": ("tui.commands.serve:serve", "Serve a simulated 35670A, SR785 or sampled bench."),
     "demo": ("tui.commands.demo:demo", "Do the whole job without hardware."),

@@ -5,7 +5,6 @@ Owns its document, its page and its figures. It computes no answer.
 
 from __future__ import annotations
 
-from analysis.report.certificate import Certificate
 from analysis.report.page import Diagnosed, file_origin, stored_origin, write_report
 
-__all__ = ["Certificate", "Diagnosed", "file_origin", "stored_origin", "write_report"]
+__all__ = ["Diagnosed", "file_origin", "stored_origin", "write_report"]

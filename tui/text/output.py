@@ -170,11 +170,6 @@ class Console:
         self._narrate(f"{self._erasure()}{drawn}")
         self._live.lines = len(lines)
 
-    def prompt(self, text: str) -> None:
-        """Print what a person is to answer, to stderr and without an end of line."""
-        self._clear()
-        self._narrate(visible(text))
-
     def ask(self, question: str) -> str | None:
         """What a person answers; None where there is nobody to ask."""
         if not (self.watched and sys.stdin.isatty()):
