@@ -3,7 +3,7 @@
 import json
 from html.parser import HTMLParser
 
-VOID = {"meta", "br", "hr", "col"}
+VOID = {"meta", "br", "hr", "col", "img"}
 
 
 class Page(HTMLParser):
@@ -32,7 +32,10 @@ class Page(HTMLParser):
     def handle_data(self, data):
         if self.open and self.open[-1][0] == "script":
             self.blocks[self.open[-1][1].get("id")] = data
-        elif self.open and self.open[-1][0] not in ("style", "text"):
+        elif self.open and self.open[-1][0] != "style":
+            # What a picture holds is no text of the page.
+            if any(tag == "svg" for tag, _ in self.open):
+                return
             self.words.append(data)
 
     @property

@@ -181,7 +181,7 @@ def test_an_estimate_of_the_history_is_taken_while_it_holds(calls, bench, tmp_pa
     ("words", "said"),
     [
         (["nowhere.csv", "--out", "r.html"], "nowhere.csv"),
-        ([SAMPLE, "--out", "r.pdf"], "ends in .html"),
+        ([SAMPLE, "--out", "r.odt"], "ends in .html"),
         ([SAMPLE, "--out", "no/r.html"], "there is no directory"),
         (["7", "--out", "r.html", "--db", "BENCH"], "measurement 7 is not in"),
         (["7", "--out", "r.html", "--db", "gone.db"], "gone.db"),
