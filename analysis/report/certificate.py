@@ -80,8 +80,15 @@ def _day(day: date | None) -> str | None:
     return None if day is None else day.isoformat()
 
 
+def issued(data: Data) -> list[str]:
+    """Number, day and issuer of the report."""
+    told = data["certificate"]
+    words = [f"Report {told['number']}", data["made"][:10], told["organisation"]]
+    return [word for word in words if word]
+
+
 def head_rows(data: Data) -> list[tuple[str, str | None]]:
-    """Rows of the facts: number, issuer, calibration, environment."""
+    """Rows of the facts: calibration of the instrument, environment."""
     told = data["certificate"]
     calibrated = told["calibrated"]
     if told["calibration_due"]:
@@ -91,8 +98,6 @@ def head_rows(data: Data) -> list[tuple[str, str | None]]:
     if told["calibration_overdue"]:
         calibrated += "; it was OVERDUE when this was measured"
     return [
-        ("Report number", told["number"]),
-        ("Issued by", told["organisation"]),
         ("Calibration of the instrument", calibrated),
         *((f"Environment: {name}", value) for name, value in told["environment"].items()),
     ]

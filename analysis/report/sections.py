@@ -14,7 +14,7 @@ from analysis.answer import Answer, model_name
 from analysis.ensemble.datasheet_belief import believed_lines
 from analysis.inference.exclusion import describe_unseen, head_unseen
 from analysis.observation.joint import sweep_lines
-from analysis.report.certificate import head_rows
+from analysis.report.certificate import head_rows, issued
 from analysis.report.html import Markup, element, joined, table
 from analysis.resonance.records import with_error
 from analysis.selection.wording import verdict_words
@@ -40,7 +40,10 @@ def summary_section(data: Data, actions: Sequence[str]) -> Markup:
     words = data["measurement"]
     serial = words.get("serial") or ""
     name = _short(f"{data['unit']['name']} {serial}".strip())
-    parts = [element("h1", f"Backlash report: {name}")]
+    parts = [
+        element("h1", f"Backlash report: {name}"),
+        element("p", " - ".join(issued(data)), class_="small"),
+    ]
     if data["simulated"]:
         parts.append(
             element("p", "SIMULATED: these data are of no real machine.", class_="simulated")
@@ -67,7 +70,6 @@ def facts_section(data: Data) -> Markup:
         sweep += f", {min(frequencies):g} to {max(frequencies):g} Hz"
     sweep += f", {how['direction']}" if how["direction"] else ""
     rows = [
-        *head_rows(data),
         ("Unit", data["unit"]["name"]),
         ("Serial number", words.get("serial")),
         ("Operator", words.get("operator")),
@@ -77,6 +79,7 @@ def facts_section(data: Data) -> Markup:
         ("Ended", origin.get("ended")),
         ("State", words.get("state")),
         ("Instrument", ", ".join(filter(None, [maker, *detail]))),
+        *head_rows(data),
         ("Address", words.get("address")),
         ("Source at the end", origin.get("source_state")),
         ("Sweep", sweep),

@@ -51,7 +51,7 @@ def test_a_certificate_says_all_of_it_and_its_document_too(report):
 
 def test_a_unit_out_of_limits_is_the_first_thing_that_is_said(report):
     _, page = report(judgement=judged(0.1))
-    assert page.text.index("FAIL by limits outgoing; out of limits: b1.") < 100
+    assert page.text.index("FAIL by limits outgoing; out of limits: b1.") < 160
     assert "No limits are set" not in page.text
 
 
