@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 __all__ = ["UnitScreen"]
 
 _RECENT = 20
+_READING_S = 30.0
+"""How long a sentence on an unusual value stays."""
 _REMARKS = {"serial": "serial number", "operator": "operator", "notes": "notes"}
 
 
@@ -247,6 +249,8 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
             return
 
         def take(unit: Unit) -> None:
+            from sim.datasheet import find_unusual  # loaded beside the screen, with the unit
+
             if self.bench.keeper.busy:
                 self.notify("a session is under way; its unit stays", severity="warning")
                 return
@@ -256,6 +260,8 @@ press Enter to go on with it where it ended. Enter on a complete one opens its r
                 self.bench.put_away()
             self._begin_anew()
             self.show()
+            for text in find_unusual(unit):
+                self.notify(text, severity="warning", timeout=_READING_S, markup=False)
             if self.query_one("#file").has_focus:
                 self.query_one("#serial", Field).focus()
 
