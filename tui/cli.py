@@ -29,9 +29,11 @@ from tui.commands.bench import is_terminal
 from tui.entry import INTERRUPTED
 from tui.logs import LEVELS, logging_to_file, silence, telling_what_is_passed_over
 from tui.text.output import Console, hush
+from tui.verbs import EPILOGUE, FRONT_PAGES, SUMMARY, VERBS, front_page
 
 __all__ = ["VERBS", "build_app", "main"]
 
+<<<<<<< HEAD
 VERBS = {
     "simulate": ("tui.commands.simulate:simulate", "Simulate a sweep and write the response."),
     "extract": (
@@ -73,6 +75,8 @@ _EPILOGUE = (
     "Every command also takes --quiet (no narration), --debug (trace of an error) and "
     "--log-level debug|info|warning|error (write the log file)."
 )
+=======
+>>>>>>> 4d7c6d2 (cli: show the help without loading the parser)
 _USAGE = 2
 _OF_THE_SYSTEM = {
     errno.ENAMETOOLONG: ("give a shorter name", _USAGE),
@@ -88,15 +92,11 @@ _LOG = logging.getLogger("lashbench.command")
 
 
 def build_app() -> App:
-    """Build the parser with all verbs, none of them imported.
-
-    The list of verbs is plain text, for importing a reader of markdown takes a third of
-    `--help`; the verbs' own help is written in it.
-    """
+    """Build the parser with all verbs, none of them imported."""
     app = App(
         name="lashbench",
-        help=_SUMMARY,
-        help_epilogue=_EPILOGUE,
+        help=SUMMARY,
+        help_epilogue=EPILOGUE,
         version=lambda: version("lashbench"),
         default_parameter=Parameter(negative=()),
         help_format="plaintext",
@@ -156,6 +156,9 @@ def _guarded(words: list[str], console: Console, debug: bool) -> int:
 
 
 def _run(words: list[str], console: Console) -> int:
+    if not words or words in FRONT_PAGES:
+        sys.stdout.write(front_page(words))
+        return 0
     command, bound, injected = build_app().parse_args(
         words, exit_on_error=False, print_error=False, help_on_error=False
     )

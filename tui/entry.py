@@ -27,12 +27,29 @@ def main() -> int:
     if fault is not None:
         sys.stderr.write(f"error: {fault}\n")
         return _REFUSED
+    if _shows_front_page(sys.argv[1:]):
+        return 0
     try:
         from tui.cli import main as run
     except KeyboardInterrupt:
         sys.stderr.write("error: interrupted\n")
         return INTERRUPTED
     return run()
+
+
+def _shows_front_page(words: list[str]) -> bool:
+    """Whether the words asked for the help or the version alone, and stdout took it."""
+    from tui.verbs import FRONT_PAGES, front_page
+
+    if words not in FRONT_PAGES or sys.stdout is None:
+        return False
+    try:
+        sys.stdout.write(front_page(words))
+        sys.stdout.flush()
+    except OSError:
+        # The command line tells what is wrong with stdout.
+        return False
+    return True
 
 
 def _stand_in_for_closed_streams() -> None:

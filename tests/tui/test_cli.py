@@ -43,6 +43,30 @@ def test_help_loads_none_of_the_heavy_libraries(words):
     assert run.stdout.strip()
 
 
+@pytest.mark.parametrize("words", [["--help"], ["-h"], ["--version"]])
+def test_the_front_page_loads_no_parser(words):
+    program = (
+        "import sys; from tui.entry import main; code = main();"
+        "loaded = sorted({'cyclopts', 'rich', 'numpy'} & set(sys.modules));"
+        "sys.exit(f'loaded {loaded}' if loaded else code)"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", program, *words], capture_output=True, text=True, check=False
+    )
+    assert (run.returncode, run.stderr) == (0, "")
+    assert run.stdout.count("\n") == (1 if words == ["--version"] else len(cli.VERBS) + 10)
+    assert max(map(len, run.stdout.splitlines())) <= 80
+
+
+def test_a_front_page_that_stdout_does_not_take_is_an_error():
+    script = Path(sys.executable).with_name("lashbench")
+    with open("/dev/full", "w") as full:
+        run = subprocess.run([script, "--help"], stdout=full, stderr=subprocess.PIPE, text=True,
+                             check=False)  # fmt: skip
+    assert run.returncode == 1
+    assert "make room" in run.stderr
+
+
 @pytest.mark.parametrize("verb", cli.VERBS)
 def test_every_verb_explains_itself_and_all_its_options(verb, capsys):
     assert cli.main([verb, "--help"]) == 0
