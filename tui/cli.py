@@ -33,50 +33,6 @@ from tui.verbs import EPILOGUE, FRONT_PAGES, SUMMARY, VERBS, front_page
 
 __all__ = ["VERBS", "build_app", "main"]
 
-<<<<<<< HEAD
-VERBS = {
-    "simulate": ("tui.commands.simulate:simulate", "Simulate a sweep and write the response."),
-    "extract": (
-        "tui.commands.files.extract:extract",
-        "Read ARF, RF and damping out of a response.",
-    ),
-    "estimate": ("tui.commands.estimate:estimate", "Tell the backlash of each gear stage."),
-    "diagnose": ("tui.commands.diagnose:diagnose", "Tell what the simulation gets wrong, and why."),
-    "plan": ("tui.commands.plan:plan", "Choose the sweep that tells most of a unit."),
-    "commission": (
-        "tui.commands.commission:commission",
-        "Learn a good drive's parameters; write its unit file.",
-    ),
-    "reproduce": ("tui.commands.reproduce:reproduce", "Compute the paper's tables and figures."),
-    "measure": ("tui.commands.measure:measure", "Measure a unit on the bench."),
-    "line": ("tui.commands.line:line", "Measure and judge unit after unit, by serial number."),
-    "prepare": ("tui.commands.prepare:prepare", "Train a posterior, or simulate a sweep ahead."),
-    "history": ("tui.commands.history:history", "List a bench's measurements and their trend."),
-    "correct": ("tui.commands.correct:correct", "Correct what was said of a measurement."),
-    "export": ("tui.commands.files.export:export", "Write a stored measurement to a file."),
-    "convert": ("tui.commands.files.convert:convert", "Write a response in another file format."),
-    "frf": ("tui.commands.files.frf:frf", "Estimate a response from a record over time."),
-    "plot": ("tui.commands.files.plot:plot", "Draw responses, with the model beside them."),
-    "report": ("tui.commands.report:report", "Write a report or certificate, as HTML or PDF."),
-    "index": ("tui.commands.index:index", "Write a page that lists a history and its reports."),
-    "new-unit": ("tui.commands.new_unit:new_unit", "Write a unit file to fill in, or check one."),
-    "serve": ("tui.commands.serve:serve", "Serve a simulated 35670A, SR785 or sampled bench."),
-    "demo": ("tui.commands.demo:demo", "Do the whole job without hardware."),
-    "bench": ("tui.commands.bench:bench", "Open the bench screen; so does no verb at all."),
-    "replay": ("tui.commands.replay:replay", "Show a recorded session as it ran."),
-    "doctor": ("tui.commands.doctor:doctor", "Check this installation; say what to mend."),
-    "first-day": ("tui.commands.first_day:first_day", "Check a real instrument on its first day."),
-    "completion": ("tui.commands.completion:completion", "Print completions for a shell."),
-}
-"""Every verb: the function that does it, and its line in the help."""
-
-_SUMMARY = "Bench application for geared servos: how much backlash sits in each gear stage."
-_EPILOGUE = (
-    "Every command also takes --quiet (no narration), --debug (trace of an error) and "
-    "--log-level debug|info|warning|error (write the log file)."
-)
-=======
->>>>>>> 4d7c6d2 (cli: show the help without loading the parser)
 _USAGE = 2
 _OF_THE_SYSTEM = {
     errno.ENAMETOOLONG: ("give a shorter name", _USAGE),
