@@ -27,9 +27,9 @@ def main() -> int:
     if fault is not None:
         sys.stderr.write(f"error: {fault}\n")
         return _REFUSED
-    if _shows_front_page(sys.argv[1:]):
-        return 0
     try:
+        if _shows_front_page(sys.argv[1:]):
+            return 0
         from tui.cli import main as run
     except KeyboardInterrupt:
         sys.stderr.write("error: interrupted\n")

@@ -13,8 +13,12 @@ from tui import cli, entry
 ROOT = Path(entry.__file__).parents[1]
 
 
-@pytest.mark.parametrize("module", ["tui.cli", "cyclopts", "tui.text.output"])
-def test_an_interrupt_while_the_command_line_is_loaded_is_told_in_one_line(module):
+@pytest.mark.parametrize(
+    ("module", "word"),
+    [("tui.verbs", "--version"), ("tui.cli", "doctor"), ("cyclopts", "doctor"),
+     ("tui.text.output", "doctor")],
+)  # fmt: skip
+def test_an_interrupt_while_the_command_line_is_loaded_is_told_in_one_line(module, word):
     program = f"""
 import sys
 
@@ -28,7 +32,7 @@ from tui.entry import main
 sys.exit(main())
 """
     run = subprocess.run(
-        [sys.executable, "-c", program, "--version"], capture_output=True, text=True, check=False
+        [sys.executable, "-c", program, word], capture_output=True, text=True, check=False
     )
     assert (run.returncode, run.stderr, run.stdout) == (130, "error: interrupted\n", "")
 
