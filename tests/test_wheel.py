@@ -44,12 +44,12 @@ def run_installed(installed, cwd, program, *words):
     )
 
 
-def test_it_holds_the_four_floors_and_nothing_beside_them(wheel):
+def test_it_holds_the_four_floors_the_notebook_names_and_nothing_beside_them(wheel):
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
     top = {name.split("/")[0] for name in names}
     (metadata,) = [name for name in top if name.endswith(".dist-info")]
-    assert top - {metadata} == {"daq", "sim", "analysis", "tui"}
+    assert top - {metadata} == {"daq", "sim", "analysis", "tui", "lashbench"}
     assert "daq/_configs/units/adss.toml" in names
     sources = {str(path.relative_to(ROOT)) for path in (ROOT / "tui").rglob("*.py")}
     assert sources <= set(names)

@@ -1,0 +1,71 @@
+"""The names for a notebook: what they load, how results show themselves, and the example."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import lashbench as lb
+from daq.analyser import SourceState
+from daq.errors import InputError
+from daq.frf import FrequencyResponse
+from daq.plan import SweepPlan
+from daq.store import Store
+
+ROOT = Path(__file__).parents[1]
+
+
+def test_nothing_heavy_is_loaded_before_a_name_is_used():
+    program = "import sys, lashbench as lb; print([n for n in lb.__all__ if not hasattr(lb, n)]);"
+    program += "print({'numpy', 'scipy', 'matplotlib', 'textual', 'cyclopts'} & set(sys.modules))"
+    run = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert run.stdout == "[]\nset()\n"
+
+
+def test_a_result_is_shown_escaped():
+    response = FrequencyResponse.from_arrays(
+        [100.0, 110.0], 1.0, [1j, 2j], unit="<script>\x1b[2J</script>"
+    )
+    shown = lb.Result("read", response, response)
+    assert "<script" not in shown._repr_html_()
+    assert "\x1b" not in repr(shown)
+    assert "2 points, 100 to 110 Hz at 1 V peak" in repr(shown)
+    assert shown.unit == response.unit
+    assert len(shown.plot().axes) == 2
+
+
+def test_a_sweep_is_measured_and_kept_with_the_source_off(tmp_path, capsys):
+    plan = SweepPlan((130.0, 150.0), (2.5,), settle_cycles=2, integrate_cycles=3)
+    measured = lb.measure(plan, "adss", "sim:?ratio=0.3&seed=1", db=tmp_path / "lab.db")
+    assert capsys.readouterr().out == ""
+    assert len(measured) == 2
+    with Store(tmp_path / "lab.db", read_only=True) as store:
+        kept = store.measurement(1)
+    assert (kept.state, kept.source_state) == ("complete", SourceState.CONFIRMED_OFF)
+
+
+def test_hardware_is_not_driven_unasked(tmp_path):
+    plan = SweepPlan((130.0,), (2.5,))
+    with pytest.raises(InputError, match="yes=True"):
+        lb.measure(plan, "adss", "GPIB0::11::INSTR", db=tmp_path / "lab.db")
+    assert not list(tmp_path.iterdir())
+
+
+def test_half_a_model_is_refused():
+    response = FrequencyResponse.from_arrays([100.0, 110.0], 1.0, [1j, 2j], unit="ADSS")
+    with pytest.raises(InputError, match="a unit and a ratio"):
+        lb.plot(response, ratio=0.3)
+
+
+def test_the_example_runs_in_its_quick_form(tmp_path):
+    example = ROOT / "docs" / "examples" / "notebook.py"
+    run = subprocess.run(
+        [sys.executable, str(example), "--quick"],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert run.returncode == 0, run.stderr
+    assert "ARF" in run.stdout.upper()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["features.png", "response.png"]
