@@ -240,6 +240,7 @@ def test_the_effect_of_the_page_needs_nothing_but_its_entry(monkeypatch, tmp_pat
 SAYS = {
     "headless": "complete, source confirmed-off",
     "replay": "13 points, the same to the last bit: True",
+    "notebook": "183 points, 100 to 180 Hz at 1.5, 2.5, 4 V peak",
     "own_unit": "contribution ratio 0.9",
     "own_effect": "with a tight bearing",
     "fleet": "ADSS SN 7: 3 sessions, b1 0.2000 +- 0.0058 deg",
@@ -249,13 +250,15 @@ SAYS = {
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_an_example_runs(example, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "argv", [str(example), *fleet_of_one(example, tmp_path)])
+    monkeypatch.setattr(sys, "argv", [str(example), *arguments_of(example, tmp_path)])
     runpy.run_path(str(example), run_name="__main__")
     assert SAYS[example.stem] in capsys.readouterr().out
 
 
-def fleet_of_one(example, folder):
-    """A history with estimates for the one example that wants its path."""
+def arguments_of(example, folder):
+    """The quick form of the notebook; for the fleet the path of a history with estimates."""
+    if example.stem == "notebook":
+        return ["--quick"]
     if example.stem != "fleet":
         return []
     plan = SweepPlan((100.0, 110.0, 120.0), (2.5,))
