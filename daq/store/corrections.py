@@ -129,10 +129,15 @@ class CorrectionStore(StoreFile):
         last: int | None = None,
         with_points: bool = False,
         exact: bool = False,
+        answered: bool = False,
     ) -> Iterator[HistoryLine]:
-        """As `lines`, one after the other, so that any number takes the memory of one."""
+        """As `lines`, one after the other, so that any number takes the memory of one.
+
+        With `answered` only those that were ever estimated or diagnosed.
+        """
+        choice = Choice(unit, serial, last, with_points, exact, answered)
         with self._reading() as connection:
-            yield from read_lines(connection, Choice(unit, serial, last, with_points, exact))
+            yield from read_lines(connection, choice)
 
     def count(self, unit: str | None = None, serial: str | None = None) -> int:
         """How many measurements there are of a unit (any case) and a serial number."""

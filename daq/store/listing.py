@@ -57,6 +57,8 @@ LEFT JOIN diagnoses AS d ON d.id = {DIAGNOSIS_IN_FORCE}
 ORDER BY m.id"""
 
 
+_ANSWERED = """(EXISTS (SELECT 1 FROM estimates AS x WHERE x.measurement_id = m.id)
+    OR EXISTS (SELECT 1 FROM diagnoses AS x WHERE x.measurement_id = m.id))"""
 _COUNT = "SELECT count(*) FROM measurements AS m {where}"
 _LACKING = f"""
 SELECT m.id FROM (SELECT m.* FROM measurements AS m {{where}} ORDER BY m.id DESC LIMIT :last) AS m
@@ -82,6 +84,8 @@ class Choice:
         Leave out what has no point.
     exact
         Take the unit's name as it stands.
+    answered
+        Leave out what was never estimated or diagnosed.
     """
 
     unit: str | None = None
@@ -89,6 +93,7 @@ class Choice:
     last: int | None = None
     with_points: bool = False
     exact: bool = False
+    answered: bool = False
 
     def asked(self, connection: sa.Connection, query: str, **more: Any) -> sa.CursorResult[Any]:
         """Ask a query that has a place for the conditions; they are such as an index serves."""
@@ -109,6 +114,8 @@ class Choice:
             which.append(f"m.unit_id IN (SELECT id FROM units WHERE {' AND '.join(kinds)})")
         if self.with_points:
             which.append("m.points > 0")
+        if self.answered:
+            which.append(_ANSWERED)
         where = f"WHERE {' AND '.join(which)}" if which else ""
         return connection.execute(sa.text(query.format(where=where)), values)
 

@@ -209,7 +209,7 @@ def _whole_trends(store: Store, rows: Sequence[Mapping[str, Any]], console: Cons
     groups = dict.fromkeys((row["unit"], row["serial"]) for row in rows)
     for count, (unit, serial) in enumerate(groups):
         console.progress(count / len(groups), "reading the history")
-        for line in store.each_line(unit, serial, exact=True):
+        for line in store.each_line(unit, serial, exact=True, answered=True):
             if line.estimate is not None or line.diagnosis is not None:
                 trends.add(measurement_row(line))
     return trends
