@@ -114,7 +114,7 @@ def test_a_correction_on_the_screen_is_kept_with_its_trail(db):
             await op.sees("say who corrects it")
             await op.types("#correct-person", "Ada")
             await op.press("enter")
-            await op.sees("ADSS SN 8 SIM.")
+            await op.sees("ADSS SN 8, complete, SIMULATED")
             await op.press("down", "a")
             await op.sees("#1: serial 'SN 7' corrected to 'SN 8' by Ada")
 

@@ -35,7 +35,7 @@ def test_all_seven_steps(tmp_path, monkeypatch, size):
             assert "SIMULATED" in screen
             await op.press("ctrl+n")
             screen = await op.sees("[5 Result]", "Adjust stage 2 first", "b2 = 0.0455")
-            assert "r = 0.310 +- 0.050  (95 %: 0.220 to 0.410)" in screen
+            assert "r = 0.310 +- 0.050  (95 %: 0.220 to 0.410)" in op.app.screen.copy_text()
             assert "ARF" in screen
             await op.press("v")
             await op.sees("least is likeliest")
