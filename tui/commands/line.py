@@ -96,11 +96,11 @@ def line(
     """
     from daq.limits import load_bench
     from daq.recipe import load_recipe
-    from sim.unit import load_unit
     from tui.line.hook import Hook
     from tui.line.results import Results
     from tui.line.scanner import Scanner
     from tui.line.unit import Line
+    from tui.unit_under_test import read_unit
 
     place, way, limits = load_bench(bench), load_recipe(recipe), limits_to_judge_by(judge)
     name = unit or _unit_of(way)
@@ -108,7 +108,7 @@ def line(
     history = history_path(db, create=True)
     results = Results(out or history.with_suffix(".line.jsonl"), csv)
     belt = Line(
-        name, load_unit(name), instrument or _address(place), recipe, bench, adaptive, operator,
+        name, read_unit(name, console), instrument or _address(place), recipe, bench, adaptive, operator,
         history, limits, diagnose, console,
     )  # fmt: skip
     request = belt.request("", 1)  # everything is refused now that would be refused later
