@@ -108,8 +108,8 @@ def line(
     history = history_path(db, create=True)
     results = Results(out or history.with_suffix(".line.jsonl"), csv)
     belt = Line(
-        name, read_unit(name, console), instrument or _address(place), recipe, bench, adaptive, operator,
-        history, limits, diagnose, console,
+        name, read_unit(name, console), instrument or _address(place), recipe, bench, adaptive,
+        operator, history, limits, diagnose, console,
     )  # fmt: skip
     request = belt.request("", 1)  # everything is refused now that would be refused later
     confirm_driving(belt.instrument, request, history, yes)
