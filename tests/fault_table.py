@@ -16,7 +16,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from bench_server import linear_analyser, served  # noqa: E402
+from instruments.bench_server import linear_analyser, served  # noqa: E402
 
 from daq.control import SessionControl
 from daq.errors import LashbenchError

@@ -12,7 +12,7 @@ import tempfile
 from contextlib import suppress
 from pathlib import Path
 
-from screen import nothing_found, operated
+from outputs.screen import nothing_found, operated
 from textual.pilot import WaitForScreenTimeout
 
 from tui.app.state.analyses import Analyses

@@ -12,7 +12,7 @@ import api_page
 import numpy as np
 import pytest
 from links import broken_links
-from printed import Newcomer, mentions, pages, pieces, stocked_history
+from outputs.printed import Newcomer, mentions, pages, pieces, stocked_history
 
 from analysis.ensemble.model import every_single_cause
 from daq.analyser import SourceState

@@ -8,8 +8,8 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent / "campaigns"))
 
-from hidden import EVERY_EFFECT
 from smallest import UNIT, next_strength, sized, thresholds
+from worlds.hidden import EVERY_EFFECT
 
 from sim.catalogue import CATALOGUE
 from sim.effects import drivetrain_with

@@ -11,8 +11,8 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import numpy as np
-from hidden import BANDS_HZ, LEVELS_VPK
 from numpy.typing import NDArray
+from worlds.hidden import BANDS_HZ, LEVELS_VPK
 
 from analysis.ensemble.batch import Family, read_families
 from analysis.ensemble.datasheet_spread import spread_of

@@ -1,7 +1,7 @@
 """What several tests of refinement share."""
 
 import pytest
-import synthetic_runs
+from worlds import synthetic_runs
 
 pytest.register_assert_rewrite("report_pages")
 

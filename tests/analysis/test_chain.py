@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from side_by_side import ADSS, FRICTIONLESS, state_space
+from worlds.side_by_side import ADSS, FRICTIONLESS, state_space
 
 from analysis.resonance import extract
 from daq.frf import FrequencyResponse

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import report_makings as makings
+from outputs import report_makings as makings
 
 from analysis.diagnosis import diagnose as module
 from analysis.diagnosis.experiment_design import NextMeasurement

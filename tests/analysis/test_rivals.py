@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from judging import TRUE, WRONG, judge, seen
-from synthetic import candidate
+from worlds.judging import TRUE, WRONG, judge, seen
+from worlds.synthetic import candidate
 
 import analysis.selection.verdict as rules
 from analysis.emulation.likelihood import TEMPERATURE

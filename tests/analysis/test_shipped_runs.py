@@ -6,8 +6,8 @@ from zipfile import ZipFile
 
 import numpy as np
 import pytest
-from hidden import BANDS_HZ
 from usual_runs import RUNS, agreement, usual_families, usual_sweep
+from worlds.hidden import BANDS_HZ
 
 import analysis.ensemble.run_cache as module
 from analysis.ensemble.batch import Family, read_family

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from synthetic import candidate, observation, read, thinned
+from worlds.synthetic import candidate, observation, read, thinned
 
 from analysis.selection.verdict import judge_candidates
 

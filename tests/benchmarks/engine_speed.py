@@ -21,7 +21,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from oracle import rk4  # noqa: E402
-from side_by_side import ADSS, EDSS, drive, half_plays  # noqa: E402
+from worlds.side_by_side import ADSS, EDSS, drive, half_plays  # noqa: E402
 
 from analysis.ensemble.model import Hypothesis  # noqa: E402
 from sim.catalogue import CATALOGUE  # noqa: E402

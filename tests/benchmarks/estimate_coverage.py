@@ -19,7 +19,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from hidden import BANDS_HZ, LEVELS_VPK, off_datasheet, reading  # noqa: E402
+from worlds.hidden import BANDS_HZ, LEVELS_VPK, off_datasheet, reading  # noqa: E402
 
 from analysis.estimate import estimate_response  # noqa: E402
 from daq.plan import SweepPlan, spaced_frequencies  # noqa: E402

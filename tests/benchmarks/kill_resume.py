@@ -17,9 +17,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from bench_server import gimbal_analyser, linear_analyser, served  # noqa: E402
-from fake_analyser import known_gain  # noqa: E402
-from killed import begun, check_kept, end, killed_after, start  # noqa: E402
+from instruments.bench_server import gimbal_analyser, linear_analyser, served  # noqa: E402
+from instruments.fake_analyser import known_gain  # noqa: E402
+from instruments.killed import begun, check_kept, end, killed_after, start  # noqa: E402
 
 from daq.store import Store  # noqa: E402
 

@@ -25,7 +25,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from oracle import rk4  # noqa: E402
-from side_by_side import ADSS, EDSS, departure, drive, half_plays  # noqa: E402
+from worlds.side_by_side import ADSS, EDSS, departure, drive, half_plays  # noqa: E402
 from yardsticks import general, operations, runge_kutta  # noqa: E402
 from yardsticks.matrices import Matrices, matrices  # noqa: E402
 from yardsticks.page import machine, replace_block  # noqa: E402

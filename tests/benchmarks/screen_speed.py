@@ -12,7 +12,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from screen import operated
+from outputs.screen import operated
 from textual.events import Key
 
 from tui.app.plot.bode import BodePlot

@@ -14,7 +14,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from fake_analyser import FakeAnalyser  # noqa: E402
+from instruments.fake_analyser import FakeAnalyser  # noqa: E402
 
 from daq.limits import Limits  # noqa: E402
 from daq.plan import SweepPlan, spaced_frequencies  # noqa: E402

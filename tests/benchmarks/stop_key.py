@@ -18,7 +18,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from bench_server import gimbal_analyser, url
+from instruments.bench_server import gimbal_analyser, url
 
 from sim.serve import Server
 from tui.cli import main as command

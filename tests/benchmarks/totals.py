@@ -31,7 +31,7 @@ COMPILE = """
 import sys, time
 sys.path[:0] = [{tests!r}]
 import numpy as np
-from side_by_side import ADSS, drive
+from worlds.side_by_side import ADSS, drive
 from sim.drivetrain import paper_drivetrain
 system = paper_drivetrain(ADSS, 0.25).system()
 began, used = time.perf_counter(), time.process_time()

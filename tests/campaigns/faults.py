@@ -25,8 +25,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tests"))
 
-from fault_cases import BENCHES, DISTURBANCES, Case, draw_cases  # noqa: E402
-from fault_runs import Campaign, Outcome  # noqa: E402
+from fault_bench.fault_cases import BENCHES, DISTURBANCES, Case, draw_cases  # noqa: E402
+from fault_bench.fault_runs import Campaign, Outcome  # noqa: E402
 
 from sim.models import models  # noqa: E402
 

@@ -112,7 +112,7 @@ def main() -> int:
 
 def outside(name: str, runs: int, seed: int) -> Result:
     """Start the process of one target and read what it said."""
-    from fuzz_targets import seeds
+    from worlds.fuzz_targets import seeds
 
     corpus = KEPT / name
     corpus.mkdir(parents=True, exist_ok=True)
@@ -160,7 +160,7 @@ def inside(name: str, words: Sequence[str]) -> None:
         for module in ("csv", "hdf5", "uff", "mat", "sdf"):
             import_module(f"daq.formats.{module}")
         import_module("sdfascii")
-        from fuzz_targets import targets
+        from worlds.fuzz_targets import targets
     logging.disable()
     warnings.simplefilter("ignore")
     with targets() as all_targets:

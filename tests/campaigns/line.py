@@ -19,7 +19,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from line_bench import BAD, GOOD, ended, line_bench
+from instruments.line_bench import BAD, GOOD, ended, line_bench
 
 
 def run(units: int, bad: int, seed: int, folder: Path) -> dict:

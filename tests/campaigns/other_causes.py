@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from blind_study import CACHE, PAGE
-from hidden import BANDS_HZ, LEVELS_VPK, NOISE_V, off_datasheet
 from kept import Kept, drawn_seed
 from oracle import rk4
+from worlds.hidden import BANDS_HZ, LEVELS_VPK, NOISE_V, off_datasheet
 from yardsticks.page import replace_block
 
 from analysis.diagnosis import Diagnosis, diagnose_response

@@ -15,7 +15,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from printed import ROOT, Newcomer, pages, pieces, stocked_history  # noqa: E402
+from outputs.printed import ROOT, Newcomer, pages, pieces, stocked_history  # noqa: E402
 
 ELSEWHERE = {ROOT / "docs" / "instrument.md"}
 """Its Python wants an address as its argument and has a test of its own."""

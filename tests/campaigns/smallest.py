@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from blind_study import CACHE, PAGE
-from hidden import EVERY_EFFECT, off_datasheet, reading
 from kept import Kept, drawn_seed
+from worlds.hidden import EVERY_EFFECT, off_datasheet, reading
 from yardsticks.page import replace_block
 
 from analysis.ensemble.model import Hypothesis

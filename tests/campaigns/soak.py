@@ -27,7 +27,7 @@ import numpy as np
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tests"))
 
-from bench_server import serving  # noqa: E402
+from instruments.bench_server import serving  # noqa: E402
 
 from daq.control import SessionControl  # noqa: E402
 from daq.session_events import Finished  # noqa: E402

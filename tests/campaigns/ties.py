@@ -20,8 +20,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from blind_study import CACHE, PAGE, wilson
-from hidden import EVERY_EFFECT, Hidden, hide
 from kept import Kept, drawn_seed
+from worlds.hidden import EVERY_EFFECT, Hidden, hide
 from yardsticks.page import replace_block
 
 from analysis.diagnosis import Diagnosis, diagnose_response

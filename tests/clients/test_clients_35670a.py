@@ -6,8 +6,8 @@ import time
 import numpy as np
 import pytest
 import pyvisa
-from bench_server import linear_analyser, served
-from fake_analyser import known_gain
+from instruments.bench_server import linear_analyser, served
+from instruments.fake_analyser import known_gain
 from lan_gpib import LanGpib
 
 pytestmark = [pytest.mark.clients, pytest.mark.filterwarnings("ignore")]

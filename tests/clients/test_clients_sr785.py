@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 import pyvisa
-from bench_server import served, simulated
-from fake_analyser import known_gain
+from instruments.bench_server import served, simulated
+from instruments.fake_analyser import known_gain
+from instruments.vxi11 import Gateway
+from instruments.wire import ByteServer
 from lan_gpib import LanGpib
-from vxi11 import Gateway
-from wire import ByteServer
 
 from sim.instrument.plant import LinearPlant
 

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from responses import measured
-from sdf_files import File
+from worlds.responses import measured
+from worlds.sdf_files import File
 
 from daq.errors import FileFormatError
 from daq.formats import read_response, write_response

@@ -4,8 +4,8 @@ import ast
 from pathlib import Path
 
 import pytest
-from bench_server import linear_analyser, served, simulated
-from fake_analyser import known_gain
+from instruments.bench_server import linear_analyser, served, simulated
+from instruments.fake_analyser import known_gain
 
 import daq
 from daq.analyser import SourceState

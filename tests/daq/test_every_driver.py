@@ -7,11 +7,11 @@ import math
 from contextlib import suppress
 
 import pytest
-from bench_server import simulated
-from fake_analyser import known_gain
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from session_runs import of
+from instruments.bench_server import simulated
+from instruments.fake_analyser import known_gain
+from instruments.session_runs import of
 
 from daq.analyser import PointSettings, SourceState
 from daq.control import SessionControl

@@ -6,10 +6,10 @@ import time
 
 import numpy as np
 import pytest
-from bench_server import simulated
-from fake_analyser import known_gain
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from instruments.bench_server import simulated
+from instruments.fake_analyser import known_gain
 
 from analysis.resonance import extract
 from daq.analyser import PointSettings, SourceState

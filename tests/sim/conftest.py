@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from known_device import known_answer
+from instruments.known_device import known_answer
 
 from sim.analyser35670a import Analyser35670A, Choices, LinearPlant, TalkState
 from sim.faults import FaultBoard, parse_fault

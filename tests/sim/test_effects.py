@@ -5,7 +5,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from oracle import rk4
-from side_by_side import ADSS, EDSS, departure, drive, engine_gain, half_plays
+from worlds.side_by_side import ADSS, EDSS, departure, drive, engine_gain, half_plays
 
 from daq.errors import ConfigurationError
 from sim.catalogue import CATALOGUE

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from known_device import known_answer
+from instruments.known_device import known_answer
 
 from daq.analyser import PointSettings
 from daq.errors import BenchTimeout, ConfigurationError, LinkError, ProtocolError

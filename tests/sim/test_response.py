@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from side_by_side import ADSS, EDSS, oracle_gain
+from worlds.side_by_side import ADSS, EDSS, oracle_gain
 
 from daq.errors import AnalysisError, ConfigurationError
 from daq.frf import DB_PER_NEPER, PointFlag

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from known_device import known_answer
+from instruments.known_device import known_answer
 
 from daq.analyser import PointSettings
 from daq.errors import BenchTimeout, LinkError

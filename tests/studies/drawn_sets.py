@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from hidden import BANDS_HZ, LEVELS_VPK, reading
+from worlds.hidden import BANDS_HZ, LEVELS_VPK, reading
 
 from daq.frf import FrequencyResponse
 from daq.plan import SweepPlan, spaced_frequencies

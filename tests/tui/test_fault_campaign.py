@@ -5,9 +5,9 @@ from itertools import chain
 from types import SimpleNamespace
 
 import pytest
-from fault_cases import BENCHES, DISTURBANCES, Case, can_strike, draw_cases
-from fault_child import drives, instrument_of, options, true_gain
-from fault_runs import Campaign, Run, Stopwatch
+from fault_bench.fault_cases import BENCHES, DISTURBANCES, Case, can_strike, draw_cases
+from fault_bench.fault_child import drives, instrument_of, options, true_gain
+from fault_bench.fault_runs import Campaign, Run, Stopwatch
 
 from daq.analyser import SweepPoint
 from daq.control import SessionControl

@@ -15,9 +15,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
-from bench_server import linear_analyser, served, simulated, wires_of
-from fake_analyser import known_gain
-from frozen_files import can_be_held, started
+from instruments.bench_server import linear_analyser, served, simulated, wires_of
+from instruments.fake_analyser import known_gain
+from worlds.frozen_files import can_be_held, started
 
 from daq.analyser import SourceState
 from daq.drivers import DRIVERS

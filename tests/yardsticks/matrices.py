@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from side_by_side import half_plays, state_space
+from worlds.side_by_side import half_plays, state_space
 
 STATES = 13
 OUTPUT = 11

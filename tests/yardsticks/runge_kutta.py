@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from side_by_side import half_plays
+from worlds.side_by_side import half_plays
 from yardsticks.matrices import OUTPUT, STATES
 
 from sim.engine.compiling import njit

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import synthetic
-from synthetic import LEVELS, ROWS, candidate, observation, read
+from worlds import synthetic
+from worlds.synthetic import LEVELS, ROWS, candidate, observation, read
 
 import analysis.checking.cross_validation as module
 from analysis.checking.cross_validation import hold_out

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from synthetic import ADSS, FREQUENCIES
+from worlds.synthetic import ADSS, FREQUENCIES
 
 from analysis.checking.equivalence import is_equivalent_at_load
 from analysis.ensemble.model import Hypothesis

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from synthetic import candidate, observation, read, shape
+from worlds.synthetic import candidate, observation, read, shape
 
 from analysis.checking import goodness_of_fit as adequacy
 from analysis.checking.goodness_of_fit import judge_adequacy

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from synthetic import ADSS
+from worlds.synthetic import ADSS
 
 from analysis.checking.plausibility import (
     is_out_of_sight,

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from judging import FITS, TRUE, WRONG
+from worlds.judging import FITS, TRUE, WRONG
 
 from analysis.checking import rejection as objection
 from analysis.checking.plausibility import is_pressed

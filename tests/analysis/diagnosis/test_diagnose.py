@@ -7,9 +7,9 @@ draw is what nearly every draw gives; how often exactly, the blind study counts.
 import json
 from pathlib import Path
 
-import hidden
 import numpy as np
 import pytest
+from worlds import hidden
 
 from analysis.advice import advise
 from analysis.answer import accept_model

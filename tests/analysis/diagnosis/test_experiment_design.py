@@ -3,7 +3,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from synthetic import ADSS, LEVELS, candidate, observation, read
+from worlds.synthetic import ADSS, LEVELS, candidate, observation, read
 
 import analysis.diagnosis.experiment_design as module
 from analysis.diagnosis.experiment_design import NextMeasurement, propose_measurement

@@ -2,7 +2,7 @@
 
 import matplotlib.pyplot as plt
 import pytest
-import report_makings as makings
+from outputs import report_makings as makings
 
 from analysis.diagnosis.figures import residual_figure
 

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-import report_makings as makings
+from outputs import report_makings as makings
 
 from tui.measurements.stored_shapes import fault_of
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import synthetic
+from worlds import synthetic
 
 from analysis.diagnosis import refinement as sharpening
 from analysis.emulation.parameter_posterior import ParameterPosterior

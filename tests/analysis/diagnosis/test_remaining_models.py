@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import report_makings as makings
+from outputs import report_makings as makings
 
 from analysis.diagnosis.remaining_models import (
     backlash_document,

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from synthetic import LEVELS, ROWS, candidate, observation, read
+from worlds.synthetic import LEVELS, ROWS, candidate, observation, read
 
 from analysis.diagnosis.residuals import Residual, describe_residuals, find_residuals
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import report_makings as makings
+from outputs import report_makings as makings
 
 from analysis.diagnosis.diagnose import _causes
 from analysis.emulation.parameter_posterior import ParameterPosterior

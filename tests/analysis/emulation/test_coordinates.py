@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-import synthetic
 from hypothesis import given
 from hypothesis import strategies as st
+from worlds import synthetic
 
 from analysis.emulation.coordinates import FeatureMap, reflections
 from analysis.emulation.emulator import Emulator

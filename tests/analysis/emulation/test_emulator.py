@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from synthetic import ROWS, SCATTER, SIGMAS, candidate, observation, read
+from worlds.synthetic import ROWS, SCATTER, SIGMAS, candidate, observation, read
 
 PLACE = np.array([0.55, 0.4])
 EFFECT = ("load-inertia",)

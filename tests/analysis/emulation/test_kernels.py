@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy import stats
-from synthetic import ROWS, candidate, observation, read
+from worlds.synthetic import ROWS, candidate, observation, read
 
 from analysis.emulation import kernel_data as expectation
 from analysis.emulation import kernels as agreement

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy import stats
-from synthetic import ROWS, observation
+from worlds.synthetic import ROWS, observation
 
 from analysis.emulation.emulator import Emulator
 from analysis.emulation.kernels import TAIL, TAIL_SCALE

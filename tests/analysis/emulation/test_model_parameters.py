@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from synthetic import candidate, observation, read
+from worlds.synthetic import candidate, observation, read
 
 import analysis.emulation.model_parameters as module
 from analysis.emulation.model_parameters import estimate_parameters, widen_if_open

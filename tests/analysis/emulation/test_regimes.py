@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from synthetic import ROWS, observation
+from worlds.synthetic import ROWS, observation
 
 from analysis.emulation.emulator import Emulator
 from analysis.emulation.kernels import log_shares

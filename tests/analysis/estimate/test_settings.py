@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from hidden import reading
+from worlds.hidden import reading
 
 from analysis.estimate import estimate_response
 from daq.formats import write_response

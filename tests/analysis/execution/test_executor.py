@@ -5,7 +5,7 @@ from time import sleep
 
 import numpy as np
 import pytest
-from synthetic import candidate, observation, read
+from worlds.synthetic import candidate, observation, read
 
 from analysis.checking.cross_validation import hold_out
 from analysis.checking.goodness_of_fit import judge_adequacy, judge_gain

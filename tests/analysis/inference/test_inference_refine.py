@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-import synthetic_runs
-from untrained import Untrained
+from worlds import synthetic_runs
+from worlds.untrained import Untrained
 
 from analysis.inference.refine import refine
 from analysis.selection.verdict import judge_candidates

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-import synthetic
-import synthetic_runs
+from worlds import synthetic, synthetic_runs
 
 from analysis.inference.model_pool import ModelPool
 

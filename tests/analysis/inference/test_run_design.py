@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-import synthetic
+from worlds import synthetic
 
 from analysis.ensemble.model import Hypothesis
 from analysis.inference.run_design import runs_about

@@ -3,8 +3,8 @@
 from datetime import UTC, datetime
 
 import pytest
-import report_makings as makings
-from report_pages import Page
+from outputs import report_makings as makings
+from outputs.report_pages import Page
 
 from analysis.report import write_report
 from analysis.report.document import Origin

@@ -5,10 +5,10 @@ import xml.etree.ElementTree as ET
 from datetime import date
 
 import pytest
-import report_makings as makings
-from browser import look
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from outputs import report_makings as makings
+from outputs.browser import look
 
 from analysis.acceptance import LimitSet, judge
 from analysis.report.certificate import Certificate

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import report_makings as makings
+from outputs import report_makings as makings
 
 from analysis.observation.joint import sweep_lines
 from sim.catalogue import CATALOGUE
@@ -173,7 +173,7 @@ def test_every_verdict_has_its_words(report, monkeypatch, hidden, judged, verdic
 def test_a_tie_is_told_with_the_sweep_that_would_break_it(report):
     class Told:
         def to_json(self):
-            from screen import DIAGNOSIS
+            from outputs.screen import DIAGNOSIS
 
             plan = DIAGNOSIS["next_measurement"]["plan"] | {"command": "lashbench measure --x"}
             return DIAGNOSIS | {"next_measurement": DIAGNOSIS["next_measurement"] | {"plan": plan}}

@@ -7,11 +7,11 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-import report_makings as makings
-from browser import look
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from report_pages import Page
+from outputs import report_makings as makings
+from outputs.browser import look
+from outputs.report_pages import Page
 
 from analysis.report import file_origin, write_report
 from analysis.report.document import Origin

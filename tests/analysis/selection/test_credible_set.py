@@ -3,7 +3,7 @@
 from types import SimpleNamespace
 
 import pytest
-from synthetic import ADSS
+from worlds.synthetic import ADSS
 
 from analysis.ensemble.model import Hypothesis
 from analysis.selection.credible_set import require_credible_set

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from synthetic import ADSS
+from worlds.synthetic import ADSS
 
 from analysis.emulation.parameter_posterior import ParameterPosterior
 from analysis.ensemble.model import Hypothesis

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from judging import FITS, TRUE, WRONG, judge, seen
-from synthetic import BASE, candidate, observation, read, shape
+from worlds.judging import FITS, TRUE, WRONG, judge, seen
+from worlds.synthetic import BASE, candidate, observation, read, shape
 
 import analysis.selection.verdict as rules
 from analysis.emulation.likelihood import TEMPERATURE
@@ -51,7 +51,7 @@ def test_nothing_is_named_where_nothing_is_hidden(seed):
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_cause_that_imitates_one_branch_of_the_plain_motion_is_not_blamed(seed, monkeypatch):
-    import synthetic
+    from worlds import synthetic
 
     plain, branch = synthetic.read, 0.3 * shape(55)
 
@@ -89,7 +89,7 @@ def test_a_cause_that_leaves_a_shape_behind_is_not_blamed():
 
 
 def test_two_causes_that_look_the_same_are_both_named(monkeypatch):
-    import synthetic
+    from worlds import synthetic
 
     plain = synthetic.effect_slope
     same = {WRONG: plain(TRUE) + 0.002}
@@ -102,7 +102,7 @@ def test_two_causes_that_look_the_same_are_both_named(monkeypatch):
 
 
 def test_of_two_that_look_the_same_the_rare_one_is_a_rival_and_not_named_first(monkeypatch):
-    import synthetic
+    from worlds import synthetic
 
     plain, rare = synthetic.effect_slope, ("motor-inertia",)
     monkeypatch.setattr(

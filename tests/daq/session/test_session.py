@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from fake_analyser import FakeAnalyser, known_gain
-from session_runs import LIMITS, PLAN, again, measured, new, of
+from instruments.fake_analyser import FakeAnalyser, known_gain
+from instruments.session_runs import LIMITS, PLAN, again, measured, new, of
 
 from daq.adaptive import Refinement
 from daq.analyser import SourceState

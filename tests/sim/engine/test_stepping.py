@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from side_by_side import ADSS, EDSS, law_parameters
+from worlds.side_by_side import ADSS, EDSS, law_parameters
 
 from daq.errors import AnalysisError
 from sim.effects import drivetrain_with, parse_effect

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from side_by_side import ADSS, EDSS, FRICTIONLESS, state_space
+from worlds.side_by_side import ADSS, EDSS, FRICTIONLESS, state_space
 
 from daq.errors import ConfigurationError
 from sim.drivetrain import paper_drivetrain

@@ -1,7 +1,7 @@
 """A controller on the bus of a simulated SR785 that was just switched on."""
 
 import pytest
-from simulated_sr785 import Bench
+from instruments.simulated_sr785 import Bench
 
 
 @pytest.fixture

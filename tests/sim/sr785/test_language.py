@@ -4,7 +4,7 @@ Expected values are those of the manual, as docs/sr785.md has them; none of this
 """
 
 import pytest
-from simulated_sr785 import DISP, IFC, SRQ, Bench
+from instruments.simulated_sr785 import DISP, IFC, SRQ, Bench
 
 from sim.instrument.bus import TalkState
 

@@ -8,10 +8,10 @@ import struct
 
 import numpy as np
 import pytest
-from fake_analyser import known_gain
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from simulated_sr785 import IFC, Bench
+from instruments.fake_analyser import known_gain
+from instruments.simulated_sr785 import IFC, Bench
 
 from sim.instrument.bus import TalkState
 from sim.sr785.model import MODEL

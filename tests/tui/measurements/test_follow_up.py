@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from measuring import measuring
+from instruments.measuring import measuring
 
 from daq.analyser import SourceState
 from daq.errors import InputError

@@ -1,6 +1,6 @@
 """The unit step of the screen tells what is unusual in a file, and refuses what cannot be."""
 
-from screen import operated, run
+from outputs.screen import operated, run
 
 from daq.configs import config_path
 

@@ -1,0 +1,86 @@
+"""A disk or a store that refuses: the source is made safe, and what was stored stays."""
+
+import sqlite3
+
+import pytest
+from instruments.fake_analyser import FakeAnalyser
+from instruments.session_runs import OFF, request
+
+from daq.errors import LinkError, MeasurementError
+from daq.plan import SweepPlan, spaced_frequencies
+from daq.session import Session
+from daq.session_events import PointStored
+from daq.store import Store
+
+
+def test_a_full_disk_stops_the_source_and_keeps_the_points(tmp_path):
+    path = tmp_path / "bench.db"
+    analyser = FakeAnalyser()
+    store = Store(path, create=True)
+    events = []
+
+    def fill_the_disk():
+        with store._writer.connect() as connection:
+            pages = connection.exec_driver_sql("PRAGMA page_count").scalar_one()
+            connection.exec_driver_sql(f"PRAGMA max_page_count = {pages}")
+
+    plan = SweepPlan(spaced_frequencies(100.0, 180.0, 900), (0.5,))
+    analyser.faults[("point", 20)] = fill_the_disk
+
+    def run():
+        for event in Session(analyser, store, request(plan)).run():
+            events.append(event)
+
+    with pytest.raises(MeasurementError, match="disk refused the data"):
+        run()
+    assert analyser.level_vpk == 0.0
+    assert analyser.log[-1] == ("make_safe",)
+    finished = events[-1]
+    assert (finished.state, finished.source_state) == ("interrupted", OFF)
+    kept = [e.stored for e in events if isinstance(e, PointStored)]
+    assert 18 <= len(kept) < 900
+    store.close()
+    with Store(path) as again:
+        assert again.points(1) == kept
+        assert again.measurement(1).state == "interrupted"
+
+
+def test_a_store_that_fails_at_the_end_does_not_hide_what_came_first(store, monkeypatch):
+    def refuse(*_args):
+        raise MeasurementError("disk gone")
+
+    monkeypatch.setattr(store, "finish", refuse)
+    analyser = FakeAnalyser({("point", 6): LinkError("cable pulled")})
+    events = []
+
+    def run():
+        events.extend(Session(analyser, store, request()).run())
+
+    with pytest.raises(LinkError, match="cable pulled"):
+        run()
+    assert analyser.log[-1] == ("make_safe",)
+
+
+def test_a_store_that_fails_at_the_very_end_is_told(store, monkeypatch):
+    def refuse(*_args):
+        raise MeasurementError("disk gone")
+
+    monkeypatch.setattr(store, "finish", refuse)
+    analyser = FakeAnalyser()
+    with pytest.raises(MeasurementError, match="disk gone"):
+        list(Session(analyser, store, request()).run())
+    assert analyser.log[-1] == ("make_safe",)
+    assert store.measurement(1).state == "interrupted"
+
+
+def test_another_program_that_holds_the_file_is_survived_or_told(store, monkeypatch):
+    monkeypatch.setattr("daq.store.file._BUSY_S", 0.2)
+    blocker = sqlite3.connect(store.path, isolation_level=None)
+    analyser = FakeAnalyser({("point", 6): lambda: blocker.execute("BEGIN IMMEDIATE")})
+    with Store(store.path) as quick, pytest.raises(MeasurementError, match="held by another"):
+        list(Session(analyser, quick, request()).run())
+    assert analyser.level_vpk == 0.0
+    assert analyser.log[-1] == ("make_safe",)
+    blocker.execute("ROLLBACK")
+    blocker.close()
+    assert len(store.points(1)) == 4

@@ -1,0 +1,78 @@
+"""A lost connection: it is opened again to make the source safe, and only for that or a pause."""
+
+import threading
+
+import pytest
+from instruments.fake_analyser import FakeAnalyser
+from instruments.session_runs import OFF, UNCONFIRMED, UNKNOWN, request
+
+from daq.control import SessionControl
+from daq.errors import LinkError
+from daq.session import Session
+
+
+def test_a_lost_connection_is_opened_again_to_make_the_source_safe(store):
+    dead = FakeAnalyser({("point", 6): LinkError("cable pulled")}, safe=(OFF, UNKNOWN))
+    fresh = FakeAnalyser()
+    fresh.level_vpk = 0.5
+    events, session = [], Session(dead, store, request(), reopen=lambda: fresh)
+
+    def run():
+        events.extend(session.run())
+
+    with pytest.raises(LinkError):
+        run()
+    assert dead.closed
+    assert fresh.log == [("make_safe",)]
+    assert fresh.level_vpk == 0.0
+    assert fresh.closed
+    assert store.measurement(1).source_state is OFF
+    assert "reconnected" in [event.kind for event in store.events(1)]
+
+
+def test_a_connection_that_stays_lost_leaves_the_source_unknown(store):
+    def refuse():
+        raise LinkError("no route")
+
+    dead = FakeAnalyser({("point", 6): LinkError("cable pulled")}, safe=(OFF, UNKNOWN))
+    with pytest.raises(LinkError, match="cable pulled"):
+        list(Session(dead, store, request(), reopen=refuse).run())
+    assert store.measurement(1).source_state is UNKNOWN
+
+
+def test_a_connection_that_cannot_even_be_closed_is_opened_again(store):
+    """Nor does it matter what opening it raises: going safe raises nothing."""
+    faults = {("point", 6): LinkError("cable pulled")}
+    dead, fresh = FakeAnalyser(faults, safe=(OFF, UNKNOWN)), FakeAnalyser()
+
+    def broken():
+        raise OSError("no space left on device")
+
+    dead.close = broken
+    with pytest.raises(LinkError, match="cable pulled"):
+        list(Session(dead, store, request(), reopen=lambda: fresh).run())
+    assert store.measurement(1).source_state is OFF
+    dead = FakeAnalyser(faults, safe=(OFF, UNKNOWN))
+    with pytest.raises(LinkError, match="cable pulled"):
+        list(Session(dead, store, request(), reopen=broken).run())
+    assert store.measurement(2).source_state is UNKNOWN
+
+
+def test_an_answer_without_proof_is_no_reason_to_connect_again(store):
+    def never():
+        raise AssertionError("opened again")
+
+    dead = FakeAnalyser({("point", 6): LinkError("gone")}, safe=(OFF, UNCONFIRMED))
+    with pytest.raises(LinkError):
+        list(Session(dead, store, request(), reopen=never).run())
+
+
+def test_a_pause_survives_a_lost_connection(store):
+    control = SessionControl()
+    dead, fresh = FakeAnalyser(safe=(OFF, UNKNOWN)), FakeAnalyser()
+    dead.faults[("point", 4)] = control.pause
+    threading.Timer(0.3, control.go_on).start()
+    finished = list(Session(dead, store, request(), control, reopen=lambda: fresh).run())[-1]
+    assert finished.state == "complete"
+    assert fresh.closed
+    assert fresh.driven[0][1] == 100.0

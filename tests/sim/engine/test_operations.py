@@ -1,0 +1,47 @@
+"""The count of a step's operations, which the benchmark divides by the machine's limit."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from worlds.side_by_side import ADSS, EDSS, drive
+from yardsticks.operations import SERVO, count_steps
+
+from sim.drivetrain import paper_drivetrain
+from sim.engine import stepping
+from sim.engine.layout import STEPS_SEEN
+
+PAGE = Path(__file__).parents[3] / "docs" / "performance.md"
+
+
+def test_steps_take_as_many_operations_as_the_page_says():
+    tally = count_steps(SERVO)
+    said = re.search(
+        rf"{STEPS_SEEN} steps of one lane: (\d+) operations "
+        r"\((\d+) add or multiply, (\d+) compare, (\d+) divide\)",
+        PAGE.read_text(),
+    )
+    counted = [tally.total(), tally["add or multiply"], tally["compare"], tally["divide"]]
+    assert counted == [int(number) for number in said.groups()]
+
+
+@pytest.mark.parametrize("unit", [ADSS, EDSS], ids=["adss", "edss"])
+def test_what_is_counted_is_what_the_units_of_the_paper_take(unit, monkeypatch):
+    asked, step = [], stepping.step_cycles
+    monkeypatch.setattr(
+        stepping, "step_cycles", lambda layout, *more: asked.append(layout) or step(layout, *more)
+    )
+    system = paper_drivetrain(unit, 0.4).system()
+    drive(system, np.zeros((len(system.states), 1)), 120.0, 1, 2.5)
+    assert {layout.structure for layout in asked} == {SERVO}
+
+
+def test_two_more_coordinates_cost_what_a_pair_of_rows_does():
+    more = replace(SERVO, turning=(True, *SERVO.turning), heard=(True, True, *SERVO.heard))
+    grown = count_steps(more) - count_steps(SERVO)
+    assert set(grown) == {"add or multiply"}
+    # Each row turns (a product, and one that is added), takes four forces, and is looked at by
+    # four laws in every step, and by the output in one of them.
+    assert grown.total() == 2 * (STEPS_SEEN * (1 + 2 + 4 * 2 + 4 * 2) + 2)

@@ -1,0 +1,97 @@
+"""Whose numbers the bench screen shows: those of the model that is accepted, and no other."""
+
+import pytest
+from outputs.screen import DIAGNOSIS, ESTIMATE, Diagnosed, operated, run
+
+from sim.unit import load_unit, unit_from_mapping
+
+REFUTED = ESTIMATE | {
+    "refuted": True,
+    "warnings": ["the model leaves 5.4 standard deviations of the response unexplained"],
+}
+"""The estimate of a response that the plain model does not fit; by itself it points at stage 2."""
+
+MODEL = DIAGNOSIS["models"][1]
+EXPLAINED = DIAGNOSIS | {
+    "verdict": "explained",
+    "causes": [{"effect": "shaft-stiffness", "parameters": {}, "probability": 0.99}],
+    "rivals": [{"causes": [], "probability": 0.004}],
+    "contribution_ratio": {
+        "baseline": {"value": 0.31, "std": 0.05},
+        "extended": MODEL["contribution_ratio"],
+    },
+    **{name: MODEL[name] for name in ("b1_deg", "b2_deg", "b_t_deg")},
+    "models": [MODEL],
+    "next_measurement": None,
+}
+
+
+def limited(b1_deg=None, b2_deg=None):
+    content = load_unit("adss").model_dump(by_alias=True)
+    content["limits"] |= {"b1_deg": b1_deg, "b2_deg": b2_deg}
+    return unit_from_mapping(content, "test")
+
+
+def shown(tmp_path, step, estimate, diagnosis=None, unit=None):
+    """The words of a step, with these results on the desk."""
+    seen = []
+
+    async def way():
+        async with operated(tmp_path / "bench.db") as op:
+            desk = op.app.desk
+            desk.measurement = 1
+            desk.unit, desk.results.estimate = unit or load_unit("adss"), estimate
+            desk.results.diagnosis = None if diagnosis is None else Diagnosed(diagnosis)
+            op.app.go(step)
+            await op.sees(f"[{step} ")
+            seen.append(op.app.screen.copy_text())
+
+    run(way)
+    return seen[0]
+
+
+def test_a_refuted_plain_model_is_shown_without_advice_stage_or_number(tmp_path):
+    text = shown(tmp_path, 5, REFUTED, unit=limited(0.3, 0.001))
+    assert text.startswith("No advice before a diagnosis")
+    assert "warning: the model leaves 5.4 standard deviations" in text
+    for word in ("tage 1", "tage 2", "0.310", "0.2148", "PASS", "FAIL"):
+        assert word not in text
+
+
+@pytest.mark.parametrize("step", [5, 6])
+def test_after_the_diagnosis_both_steps_follow_the_model_that_it_accepts(tmp_path, step):
+    text = shown(tmp_path, step, REFUTED, EXPLAINED)
+    assert "Adjust stage 1 first: 62 % of the backlash" in text
+    assert "r = 0.620 +- 0.040  (95 %: 0.540 to 0.700); extended by shaft-stiffness" in text
+    assert "b1 = 0.4297 +- 0.0280 deg" in text
+    assert "0.31" not in text
+
+
+@pytest.mark.parametrize("step", [5, 6])
+def test_a_tie_is_undecided_where_its_models_disagree(tmp_path, step):
+    text = shown(tmp_path, step, ESTIMATE, DIAGNOSIS)
+    assert "Undecided, adjust no stage yet: 23 to 70 %" in text
+    assert "first:" not in text
+
+
+def test_limits_decide_on_the_screen_as_well(tmp_path):
+    text = shown(tmp_path, 6, REFUTED, EXPLAINED, limited(0.5, 0.01))
+    assert "Adjust stage 2: stage 1 PASS; stage 2 FAIL." in text
+    assert "Adjust stage 1" not in text
+
+
+def test_how_likely_nothing_is_hidden_is_on_the_screen(tmp_path):
+    plain = MODEL | {"causes": [], "probability": 0.62}
+    consistent = EXPLAINED | {
+        "verdict": "consistent",
+        "causes": [],
+        "models": [plain],
+        "rivals": [{"causes": [], "probability": 0.62}, {"causes": ["x"], "probability": 0.3}],
+        "residual": [{"band_hz": [100.0, 110.0], "source_vpk": 2.0, "quantity": "gain",
+                      "mean": 0.4, "sigma": 6.9}],
+    }  # fmt: skip
+    text = shown(tmp_path, 6, ESTIMATE, consistent)
+    assert "that nothing is hidden has probability 0.62: more likely than not" in text
+    assert "x (probability 0.30) is not ruled out" in text
+    assert "1 band departs from the plain model, by up to 6.9 sigma" in text
+    assert "no further cause is needed" not in text

@@ -1,0 +1,228 @@
+"""The bench screen with sessions behind it: reference, trend, overlay, opening, the palette."""
+
+import logging
+
+import pytest
+from outputs.screen import ESTIMATE, operated, quick_analyses, run
+
+from daq.store import Store
+from tui.app.state.analyses import Analyses
+from tui.cli import main
+from tui.logs import logging_to_file
+from tui.measurements.stored_answers import keep_estimate
+from tui.places import log_path
+
+SHORT = ["--settle-cycles", "3", "--integrate-cycles", "3", "--serial", "SN 7"]
+BAND = ["--level", "2.5", "--start", "120", "--stop", "160", "--points", "9"]
+
+
+@pytest.fixture
+def db(tmp_path):
+    """Two complete sessions, the first of them estimated."""
+    path = tmp_path / "bench.db"
+    words = ["measure", "--unit", "adss", "--db", str(path), *BAND, *SHORT]
+    for seed in (1, 2):
+        assert main([*words, "--instrument", f"sim:?seed={seed}"]) == 0
+    with Store(path) as store:
+        measured = store.measurement(1)
+    keep_estimate(path, measured, ESTIMATE)
+    return path
+
+
+def test_trend_overlay_and_opening(db):
+    asked = []
+
+    def estimate(response, unit, progress):
+        asked.append(unit.name)
+        return ESTIMATE
+
+    async def way():
+        analyses = quick_analyses(estimate=estimate)
+        async with operated(db, (120, 40), analyses=analyses) as op:
+            await op.press("7")
+            screen = await op.sees("[7 Report]", "0.31+-0.05", "oldest first")
+            assert "ADSS SN 7 SIM." in screen
+            await op.press("o")
+            await op.sees("mark two sessions first")
+            await op.press("space", "down", "space", "o")
+            await op.sees("\u25cf 2.5 V", "line #2 2.5 V")
+            await op.press("t")
+            await op.sees("oldest first")
+            await op.press("enter")
+            await op.sees("[5 Result]", "measurement 1, SIMULATED", "r = 0.310")
+            assert asked == []
+            await op.press("7", "up", "enter")
+            await op.sees("[5 Result]", "measurement 2, SIMULATED", "r = 0.310")
+            assert asked == ["ADSS"]
+
+    run(way)
+    with Store(db, read_only=True) as store:
+        assert set(store.latest_estimates()) == {1, 2}
+
+
+def test_the_trend_leaves_out_an_estimate_of_points_that_were_measured_again(db):
+    words = ["measure", "--unit", "adss", "--db", str(db), "--instrument", "sim:"]
+    assert main([*words, "--resume", "1", "--remeasure", "100:200"]) == 0
+
+    async def way():
+        async with operated(db, (120, 40)) as op:
+            await op.press("7")
+            assert "0.31" not in await op.sees("[7 Report]", "no session is estimated yet")
+
+    run(way)
+
+
+def test_a_diagnosis_is_there_again_after_a_restart(db):
+    async def diagnosed():
+        async with operated(db, (120, 40)) as op:
+            await op.press("7", "down", "enter")
+            await op.sees("[5 Result]", "measurement 1")
+            await op.press("6", "d")
+            assert "from the history" not in await op.sees("VERDICT: AMBIGUOUS")
+
+    async def restarted():
+        async with operated(db, (120, 40)) as op:
+            await op.press("7", "down")
+            await op.sees("#1: diagnosed ambiguous: load-inertia (0.55)", "open")
+            await op.press("enter")
+            await op.sees("[5 Result]", "measurement 1")
+            await op.press("6")
+            await op.sees("from the history, made 20", "VERDICT: AMBIGUOUS", "MEASURE THIS NEXT")
+
+    run(diagnosed)
+    run(restarted)
+    words = ["measure", "--unit", "adss", "--db", str(db), "--instrument", "sim:"]
+    assert main([*words, "--resume", "1", "--remeasure", "100:200"]) == 0
+
+    async def measured_again():
+        async with operated(db, (120, 40)) as op:
+            await op.press("7", "down", "enter")
+            await op.sees("[5 Result]", "measurement 1")
+            await op.press("6")
+            await op.sees("not diagnosed yet")
+
+    run(measured_again)
+
+
+def test_a_correction_on_the_screen_is_kept_with_its_trail(db):
+    async def way():
+        async with operated(db) as op:
+            await op.press("7", "down", "c")
+            await op.sees("Correct measurement 1", "corrected by")
+            await op.types("#correct-serial", "SN 8")
+            await op.press("enter")
+            await op.sees("say who corrects it")
+            await op.types("#correct-person", "Ada")
+            await op.press("enter")
+            await op.sees("ADSS SN 8, complete, SIMULATED")
+            await op.press("down", "a")
+            await op.sees("#1: serial 'SN 7' corrected to 'SN 8' by Ada")
+
+    run(way)
+    with Store(db, read_only=True) as store:
+        assert [one.new for one in store.corrections(1)] == ["SN 8"]
+        assert store.measurement(2).header.serial == "SN 7"
+
+
+def test_the_report_is_written_where_the_operator_is(db, tmp_path, monkeypatch):
+    async def way():
+        analyses = Analyses(quick_analyses().estimate, quick_analyses().diagnose)
+        async with operated(db, analyses=analyses) as op:
+            await op.press("7", "enter")
+            await op.sees("r = 0.310")
+            await op.press("7", "w")
+            await op.sees("REPORT: report-2.html")
+
+    folder = tmp_path / "here"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    run(way)
+    (page,) = folder.iterdir()
+    text = page.read_text()
+    assert "SIMULATED" in text
+    assert "ADSS" in text
+    assert "SN 7" in text
+
+
+def test_an_earlier_session_stands_behind_the_sweep(db):
+    async def way():
+        async with operated(db) as op:
+            await op.connects("sim:")
+            await op.plans()
+            await op.checks()
+            await op.press("ctrl+n", "l")
+            await op.sees("line #2 2.5 V")
+            await op.press("l")
+            await op.sees("no points yet")
+
+    run(way)
+
+
+def test_another_unit_takes_results_of_the_first_off_the_desk(db):
+    async def way():
+        async with operated(db) as op:
+            await op.press("7", "enter")
+            await op.sees("[5 Result]", "r = 0.310")
+            await op.press("1")
+            op.app.screen.query_one("#units").focus()
+            await op.press("end")
+            await op.sees("EDSS: SI units")
+            await op.press("5")
+            await op.sees("no measurement yet")
+            assert op.app.screen.STEP == 1
+
+    run(way)
+
+
+def test_a_plan_changed_after_the_checks_is_the_one_that_is_swept(db):
+    async def way():
+        async with operated(db) as op:
+            await op.connects("sim:")
+            await op.plans()
+            await op.checks()
+            await op.plans(start="125", stop="150", points="6")
+            await op.checks()
+            await op.press("ctrl+n", "s")
+            await op.sees("6 of 6 points stored; complete")
+
+    run(way)
+    with Store(db, read_only=True) as store:
+        plan = store.measurements()[-1].header.plan
+    assert (plan.frequencies_hz[0], len(plan.frequencies_hz)) == (125.0, 6)
+
+
+def test_the_palette_leads_to_every_step_and_copies(db):
+    async def way():
+        async with operated(db) as op:
+            await op.press("ctrl+p", *"report", "enter")
+            await op.press("ctrl+p", *"go to history", "enter")
+            await op.sees("[7 Report]")
+            await op.press("ctrl+y")
+            await op.sees("copied")
+            assert "ADSS SN 7 SIM." in op.app.clipboard
+
+    run(way)
+
+
+def test_the_log_has_the_trace_that_the_screen_leaves_out(db, tmp_path, monkeypatch):
+    def broken(response, unit, progress):
+        raise ZeroDivisionError("by design")
+
+    async def way():
+        analyses = quick_analyses(diagnose=broken)
+        async with operated(db, analyses=analyses, log=log_path()) as op:
+            await op.press("7", "enter")
+            await op.sees("r = 0.310")
+            await op.press("6", "d")
+            screen = await op.sees("NO DIAGNOSIS", "internal fault (ZeroDivisionError)")
+            assert "by design" not in screen
+
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    with logging_to_file() as path:
+        run(way)
+    assert path == tmp_path / "state" / "lashbench" / "lashbench.log"
+    text = path.read_text()
+    assert "Traceback" in text
+    assert "by design" in text
+    handlers = logging.getLogger("lashbench").handlers
+    assert not any(isinstance(handler, logging.FileHandler) for handler in handlers)

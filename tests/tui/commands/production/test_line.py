@@ -1,0 +1,231 @@
+"""A production line: units judged rightly, killed on the way, nothing lost or judged twice."""
+
+import io
+import json
+import os
+import sys
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from instruments.line_bench import BAD, GOOD, ended, line_bench
+
+from daq.errors import FileFormatError, InputError, LashbenchError
+from daq.formats.atomic import append_line
+from tui.line.hook import Hook
+from tui.line.results import Result, Results
+from tui.line.scanner import Scanner, clean_serial
+from tui.line.tally import tally_lines
+
+
+def result(serial="S1", attempt=1, verdict="PASS", measurement=1, **more) -> Result:
+    return Result(
+        serial=serial, attempt=attempt, verdict=verdict, unit="ADSS", measurement=measurement,
+        history="/h.db", started="2026-01-02T03:04:05", ended=None, **more,
+    )  # fmt: skip
+
+
+def scanned(data: bytes) -> list[str]:
+    """The lines of a stream that comes in pieces of any size."""
+    read, write = os.pipe()
+    os.write(write, data)
+    os.close(write)
+    lines = []
+    with os.fdopen(read) as stream:
+        scanner = Scanner(stream)
+        while (line := scanner.line()) is not None:
+            lines.append(line)
+    return lines
+
+
+def test_a_line_is_judged_rightly_though_it_is_killed_twice(tmp_path):
+    """Six units, two of them bad; the table, the labels, the command and the counts agree."""
+    told = tmp_path / "told.jsonl"
+    script = f"import sys; open({str(told)!r}, 'a').write(sys.stdin.read())"
+    hook = ["--on-result", f'{sys.executable} -c "{script}"', "--csv", tmp_path / "results.csv"]
+    with line_bench(tmp_path) as bench:
+        process = bench.start(*hook)
+        assert bench.scan(process, "\x02]C1SN1\t\r").startswith("PASS       SN1  ADSS  ")
+        assert bench.scan(process, "SN2", BAD).startswith("FAIL       SN2  ")
+        bench.kill_in_mid_unit(process, "SN3", BAD)
+        process = bench.start(*hook)
+        assert process.stdout.readline().startswith("FAIL       SN3  ADSS  measurement 3")
+        # Whoever does not know that it was gone on with scans it again: it is no retest.
+        process.stdin.write("SN3\n")
+        assert bench.scan(process, "SN4").startswith("PASS       SN4  ")
+        bench.kill_in_mid_unit(process, "SN5", GOOD)
+        process = bench.start(*hook)
+        assert process.stdout.readline().startswith("PASS       SN5  ")
+        code, out, _ = ended(process)
+        assert not bench.drives
+        results = bench.results()
+    assert code == 0
+    assert [(one["serial"], one["attempt"], one["verdict"]) for one in results] == [
+        ("SN1", 1, "PASS"), ("SN2", 1, "FAIL"), ("SN3", 1, "FAIL"), ("SN4", 1, "PASS"),
+        ("SN5", 1, "PASS"),
+    ]  # fmt: skip
+    assert [one["measurement"] for one in results] == [1, 2, 3, 4, 5]
+    assert [json.loads(line)["serial"] for line in told.read_text().splitlines()] == [
+        "SN1", "SN2", "SN3", "SN4", "SN5",
+    ]  # fmt: skip
+    assert (tmp_path / "results.csv").read_text().count("\n") == 6
+    assert "5 units: 3 PASS, 2 FAIL; 0 retests" in out
+    assert "yield 3/5 (60 %), at the first attempt 3/5 (60 %)" in out
+    assert "FAIL: SN2, SN3\n  by: ARF at 2 V 2" in out
+
+
+def test_what_was_not_written_is_judged_from_the_history_and_a_retest_is_marked(tmp_path):
+    with line_bench(tmp_path) as bench:
+        process = bench.start("--on-result", "false")
+        assert bench.scan(process, "A", BAD).startswith("FAIL")
+        assert "retest 1" in bench.scan(process, "A")
+        code, out, err = ended(process)
+        assert (code, err.count("it ended with 1; the result is kept")) == (0, 2)
+        assert "1 units: 1 PASS; 1 retests" in out
+        assert "at the first attempt 0/1" in out
+        whole = bench.out.read_bytes()
+        # A cut in the middle of the last line: that unit is judged again, and not driven again.
+        bench.out.write_bytes(whole[:-40])
+        code, out, _ = ended(bench.start())
+        assert (code, bench.measurements()) == (0, 2)
+        assert out.startswith("PASS       A  ADSS  measurement 2  retest 1")
+        again = bench.results()
+        assert [one["attempt"] for one in again] == [1, 2]
+        assert again[-1]["judgement"] == json.loads(whole.splitlines()[-1])["judgement"]
+
+
+def test_a_unit_that_does_not_answer_is_told_and_a_bench_that_fails_stops_the_line(tmp_path):
+    with line_bench(tmp_path) as bench:
+        process = bench.start()
+        bench.unit.is_dead = True
+        label = bench.scan(process, "DEAD")
+        assert label.startswith("UNDECIDED  DEAD  ")
+        assert "not measured: a gain of" in label
+        bench.unit.is_dead = False
+        assert bench.scan(process, "B").startswith("PASS")
+    # The analyser is gone.
+    process.stdin.write("C\nD\n")
+    code, _, err = ended(process)
+    assert code == 3
+    assert err.rstrip().splitlines()[-1].startswith("error: ")
+    assert [one["serial"] for one in bench.results()] == ["DEAD", "B"]
+
+
+@given(st.text(st.characters(codec="utf-8"), max_size=30))
+def test_any_serial_is_taken_clean_or_refused(text):
+    try:
+        serial = clean_serial(text)
+    except InputError as error:
+        assert "scan it again" in str(error)  # noqa: PT017
+        return
+    assert serial == serial.strip()
+    assert serial.isprintable()
+    assert clean_serial(f"\x02 {serial}\x03\r") in (serial, clean_serial(serial))
+
+
+@pytest.mark.parametrize(
+    ("data", "lines"),
+    [
+        (b"A\nB\n", ["A", "B"]),
+        (b"A\rB\r", ["A", "B"]),
+        (b"A\r\nB\r\n", ["A", "B"]),
+        (b"A\n\nB", ["A", "", "B"]),
+        (b"", []),
+        (b"\xff\xfe\n", ["��"]),
+    ],
+)
+def test_lines_end_as_a_scanner_ends_them(data, lines):
+    assert scanned(data) == lines
+
+
+@given(st.integers(0, 400))
+def test_a_cut_file_of_results_loses_the_last_line_alone(cut):
+    import tempfile
+    from pathlib import Path
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "results.jsonl"
+        for number in (1, 2):
+            Results(path).add(result(f"S{number}", measurement=number))
+        data = path.read_bytes()
+        path.write_bytes(data[: max(0, len(data) - cut)])
+        left = [one.serial for one in Results(path).all]
+        assert left == ["S1", "S2"][: len(left)]
+        Results(path).add(result("S3", measurement=3))
+        assert [one.serial for one in Results(path).all] == [*left, "S3"]
+
+
+@pytest.mark.parametrize("text", ["serial,verdict\n", '{"serial": 1}\n', "[]\n", "{" * 5000 + "\n",
+                                  '{"a": 1}', "notes"])  # fmt: skip
+def test_no_file_of_others_is_taken_for_results(tmp_path, text):
+    path = tmp_path / "results.jsonl"
+    path.write_text(text)
+    with pytest.raises(FileFormatError, match="line 1 is no result"):
+        Results(path)
+    assert path.read_text() == text
+
+
+def test_a_full_disk_leaves_whole_lines(small_disk):
+    path, whole = small_disk / "lines", "x" * 1000
+    for _ in range(40):
+        append_line(path, whole)
+    with pytest.raises(LashbenchError, match="could not be written"):
+        append_line(path, 60000 * "x")
+    assert set(path.read_text().splitlines()) == {whole}
+    assert path.read_bytes().endswith(b"\n")
+
+
+def test_no_link_is_followed_out_of_the_table(tmp_path):
+    results = Results(tmp_path / "r.jsonl", tmp_path / "r.csv")
+    results.add(result("=HYPERLINK(1)", failed=["b1", "b2"], verdict="FAIL"))
+    assert "'=HYPERLINK(1),1,FAIL" in (tmp_path / "r.csv").read_text()
+    assert "b1; b2" in (tmp_path / "r.csv").read_text()
+
+
+@pytest.mark.parametrize(
+    ("command", "fault"),
+    [
+        ("true", ""),
+        ("sh -c 'echo no paper >&2; exit 3'", "it ended with 3: no paper"),
+        ("sleep 20", "it took longer than 0.2 s and was ended"),
+    ],
+)
+def test_what_a_command_does_is_told(command, fault):
+    assert Hook(command).run("{}", bound_s=0.2 if "sleep" in command else 30.0) == fault
+
+
+def test_a_command_that_cannot_be_is_refused_at_once():
+    for command in ("", "'", "/no/such/program x"):
+        with pytest.raises(InputError, match="--on-result"):
+            Hook(command)
+
+
+def test_the_counts_are_of_the_last_verdict_of_each_unit():
+    results = [
+        result("A", 1, "FAIL", failed=["b1"]),
+        result("A", 2, "PASS"),
+        result("B", 1, "UNDECIDED", reasons=["not measured: no answer"]),
+        result("C", 1, "PASS"),
+    ]
+    text = "\n".join(tally_lines(results))
+    assert "3 units: 2 PASS, 1 UNDECIDED; 1 retests" in text
+    assert "yield 2/3 (67 %), at the first attempt 1/3 (33 %)" in text
+    assert "by: not measured: no answer 1" in text
+
+
+def test_nothing_is_driven_where_something_is_wrong_before(tmp_path, monkeypatch, capsys):
+    from tui import cli
+
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"SN1\n")))
+    monkeypatch.chdir(tmp_path)
+    for words, text in [
+        (["--recipe", "edss"], "--instrument is missing"),
+        (["--recipe", "nothing"], "recipe 'nothing' was not found"),
+        (["--recipe", "adss", "--instrument", "GPIB0::11::INSTR"], "give --yes"),
+        (["--recipe", "adss", "--instrument", "sim:", "--out", "none/x"], "no directory"),
+        (["--recipe", "adss", "--instrument", "sim:", "--judge", "adss"], "sets no limit"),
+    ]:
+        assert cli.main(["line", "--db", "bench.db", *words]) == 2
+        out, err = capsys.readouterr()
+        assert (out, err.count("\n"), text in err) == ("", 1, True)
+    assert not (tmp_path / "bench.db").exists()

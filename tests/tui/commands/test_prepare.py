@@ -1,0 +1,155 @@
+"""The verb prepare: what is simulated ahead is what a measurement of that sweep is held against."""
+
+import json
+
+import pytest
+from instruments.measuring import QUICK, SHORT, measuring
+
+import analysis.precompute as module
+from analysis.estimate import estimate_response
+from analysis.inference.checkpoint import posterior_name, read_checkpoint
+from analysis.inference.nominal import nominal_of
+from analysis.observation.observation import USUAL_NOISE_V, observe, unread
+from daq.configs import config_path
+from daq.formats import read_response
+from daq.plan import SweepPlan
+from sim.unit import load_unit
+from tui.cli import main
+
+ADSS = load_unit("adss")
+TINY = unread(SweepPlan((130.0, 140.0), (2.5,), settle_cycles=1, integrate_cycles=2), USUAL_NOISE_V)
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache" / "lashbench"
+
+
+def test_a_sweep_that_was_prepared_is_estimated_without_simulating(run, cache, tmp_path):
+    words = ["--unit", "adss", *SHORT, *QUICK, "--offset", "0.5", "--json"]
+    code, out, _ = run("prepare", *words, history=False)
+    assert code == 0
+    said = json.loads(out)
+    assert (said["unit"], said["points"], said["kept_in"]) == ("ADSS", 5, str(cache))
+    assert said["simulated_s"] > 0.0
+    run(*measuring("--offset", "0.5"))
+    file = tmp_path / "swept.csv"
+    assert run("export", 1, "--out", file)[0] == 0
+    kept = sorted(cache.iterdir())
+    response = read_response(file)
+    assert estimate_response(response, ADSS, cache=cache).simulated_s == 0.0
+    nominal_of(ADSS, observe(response), cache)
+    assert sorted(cache.iterdir()) == kept
+    # A response says which sweep is meant, too, and nothing is left to be made of this one.
+    code, out, _ = run("prepare", file, "--unit", "adss", history=False)
+    assert (code, out) == (0, "ADSS: all of it was there already\n")
+
+
+def test_one_that_was_interrupted_goes_on(tmp_path, monkeypatch):
+    made, whole = [], module.run_families
+
+    def stopping(unit, families, *rest, **options):
+        if len(made) == 2:
+            raise KeyboardInterrupt
+        made.append(len(families))
+        return whole(unit, families, *rest, **options)
+
+    monkeypatch.setattr(module, "nominal_of", lambda *_, **__: None)
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "run_families", stopping)
+        with pytest.raises(KeyboardInterrupt):
+            module.prepare_sweep(ADSS, TINY, tmp_path)
+    assert len(list(tmp_path.iterdir())) == sum(made) == 16
+    told = []
+    left = module.prepare_sweep(ADSS, TINY, tmp_path, progress=lambda *said: told.append(said))
+    fresh = module.prepare_sweep(ADSS, TINY, tmp_path / "other")
+    count = len(list((tmp_path / "other").iterdir()))
+    assert left.simulated_s == pytest.approx(fresh.simulated_s * (count - 16) / count, rel=0.2)
+    assert (left.before, left.kept) == (16, count)
+    assert [share for share, _ in told] == sorted(share for share, _ in told)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--unit", "adss", "--level", "2"], "--start, --stop, --points is missing"),
+        (["--unit", "adss", *SHORT, "--machines", "10"], "--machines"),
+        (["--unit", "adss", "--machines", "0"], "0 is too few"),
+        (["--unit", str(config_path("templates", "one-stage"))], "one gear stage"),
+        (["--unit", "adss", *SHORT[:-2]], "--points is missing"),
+        (["x.csv", "--unit", "adss", "--start", "2"], "not both"),
+        (["x.csv", "--unit", "adss", "--level", "2", "--level", "3"], "give --level once"),
+        (["--unit", "adss", *SHORT, "--function", "2"], "no file that an option could complete"),
+        (["x.csv", "--unit", "adss"], "x.csv"),
+        (["--unit", "nosuch", *SHORT], "nosuch"),
+        (["--unit", "adss", "--recipe", "nosuch"], "nosuch"),
+    ],
+)
+def test_what_is_no_sweep_is_refused_in_one_line(words, said, capsys, cache, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["prepare", *words]) == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert said in line
+    assert not cache.exists()
+
+
+def test_a_cache_that_cannot_be_written_is_refused_before_anything_is_simulated(
+    capsys, cache, monkeypatch
+):
+    cache.parent.write_text("no folder")
+    monkeypatch.setattr(module, "run_families", None)
+    assert main(["prepare", "--unit", "adss", *SHORT]) == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert line.startswith(f"error: {cache}: cannot be written (")
+    assert line.endswith("set XDG_CACHE_HOME to a folder that can")
+
+
+ONE_STAGE = ["prepare", "--unit", str(config_path("templates", "one-stage")), "--level", "2",
+             "--start", "130", "--stop", "150", "--points", "2", "--settle-cycles", "1",
+             "--integrate-cycles", "2", "--json"]  # fmt: skip
+
+
+def test_what_a_full_disk_did_not_keep_is_told(small_disk, monkeypatch, capsys):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(small_disk))
+    assert main(ONE_STAGE) == 0
+    out, err = capsys.readouterr()
+    files = json.loads(out)["files"]
+    kept = len(list((small_disk / "lashbench").glob("runs-*.npz")))
+    assert 0 < kept == files["kept"] < files["needed"]
+    lost = files["needed"] - kept
+    folder = small_disk / "lashbench"
+    assert f"warning: {lost} of {files['needed']} files could not be kept in {folder}" in err
+    # No room for another: nothing is gained by a second run, which says so.
+    assert main(ONE_STAGE) == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith(f"error: {folder}: nothing ")
+    assert err.count("\n") == 1
+
+
+def test_on_a_disk_without_room_nothing_is_simulated(small_disk, monkeypatch, capsys):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(small_disk))
+    (small_disk / "filler").write_bytes(bytes(60 << 10))
+    assert main(ONE_STAGE) == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "nothing could be kept there (No space left on device), and nothing was" in err
+    assert err.count("\n") == 1
+
+
+def test_the_posterior_of_a_unit_is_trained_for_every_sweep(run, cache):
+    """Of another unit than the shipped ones; a second call finds it and trains no further."""
+    pytest.importorskip("jax", reason="training needs the extra `train`")
+    unit = config_path("templates", "two-stage")
+    words = ["prepare", "--unit", str(unit), "--machines", "90", "--json"]
+    code, out, err = run(*words, history=False)
+    assert code == 0
+    said = json.loads(out)
+    made = read_checkpoint(cache / posterior_name(load_unit(str(unit))))
+    assert said["machines"] == made.machines
+    assert said["steps"] == made.steps > 0
+    assert "machines simulated" in err
+    code, again, _ = run(*words, history=False)
+    assert code == 0
+    assert json.loads(again)["steps"] == made.steps
