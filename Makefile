@@ -1,9 +1,9 @@
 # Everything runs in .venv, which is made on first use and again when the
 # requirements change. `make` alone lists what there is. `make test JOBS=4` tests
-# in as many processes; three keep two cores busy, as tests often wait for something.
+# in as many processes; four keep two cores busy, as tests often wait for something.
 
 PYTHON ?= python3
-JOBS ?= 3
+JOBS ?= 4
 BIN := .venv/bin
 READY := .venv/.ready
 

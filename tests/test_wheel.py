@@ -91,7 +91,8 @@ def test_tests_pass_on_it_away_from_the_checkout(installed, tmp_path):
         "sys.exit(pytest.main(['-p', 'no:cacheprovider', *sys.argv[1:]]))"
     )
     words = ("-c", str(ROOT / "pyproject.toml"), "--rootdir", str(ROOT))
-    tests = (str(ROOT / "tests" / name) for name in ("daq/test_csv_columns.py", "tui/test_logs.py"))
+    names = ("daq/formats/test_csv_columns.py", "tui/test_logs.py")
+    tests = (str(ROOT / "tests" / name) for name in names)
     run = run_installed(installed, tmp_path, program, *words, *tests)
     assert run.returncode == 0, run.stdout + run.stderr
     assert all(

@@ -83,7 +83,7 @@ def identify(
         drawn = simulate_drives(
             coordinates, observation, proposal, (1 + last) * families, rng, executor
         )
-        fit = regress(drawn, measured, proposal, prior)
+        fit = regress(drawn, measured, proposal, prior, last=last)
         at = fit.posterior
         stds.append(at.std)
         if progress is not None:

@@ -80,8 +80,14 @@ class Regressed:
     misfit_rank: float
 
 
-def regress(drawn: Round, measured: Vector, proposal: Gaussian, prior: Gaussian) -> Regressed:
-    """The posterior given the measurement, by what the drives of one round show."""
+def regress(
+    drawn: Round, measured: Vector, proposal: Gaussian, prior: Gaussian, *, last: bool = True
+) -> Regressed:
+    """The posterior given the measurement, by what the drives of one round show.
+
+    Only that of the `last` round is widened where the measurement fits worse than the drives do:
+    before, the drives are not where it is.
+    """
     seen = np.isfinite(measured) & np.all(np.isfinite(drawn.y), axis=0)
     y, x = drawn.y[:, seen], (drawn.z - proposal.mean) / proposal.std
     target = measured[seen]
@@ -111,7 +117,7 @@ def regress(drawn: Round, measured: Vector, proposal: Gaussian, prior: Gaussian)
     misfit = own / float(np.median(size))
     posterior = _corrected(
         Gaussian(at, scatter), _standardised(proposal), _standardised(prior, proposal),
-        max(misfit, 1.0),
+        max(misfit, 1.0) if last else 1.0,
     )  # fmt: skip
     std = proposal.std
     found = Gaussian(

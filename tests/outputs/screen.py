@@ -159,7 +159,9 @@ class Operator:
 
     async def goes_to(self, step):
         """Step by step, as the keys for it work while a field has the focus."""
-        while step != self.app.screen.STEP:
+        for _ in range(40):
+            if step == self.app.screen.STEP:
+                break
             # The first Escape leaves a field, the next one the step.
             await self.press("ctrl+n" if step > self.app.screen.STEP else "escape")
         await self.sees(f"[{step} ")
@@ -203,7 +205,7 @@ async def operated(db, size=(80, 24), **options):
         finally:
             # A test that failed must not leave a session behind.
             app.keeper.stop_now()
-            await app.workers.wait_for_complete()
+            await asyncio.wait_for(app.workers.wait_for_complete(), 60.0)
 
 
 def run(test):

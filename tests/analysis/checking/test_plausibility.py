@@ -12,7 +12,6 @@ from analysis.checking.plausibility import (
     may_be_within_tolerance,
 )
 from analysis.ensemble.model import Hypothesis
-from analysis.selection import verdict as rules
 
 TRUE = ("load-inertia",)
 PAIR = ("amplifier-gain", "cable-stiffness")
@@ -115,13 +114,3 @@ def test_what_has_no_resonance_is_never_out_of_sight():
 
 def test_what_no_datasheet_knows_has_no_tolerance():
     assert not may_be_within_tolerance(off_by(("amplifier-lag", "cable-stiffness"), 0.0, 0.0))
-
-
-def test_a_cause_within_tolerance_pays_for_it(monkeypatch):
-    one = off_by(PAIR, 0.2, 0.0)
-    held_out = SimpleNamespace(score=0.0)
-    scores = []
-    for within in (False, True):
-        monkeypatch.setattr(rules, "may_be_within_tolerance", lambda _, w=within: w)
-        scores.append(rules._score(one, held_out))
-    assert scores[1] == scores[0] - 40.0

@@ -27,7 +27,7 @@ from tui.cli import main
 HOSTILE = "[/x][proto]:boom:\u202e\x1b]0;t\x07[@click=app.bell]go[/]"
 SHOWN = visible(HOSTILE)
 SHORT = "[/x][proto]\u202e\x1b[2J"
-SIZES = [(80, 24), (140, 40)]
+SIZES = [(80, 24), (138, 40)]
 
 
 def hostile_history(path):
@@ -109,7 +109,8 @@ def test_a_history_of_hostile_texts_is_plain_text_on_every_screen(tmp_path, monk
                 await holds(op, f"warning: {SHOWN}")
             await op.press("ctrl+n", "d")
             await op.sees("VERDICT")
-            await holds(op, f"left by the plain model: {SHOWN}")
+            if size[0] > 100:
+                await holds(op, f"left by the plain model: {SHOWN}")
             await op.press("ctrl+n")
             await holds(op, short)
             await op.press("w")
@@ -122,7 +123,7 @@ def test_a_history_of_hostile_texts_is_plain_text_on_every_screen(tmp_path, monk
 
 def test_what_instrument_session_and_analyses_say_is_plain_text(tmp_path):
     async def way():
-        async with operated(tmp_path / "bench.db", (140, 40)) as op:
+        async with operated(tmp_path / "bench.db", (138, 40)) as op:
             post = op.app.post_message
             await op.goes_to(2)
             post(messages.InstrumentsListed([(f"/dev/{HOSTILE}", HOSTILE)], [HOSTILE]))
@@ -136,6 +137,7 @@ def test_what_instrument_session_and_analyses_say_is_plain_text(tmp_path):
             await holds(op, f"CONNECTED to {SHOWN}")
             await holds(op, f"options: {SHOWN}")
             op.app.desk.url = "sim:"
+            op.app.screen.query_one("#url").value = "sim:"
             await op.goes_to(3)
             post(messages.SessionTold(CheckLine(HOSTILE, "note", HOSTILE)))
             post(messages.SessionTold(Warned(HOSTILE)))
@@ -174,7 +176,7 @@ def test_a_replay_of_hostile_texts_is_plain_text(tmp_path):
 
 def test_a_file_whose_name_is_markup_is_named_as_it_is(tmp_path):
     async def way():
-        async with operated(tmp_path / "bench.db", (140, 40)) as op:
+        async with operated(tmp_path / "bench.db", (138, 40)) as op:
             await op.types("#file", f"/no/{HOSTILE}.toml")
             await op.press("enter")
             await holds(op, "The unit file cannot be used")

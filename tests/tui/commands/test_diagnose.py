@@ -219,7 +219,6 @@ def test_figures_go_where_they_are_asked_for(calls, capsys, monkeypatch, tmp_pat
         analysis.diagnosis.figures, "draw_diagnosis", lambda result, folder: [folder / "a.png"]
     )
     assert main(["diagnose", SWEEP, "--unit", "adss", "--plots", str(tmp_path / "out")]) == 0
-    assert (tmp_path / "out").is_dir()
     assert "a.png" in capsys.readouterr().err
 
 
@@ -241,7 +240,6 @@ def test_the_papers_row_is_answered_with_json_and_a_picture(capsys, monkeypatch,
     assert json.loads(told.out) == {"verdict": "consistent"}
     assert "adss.png" in told.err
     assert asked == ["ADSS"]
-    assert (tmp_path / "out").is_dir()
 
 
 @pytest.mark.slow

@@ -133,7 +133,7 @@ class PlanDialog(ModalScreen[PlanChoice | None]):
         return PlanChoice(recipe, self._options())
 
     def _options(self) -> PlanOptions:
-        levels = tuple(real_number(w) for w in self._text("levels").replace(",", " ").split())
+        levels = tuple(real_number(word) for word in self._text("levels").split())
         if not levels:
             raise ValueError("levels: give one or more in V peak")
         return PlanOptions(

@@ -112,7 +112,7 @@ def ratio_drawing(chart: Chart, document: Mapping[str, Any]) -> Drawing | None:
         labels.append(Line(float(value), palette.colour(number), word))
     if not layers:
         return None
-    title = "contribution ratio r: before (plain model)" + (", after (with the cause)" * named)
+    title = "ratio r: before (plain model)" + (", after (with the cause)" * named)
     return Drawing(
         title, "r", linear_scale(0.0, 1.0, width, _APART),
         linear_scale(0.0, 1.0, height, (2, max(3, height)), [0.5, 1.0]), [*layers, *labels],
