@@ -3,7 +3,7 @@
 import pytest
 from worlds import synthetic_runs
 
-pytest.register_assert_rewrite("report_pages")
+pytest.register_assert_rewrite("outputs.report_pages")
 
 
 @pytest.fixture

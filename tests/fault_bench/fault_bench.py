@@ -30,7 +30,7 @@ class Programs:
 
     def __init__(self) -> None:
         self._context = multiprocessing.get_context("forkserver")
-        self._context.set_forkserver_preload(["fault_child"])
+        self._context.set_forkserver_preload(["fault_bench.fault_child"])
 
     def start(self, *words: Any) -> Child:
         """A measuring program; the words are those of `fault_child.measure`."""

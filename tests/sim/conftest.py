@@ -12,7 +12,7 @@ from instruments.known_device import known_answer
 from sim.analyser35670a import Analyser35670A, Choices, LinearPlant, TalkState
 from sim.faults import FaultBoard, parse_fault
 
-pytest.register_assert_rewrite("simulated_sr785")
+pytest.register_assert_rewrite("instruments.simulated_sr785")
 
 SWEPT_SINE = (
     "INST:SEL SINE",

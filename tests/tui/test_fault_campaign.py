@@ -59,7 +59,7 @@ def outcomes():
     campaign = Campaign()
     with pytest.MonkeyPatch.context() as patch, ThreadPoolExecutor(4) as pool:
         # A hang is found all the same, and a busy machine is none.
-        patch.setattr("fault_runs.END_S", 240.0)
+        patch.setattr("fault_bench.fault_runs.END_S", 240.0)
         return list(
             pool.map(campaign.run, [case(number, *kind) for number, kind in enumerate(KINDS)])
         )
