@@ -17,6 +17,7 @@ from daq.configs import config_path
 from daq.errors import ConfigurationError
 from daq.untrusted.toml_files import read_toml
 from sim.acceptance import Acceptance
+from sim.commissioning import Commissioning
 from sim.tolerance import Share, believed_shares, find_fault
 
 __all__ = ["StageBacklash", "Unit", "load_unit", "stage_backlash", "unit_from_mapping"]
@@ -25,8 +26,8 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
-_SAID_OF_VALUES = ("tolerance", "commissioning")
-"""Sections that hold no values but what is known of them."""
+_NO_PHYSICS = {"schema_", "schema", "name", "limits", "acceptance", "tolerance", "commissioning"}
+"""Sections of a unit that do not decide how it moves."""
 
 
 class _Section(BaseModel):
@@ -118,47 +119,6 @@ class Limits(_Section):
     """Most backlash of stage 1 that is acceptable, degrees."""
     b2_deg: NonNegative | None = None
     """Most backlash of stage 2 that is acceptable, degrees."""
-
-
-class CommissioningSweep(_Section):
-    """A sweep that a unit was commissioned by."""
-
-    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-    """Of its readings, see `analysis.commissioning`."""
-    levels_vpk: tuple[Positive, ...]
-    start_hz: Positive
-    stop_hz: Positive
-    points: Positive
-    serial: str | None = None
-
-
-class Commissioning(_Section):
-    """How the values of a unit were identified while it was known to be good."""
-
-    date: str
-    of: str
-    """Name of the unit whose datasheet it began with."""
-    contribution_ratio: Annotated[float, Field(ge=0, le=1)] | None = None
-    contribution_ratio_std: NonNegative | None = None
-    datasheet: Mapping[str, Positive]
-    """Values before, by symbol."""
-    std: Mapping[str, NonNegative]
-    """One standard deviation of each value as a share, whatever the others are."""
-    order: tuple[str, ...]
-    covariance: tuple[tuple[Annotated[float, Field(allow_inf_nan=False)], ...], ...]
-    """Of the logarithms of the values in `order`; of the contribution ratio itself."""
-    sweeps: tuple[CommissioningSweep, ...]
-
-    @model_validator(mode="after")
-    def _has_a_square_covariance(self) -> Self:
-        sides = {len(self.covariance), *map(len, self.covariance)}
-        if sides != {len(self.order)}:
-            raise ValueError("covariance has not as many rows and columns as order has names")
-        return self
-
-
-_NO_PHYSICS = {"schema_", "schema", "name", "limits", "acceptance", "tolerance", "commissioning"}
-"""Sections of a unit that do not decide how it moves."""
 
 
 class Unit(_Section):
