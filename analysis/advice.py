@@ -1,36 +1,34 @@
 """What the answer means for whoever adjusts the gears, in plain words.
 
-Owns the judgement of b1 and b2 against their limits and the sentence about which stage to adjust:
-one function decides and everything else prints what it decided. It estimates nothing and chooses
-no model (`analysis.answer` does).
+Owns the sentence about which stage to adjust, and the line of each stage. It judges no limit
+(`analysis.acceptance` does), estimates nothing and chooses no model (`analysis.answer` does).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
+from analysis.acceptance import Item, Judgement, Verdict, combine, judge_stages
 from analysis.answer import Answer, model_name, span_of
 from sim.catalogue import CATALOGUE
 from sim.unit import Unit
 
-__all__ = ["Advice", "Stage", "StageVerdict", "advise", "judge_limit", "span_of"]
-
-StageVerdict = Literal["PASS", "FAIL", "UNDECIDED"]
+__all__ = ["Advice", "Stage", "advise"]
 
 _HALF = 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """One gear stage: its number, what its limit says of it (None without a limit), and a line.
+    """One gear stage: its number, what its limits say of it (None without one), and a line.
 
     The line is empty where neither the backlash nor a limit is known.
     """
 
     stage: int
-    verdict: StageVerdict | None
+    verdict: Verdict | None
     line: str
 
 
@@ -51,46 +49,49 @@ class Advice:
         return [*first, self.headline, *(stage.line for stage in self.stages if stage.line)]
 
 
-def advise(answer: Answer, unit: Unit | None = None) -> Advice:
+def advise(
+    answer: Answer,
+    unit: Unit | None = None,
+    *,
+    judgement: Judgement | None = None,
+    doubt: str = "",
+) -> Advice:
     """What to do about the stages, by every model that may be true.
 
-    Limits decide where the unit sets any (``b1_deg``, ``b2_deg`` under ``[limits]``). Without
-    them the stage that holds more of the backlash is named, where the whole 95 % interval of the
-    contribution ratio lies on its side of one half. Nothing is decided that the models left do
-    not agree on, and nothing at all where no model is accepted.
+    Limits of b1 and b2 decide where there are any: those of the judgement, or those of the unit
+    if none was made. Without them the stage that holds more of the backlash is named, where the
+    whole 95 % interval of the contribution ratio lies on its side of one half. Nothing is decided
+    that the models left do not agree on, and nothing at all where no model is accepted.
 
     Parameters
     ----------
     unit
         The unit that the answer is about, with its limits; None if it is not known.
+    judgement
+        What the limits asked for say of the same answer.
+    doubt
+        Why the response is not to be trusted; no limit of the unit is passed or failed then.
     """
     one_stage = _has_one_stage(answer, unit)
+    if judgement is None and unit is not None:
+        judgement = judge_stages(unit, answer, doubt)
+    items = () if judgement is None else judgement.items
     stages = tuple(
-        _judged(answer, number, _limit(unit, number), unit)
+        _told_with_limits(
+            answer, number, [item for item in items if item.quantity == f"b{number}_deg"], unit
+        )
         for number in (1, 2)[: 1 if one_stage else 2]
     )
     limited = [stage for stage in stages if stage.verdict is not None]
     if not answer.models or any("contribution_ratio" not in one for one in answer.models):
         headline = _without_model(answer, one_stage)
     elif limited:
-        headline = _by_limits(limited)
+        headline = _by_limits(limited, doubt)
     elif one_stage:
         headline = "There is one gear stage: it holds all of the backlash."
     else:
         headline = _by_ratio(answer)
     return Advice(headline, stages, _before(answer))
-
-
-def judge_limit(spans: Sequence[tuple[float, float]], limit: float) -> StageVerdict:
-    """A limit against the 95 % intervals of a backlash, one of each model that may be true.
-
-    PASS where every interval lies within the limit, FAIL where every one lies above it.
-    """
-    if spans and all(high <= limit for _, high in spans):
-        return "PASS"
-    if spans and all(low > limit for low, _ in spans):
-        return "FAIL"
-    return "UNDECIDED"
 
 
 def _before(answer: Answer) -> str:
@@ -110,26 +111,30 @@ def _has_one_stage(answer: Answer, unit: Unit | None) -> bool:
     return ratio is not None and ratio["value"] == 1.0 and not ratio["std"]
 
 
-def _limit(unit: Unit | None, stage: int) -> float | None:
-    limit: float | None = None if unit is None else getattr(unit.limits, f"b{stage}_deg")
-    return limit
-
-
-def _judged(answer: Answer, stage: int, limit: float | None, unit: Unit | None) -> Stage:
-    """One stage against its limit, by every model that may be true."""
+def _told_with_limits(
+    answer: Answer, stage: int, items: Sequence[Item], unit: Unit | None
+) -> Stage:
+    """One stage by every model that may be true, with what its limits say of it."""
     told = [model.get(f"b{stage}_deg") for model in answer.models]
     numbers = [number for number in told if number is not None]
     known = len(numbers) == len(told) > 0
     said = _told(stage, numbers) if known else f"b{stage} is not known"
-    if limit is None and not known:
+    if not items and not known:
         return Stage(stage, None, "")
-    if limit is None:
+    if not items:
         most = _most(answer, stage, unit)
         all_of_it = "" if most is None else f", all of it would be {most:.4f} deg"
         return Stage(stage, None, f"Stage {stage}: {said}; no limit set{all_of_it}.")
-    verdict = judge_limit([span_of(number) for number in numbers] if known else [], limit)
-    line = f"Stage {stage}: {verdict}. {said}; limit {limit:.4f} deg: {_ACTIONS[verdict]}"
-    return Stage(stage, verdict, line)
+    verdict = combine([item.verdict for item in items])
+    limits = " and ".join(_limit(item) for item in items)
+    reasons = dict.fromkeys(item.reason for item in items if item.verdict == "UNDECIDED")
+    why = "; ".join(filter(None, reasons))
+    action = f"{_ACTIONS[verdict]} ({why})" if why else _ACTIONS[verdict]
+    return Stage(stage, verdict, f"Stage {stage}: {verdict}. {said}; limit {limits}: {action}")
+
+
+def _limit(item: Item) -> str:
+    return f"{item.upper:.4f} deg" if item.lower is None else item.limit
 
 
 def _told(stage: int, numbers: Sequence[Mapping[str, Any]]) -> str:
@@ -168,12 +173,14 @@ def _without_model(answer: Answer, one_stage: bool) -> str:
     )
 
 
-def _by_limits(limited: Sequence[Stage]) -> str:
+def _by_limits(limited: Sequence[Stage], doubt: str) -> str:
     """The verdicts of all stages that have a limit, and what they ask for."""
     found = {word: [s.stage for s in limited if s.verdict == word] for word in _ACTIONS}
     told = "; ".join(f"stage {s.stage} {s.verdict}" for s in limited)
     if found["FAIL"]:
         return f"Adjust {_stages(found['FAIL'])}: {told}."
+    if found["UNDECIDED"] and doubt:
+        return f"Undecided: {told}. Settle first whether the response is right."
     if found["UNDECIDED"]:
         return (
             f"Undecided: {told}. Measure again at further source levels before adjusting "
@@ -216,7 +223,7 @@ def _by(answer: Answer) -> str:
     return f"model {answer.source}" if answer.models[0]["causes"] else answer.source
 
 
-_ACTIONS: Mapping[StageVerdict, str] = {
+_ACTIONS: Mapping[Verdict, str] = {
     "PASS": "leave it.",
     "FAIL": (
         "adjust its mesh (centre distance or preload) and measure again; replace the gear pair "

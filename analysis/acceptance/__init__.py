@@ -6,8 +6,8 @@ Owns the rule, the limits and what was decided. It measures and estimates nothin
 from __future__ import annotations
 
 from analysis.acceptance.decision import EXIT_CODES, Verdict, combine, decide
-from analysis.acceptance.judgement import Item, Judgement, judge
-from analysis.acceptance.limits import LimitSet, limits_of_unit, load_limits
+from analysis.acceptance.judgement import Item, Judgement, judge, judge_stages
+from analysis.acceptance.limits import LimitSet, limits_of_stages, limits_of_unit, load_limits
 
 __all__ = [
     "EXIT_CODES",
@@ -18,6 +18,8 @@ __all__ = [
     "combine",
     "decide",
     "judge",
+    "judge_stages",
+    "limits_of_stages",
     "limits_of_unit",
     "load_limits",
 ]

@@ -19,12 +19,13 @@ from analysis.acceptance.decision import (
     decide,
     false_pass_share,
 )
-from analysis.acceptance.limits import LimitSet
+from analysis.acceptance.limits import LimitSet, limits_of_stages
 from analysis.answer import Answer, accept_model
 from analysis.resonance.records import with_error
 from sim.acceptance import BACKLASH_QUANTITIES, FEATURE_QUANTITIES, Bound
+from sim.unit import Unit
 
-__all__ = ["NAMES", "Item", "Judgement", "judge"]
+__all__ = ["NAMES", "Item", "Judgement", "judge", "judge_stages"]
 
 Data = Mapping[str, Any]
 
@@ -244,6 +245,27 @@ def judge(
     if doubt:
         items = [_doubted(item, doubt) for item in items]
     return Judgement(limits, tuple(items))
+
+
+def judge_stages(unit: Unit, answer: Answer, doubt: str = "") -> Judgement | None:
+    """Judge each stage by the limits of the unit itself, by the same rule; None if it has none.
+
+    Parameters
+    ----------
+    answer
+        What is known of the backlash.
+    doubt
+        As `judge`.
+    """
+    limits = limits_of_stages(unit)
+    if limits is None:
+        return None
+    k = limits.acceptance.coverage_factor
+    items = tuple(
+        _judged(quantity, bound, _of_models(answer, None, quantity), k)
+        for quantity, bound in limits.acceptance.bounds()
+    )
+    return Judgement(limits, tuple(_doubted(item, doubt) for item in items) if doubt else items)
 
 
 def _doubted(item: Item, doubt: str) -> Item:

@@ -20,7 +20,9 @@ from sim.acceptance import BACKLASH_QUANTITIES, FEATURE_QUANTITIES, Acceptance
 from sim.catalogue import CATALOGUE
 from sim.unit import Unit, load_unit
 
-__all__ = ["LimitSet", "limits_of_unit", "load_limits"]
+__all__ = ["LimitSet", "limits_of_stages", "limits_of_unit", "load_limits"]
+
+_STAGES = ("b1_deg", "b2_deg")
 
 
 class _LimitsFile(Section):
@@ -112,13 +114,7 @@ def limits_of_unit(unit: Unit, source: str = "") -> LimitSet:
     ConfigurationError
         If it sets none.
     """
-    table: dict[str, Any] = {}
-    if unit.acceptance is not None:
-        table = unit.acceptance.model_dump()
-    for name in ("b1_deg", "b2_deg"):
-        limit = getattr(unit.limits, name)
-        if limit is not None:
-            table[name] = (*table.get(name, ()), {"upper": limit})
+    table = _table(unit)
     if not table:
         raise ConfigurationError(
             f"{source or f'unit {unit.name}'}: sets no limit to judge by; add an [acceptance] "
@@ -126,6 +122,26 @@ def limits_of_unit(unit: Unit, source: str = "") -> LimitSet:
         )
     found = LimitSet(unit.name, Acceptance.model_validate(table))
     return _checked(found, source or f"unit {unit.name}")
+
+
+def limits_of_stages(unit: Unit) -> LimitSet | None:
+    """The limits of a unit on the backlash of its stages; None if it sets none."""
+    table = _table(unit)
+    kept = {name: table[name] for name in _STAGES if table.get(name)}
+    if not kept:
+        return None
+    if "coverage_factor" in table:
+        kept["coverage_factor"] = table["coverage_factor"]
+    return LimitSet(unit.name, Acceptance.model_validate(kept))
+
+
+def _table(unit: Unit) -> dict[str, Any]:
+    table = {} if unit.acceptance is None else unit.acceptance.model_dump()
+    for name in _STAGES:
+        limit = getattr(unit.limits, name)
+        if limit is not None:
+            table[name] = (*table.get(name, ()), {"upper": limit})
+    return table
 
 
 def _checked(limits: LimitSet, source: str) -> LimitSet:

@@ -18,6 +18,7 @@ from analysis.acceptance import Judgement
 from analysis.advice import Advice, advise
 from analysis.answer import Answer, accept_model
 from analysis.diagnosis import Diagnosis
+from analysis.observation.incomplete import state_doubt
 from analysis.report import sections
 from analysis.report.certificate import (
     Certificate,
@@ -117,7 +118,7 @@ def write_report(
     )
     pictures = diagnosis_svgs(diagnosis) if isinstance(diagnosis, Diagnosis) else ()
     answer = accept_model(data["estimate"], data["diagnosis"])
-    advice = advise(answer, unit)
+    advice = advise(answer, unit, judgement=judgement, doubt=_doubt(data))
     logo = "" if certificate is None else certificate.logo
     body = joined(
         logo_picture(logo),
@@ -179,7 +180,7 @@ def _actions(
     lines += [] if answer.state == "none" else [advice.headline]
     if answer.models:
         lines += [stage.line for stage in advice.stages if stage.verdict is not None]
-        without = all(getattr(unit.limits, f"b{n}_deg") is None for n in range(1, unit.stages + 1))
+        without = all(stage.verdict is None for stage in advice.stages)
         if without and judgement is None:
             lines.append(
                 "No limits are set; b1_deg and b2_deg under [limits] of the unit file would say "
@@ -191,6 +192,12 @@ def _actions(
     return lines or ["No estimate was made; see below for what was measured."]
 
 
+def _doubt(data: Mapping[str, Any]) -> str:
+    """Why no limit is passed or failed by this response; empty if nothing is known."""
+    incomplete = state_doubt(data["measurement"].get("state"))
+    return "; ".join(filter(None, (data["remarks"].get("input"), incomplete)))
+
+
 def _doubts(data: Mapping[str, Any], unit: Unit) -> list[str]:
     """Reasons to think that the response and the unit do not belong together."""
     named = data["procedure"]["unit"]
@@ -200,9 +207,8 @@ def _doubts(data: Mapping[str, Any], unit: Unit) -> list[str]:
     measured_as = data["provenance"]["configurations"].get("unit")
     if measured_as is not None and _other_unit(measured_as["text"], unit):
         lines.append("The unit file has changed since this was measured.")
-    state = data["measurement"].get("state")
-    if state in ("interrupted", "aborted"):
-        lines.append(f"The measurement is not complete: {state}.")
+    if incomplete := state_doubt(data["measurement"].get("state")):
+        lines.append(f"{incomplete[0].upper()}{incomplete[1:]}.")
     return lines
 
 

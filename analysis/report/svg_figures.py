@@ -16,7 +16,7 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from analysis.advice import span_of
+from analysis.answer import span_of
 from analysis.diagnosis import Diagnosis
 from analysis.diagnosis.figures import probability_figure, residual_figure
 from analysis.report.html import Markup

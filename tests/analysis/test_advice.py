@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.advice import advise, judge_limit
+from analysis.acceptance import judge, limits_of_unit
+from analysis.advice import advise
 from analysis.answer import accept_model
 from sim.unit import load_unit, unit_from_mapping
 
@@ -135,15 +136,56 @@ def test_without_limits_the_greatest_value_there_can_be_is_named():
 @pytest.mark.parametrize(
     ("span", "verdict"),
     [
-        ((0.10, 0.19), "PASS"), ((0.10, 0.20), "PASS"), ((0.10, 0.21), "UNDECIDED"),
-        ((0.20, 0.30), "UNDECIDED"), ((0.21, 0.30), "FAIL"),
+        ((0.10, 0.19), "PASS"), ((0.10, 0.198), "PASS"), ((0.10, 0.21), "UNDECIDED"),
+        ((0.19, 0.30), "UNDECIDED"), ((0.21, 0.30), "FAIL"),
     ],
 )  # fmt: skip
 def test_a_limit_is_passed_or_failed_only_with_the_whole_interval(span, verdict):
-    assert judge_limit([span], 0.2) == verdict
-    assert judge_limit([span, span], 0.2) == verdict
-    assert judge_limit([span, (0.0, 0.1)], 0.2) == ("PASS" if verdict == "PASS" else "UNDECIDED")
-    assert judge_limit([], 0.2) == "UNDECIDED"
+    def b1(*found):
+        models = [{**model(0.1, 0.2), "b1_deg": number(sum(s) / 2, *s)} for s in found]
+        document = diagnosed("explained" if len(models) == 1 else "ambiguous", *models)
+        return advise(accept_model(None, document), with_limits(0.2)).stages[0].verdict
+
+    assert b1(span) == verdict
+    assert b1(span, span) == verdict
+    assert b1(span, (0.0, 0.1)) == ("PASS" if verdict == "PASS" else "UNDECIDED")
+
+
+@given(
+    spans=st.tuples(st.floats(0, 1), st.floats(0, 1)).map(sorted),
+    limit=st.floats(0.001, 1),
+    k=st.sampled_from([0.5, 1.0, 2.0, 3.0, 10.0]),
+    doubt=st.sampled_from(["", "the phase is likely in radians"]),
+)
+def test_advice_and_judgement_decide_one_limit_alike(spans, limit, k, doubt):
+    content = with_limits(b1_deg=limit).model_dump(by_alias=True)
+    content["acceptance"] = {"coverage_factor": k, "b2_deg": {"upper": limit / 10}}
+    unit, estimate = unit_from_mapping(content, "test"), estimated(*spans)
+    judgement = judge(limits_of_unit(unit), estimate=estimate, doubt=doubt)
+    decided = {item.quantity: item.verdict for item in judgement.items}
+    answer = accept_model(estimate)
+    for advice in (
+        advise(answer, unit, judgement=judgement, doubt=doubt),
+        advise(answer, unit, doubt=doubt),
+    ):
+        assert {f"b{s.stage}_deg": s.verdict for s in advice.stages} == decided
+    assert not doubt or set(decided.values()) == {"UNDECIDED"}
+
+
+def test_a_wider_guard_band_leaves_a_stage_undecided():
+    content = with_limits(b1_deg=0.2).model_dump(by_alias=True)
+    content["acceptance"] = {"coverage_factor": 3.0, "b2_deg": {"upper": 1.0}}
+    answer = accept_model(estimated(0.2, 0.28))
+    assert advise(answer, with_limits(b1_deg=0.2)).stages[0].verdict == "PASS"
+    assert advise(answer, unit_from_mapping(content, "test")).stages[0].verdict == "UNDECIDED"
+
+
+def test_a_doubted_response_passes_and_fails_no_stage():
+    answer = accept_model(estimated(0.1, 0.2))
+    advice = advise(answer, with_limits(0.03, 0.066), doubt="the gain looks halved")
+    assert [stage.verdict for stage in advice.stages] == ["UNDECIDED", "UNDECIDED"]
+    assert "(the gain looks halved)" in advice.stages[0].line
+    assert advice.headline.endswith("Settle first whether the response is right.")
 
 
 @pytest.mark.parametrize(

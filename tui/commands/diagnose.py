@@ -106,6 +106,7 @@ def _diagnose_files(
 ) -> int:
     response, *others = read_files(files, given, console)
     from analysis.diagnosis import diagnose_response
+    from analysis.observation.incomplete import state_doubt
     from analysis.observation.input_check import check_inputs
     from analysis.observation.joint import check_together, unit_doubts
     from analysis.observation.stated_error import error_doubts, error_notes
@@ -118,9 +119,10 @@ def _diagnose_files(
     for doubt in doubts:
         # Now, as well as with the answer: it may be a slip, and the answer takes a minute.
         console.note(f"warning: {doubt}")
-    doubt = "; ".join(said)
     with executor_at(cluster) as executor:
         said += _settings((response, *others), subject, as_is, executor, console)
+        incomplete = [state_doubt(one.provenance.get("state")) for one in (response, *others)]
+        doubt = "; ".join(filter(None, dict.fromkeys([*said, *incomplete])))
         result = diagnose_response(
             response, subject, further=others, cache=cache_folder(), executor=executor,
             progress=console.progress,
@@ -128,16 +130,19 @@ def _diagnose_files(
     if said:
         result = replace(result, warnings=(*said, *result.warnings))
     result = proposing(result, unit, (response, *others))
-    code = 0
-    if limits is None:
-        _tell(result, json, console, _advice(result, subject))
-    else:
-        from analysis.acceptance import judge as judged_by
+    code, document, judgement = 0, result.to_json(), None
+    from analysis.acceptance import judge as judged_by
+    from analysis.advice import advise
+    from analysis.answer import accept_model
 
-        document = result.to_json()
-        lines = [*result.summary(), *(f"  {text}" for text in _advice(result, subject))]
+    if limits is not None:
         features = features_for(limits, (response, *others))
         judgement = judged_by(limits, features=features, diagnosis=document, doubt=doubt)
+    advice = advise(accept_model(None, document), subject, judgement=judgement, doubt=doubt)
+    if judgement is None:
+        _tell(result, json, console, advice.lines())
+    else:
+        lines = [*result.summary(), *(f"  {text}" for text in advice.lines())]
         code = tell_judged(judgement, document, lines, json, console)
     if plots is not None:
         from analysis.diagnosis.figures import draw_diagnosis
@@ -182,14 +187,6 @@ def _diagnose_paper(
     if plots is not None:
         for path in result.plot(plots):
             console.note(f"wrote {path}")
-
-
-def _advice(result: Diagnosis, unit: Unit) -> list[str]:
-    """What the accepted model means for whoever adjusts the gears."""
-    from analysis.advice import advise
-    from analysis.answer import accept_model
-
-    return advise(accept_model(None, result.to_json()), unit).lines()
 
 
 def _tell(

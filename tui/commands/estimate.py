@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from daq.errors import InputError
 from tui.executors import executor_at
@@ -18,9 +17,6 @@ from tui.places import cache_folder
 from tui.reading_options import NO_OPTIONS, ReadingOptions, read_files
 from tui.text.output import Injected
 from tui.unit_under_test import read_unit
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["estimate"]
 
@@ -86,6 +82,7 @@ def estimate(
         subject = read_unit(unit, console, tolerance)
         responses = read_files([file, *further], given, console)
         from analysis.estimate import estimate_response
+        from analysis.observation.incomplete import state_doubt
         from analysis.observation.input_check import check_inputs
         from analysis.observation.joint import unit_doubts
         from analysis.observation.stated_error import error_notes
@@ -101,23 +98,25 @@ def estimate(
             )  # fmt: skip
         if said:
             result = replace(result, warnings=(*said, *result.warnings), refuted=True)
-            doubt = "; ".join(said)
+        incomplete = [state_doubt(one.provenance.get("state")) for one in responses]
+        doubt = "; ".join(filter(None, dict.fromkeys([*said, *incomplete])))
     document = result.to_json()
     if json:
         for text in warnings:
             console.note(f"warning: {text}")
+    from analysis.acceptance import judge as judged_by
     from analysis.advice import advise
     from analysis.answer import accept_model
 
-    advice = advise(accept_model(document), subject)
+    judgement = None
+    if limits is not None:
+        features = None if file is None else features_for(limits, responses)
+        judgement = judged_by(limits, features=features, estimate=document, doubt=doubt)
+    advice = advise(accept_model(document), subject, judgement=judgement, doubt=doubt)
     told = [*(f"warning: {text}" for text in warnings), *advice.lines()]
     lines = [*result.summary(), *(f"  {text}" for text in told)]
     whole = document | {"warnings": warnings + document["warnings"]}
-    if limits is None:
+    if judgement is None:
         tell(whole, lines, json, console)
         return 0
-    features = None if file is None else features_for(limits, responses)
-    from analysis.acceptance import judge as judged_by
-
-    judgement = judged_by(limits, features=features, estimate=document, doubt=doubt)
     return tell_judged(judgement, whole, lines, json, console)

@@ -143,7 +143,7 @@ def report(
             features=features_for(limits, [response]),
             estimate=estimate,
             diagnosis=None if diagnosis is None else diagnosis.to_json(),
-            doubt=_doubt(remarks, kept),
+            doubt=_doubt(remarks, response),
         )
     with _page_for(out) as page:
         write_report(
@@ -172,12 +172,12 @@ def _page_for(out: Path) -> Iterator[Path]:
         print_pdf(page, out)
 
 
-def _doubt(remarks: Mapping[str, str], kept: _Kept | None) -> str:
+def _doubt(remarks: Mapping[str, str], response: FrequencyResponse) -> str:
     """Why the response is not to be judged; empty if nothing is known."""
+    from analysis.observation.incomplete import state_doubt
+
     doubts = [remarks["input"]] if "input" in remarks else []
-    if kept is not None and kept.measured.state != "complete":
-        doubts.append(f"the measurement is not complete: {kept.measured.state}")
-    return "; ".join(doubts)
+    return "; ".join([*doubts, *filter(None, [state_doubt(response.provenance.get("state"))])])
 
 
 def _is_identifier(source: str, db: Path | None) -> bool:

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from daq.errors import AnalysisError, InputError, LashbenchError
+from daq.errors import AnalysisError, ConfigurationError, InputError, LashbenchError
+from tui.judging import features_for
 from tui.measurements.reports import unit_as_measured
 from tui.places import cache_folder
 
@@ -49,6 +50,7 @@ def judge_measurement(
         If the history cannot be read, or does not hold the measurement or its unit.
     """
     from analysis.acceptance import judge
+    from analysis.observation.incomplete import state_doubt
     from analysis.observation.input_check import check_inputs
     from daq.store import Store
     from tui.measurements.stored_answers import kept_diagnosis, kept_estimate
@@ -62,8 +64,7 @@ def judge_measurement(
         diagnosis = kept_diagnosis(store, measurement, unit)
     case = _Case(db, measured, response, unit, progress)
     doubts = check_inputs([response], unit, as_is=True)
-    if measured.state != "complete":
-        doubts.append(f"the measurement is not complete: {measured.state}")
+    doubts += filter(None, [state_doubt(measured.state)])
     estimate = stored
     told = None if diagnosis is None else diagnosis.to_json()
     if told is None and diagnose and not doubts:
@@ -72,7 +73,7 @@ def judge_measurement(
         estimate = case.estimated(limits.limits_total)
     return judge(
         limits,
-        features=features_of(response) if limits.needs_features else None,
+        features=features_for(limits, [response]),
         estimate=estimate,
         diagnosis=told,
         doubt="; ".join(doubts),
@@ -91,6 +92,8 @@ def judge_line(store: Store, line: HistoryLine, limits: LimitSet) -> Judgement:
     """
     from analysis.acceptance import judge
     from analysis.edition import EDITION
+    from analysis.observation.incomplete import state_doubt
+    from analysis.observation.input_check import check_inputs
 
     told = {"estimate": line.estimate, "diagnosis": line.diagnosis}
     doubts = [
@@ -98,11 +101,17 @@ def judge_line(store: Store, line: HistoryLine, limits: LimitSet) -> Judgement:
         for kind, kept in told.items()
         if kept is not None and kept.edition != EDITION
     ]
-    if line.state != "complete":
-        doubts.append(f"the measurement is not complete: {line.state}")
+    doubts += filter(None, [state_doubt(line.state)])
     features = None
     if limits.needs_features and line.points:
-        features = features_of(store.response(line.id))
+        response = store.response(line.id)
+        features = features_for(limits, [response])
+        # A stored answer of a mistaken response is in force nowhere; its features would be.
+        try:
+            unit = unit_as_measured(store.measurement(line.id))
+            doubts += check_inputs([response], unit, as_is=True)
+        except (ConfigurationError, InputError) as error:
+            doubts.append(str(error))
     return judge(
         limits,
         features=features,
@@ -110,16 +119,6 @@ def judge_line(store: Store, line: HistoryLine, limits: LimitSet) -> Judgement:
         diagnosis=None if line.diagnosis is None else line.diagnosis.summary,
         doubt="; ".join(doubts),
     )
-
-
-def features_of(response: FrequencyResponse) -> dict[str, Any] | None:
-    """The document of ``extract``; None where the response carries none."""
-    from analysis.resonance import extract, to_json
-
-    try:
-        return to_json(extract(response))
-    except AnalysisError:
-        return None
 
 
 @dataclass(frozen=True, slots=True)

@@ -94,6 +94,36 @@ def test_the_screen_diagnoses_it_only_as_it_is(mistaken):
     drive(way)
 
 
+@pytest.fixture
+def loose(tmp_path):
+    """Limits that the ARF of any sweep of the unit passes."""
+    path = tmp_path / "loose.toml"
+    path.write_text('schema = 1\nname = "loose"\n[acceptance]\narf_hz = { upper = 1000 }\n')
+    return str(path)
+
+
+def test_the_history_passes_no_features_of_it(mistaken, loose, capsys):
+    words = ["history", "--db", str(mistaken), "--estimate", "none", "--judge", loose, "--json"]
+    assert cli.main(words) == 7
+    (row,) = json.loads(capsys.readouterr().out)["measurements"]
+    (item,) = row["judgement"]["items"]
+    assert (item["verdict"], CURE in item["reason"]) == ("UNDECIDED", True)
+
+
+def test_extract_passes_nothing_of_another_excitation_or_of_half_a_sweep(loose, tmp_path, capsys):
+    whole = read_response(sample_path("adss-sweep"))
+    path = tmp_path / "sweep.h5"
+    for said, code in [
+        ({"excitation": "noise"}, 7),
+        ({"state": "interrupted"}, 7),
+        ({"state": "complete"}, 0),
+        ({}, 0),
+    ]:
+        write_response(replace(whole, provenance={**whole.provenance, **said}), path)
+        assert cli.main(["extract", str(path), "--judge", loose]) == code, said
+        assert ("UNDECIDED by limits loose" in capsys.readouterr().out) == (code == 7)
+
+
 def test_the_history_makes_no_estimate_of_it(mistaken, capsys):
     assert cli.main(["history", "--db", str(mistaken), "--json"]) == 0
     out, err = capsys.readouterr()

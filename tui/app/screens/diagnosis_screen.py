@@ -239,7 +239,7 @@ H tells what a simulated bench hid, where the measurement is of one that hides s
         origin = getattr(results.diagnosis, "origin", "")
         lines = _plain(f"{head}, {origin}; D makes it anew" if origin else head)
         unit = desk.unit
-        answer = [] if unit is None else answer_lines(None, document, unit)
+        answer = [] if unit is None else answer_lines(None, document, unit, results.doubt)
         chart = self.query_one("#ratios", Chart)
         width = max(40, self.query_one("#scroll").size.width - 4)
         lines += diagnosis_lines(document, chart.palette, width, answer)

@@ -199,7 +199,7 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
         below: list[str] = []
         if results.estimate is not None and desk.unit is not None:
             diagnosis = None if results.diagnosis is None else results.diagnosis.to_json()
-            lines += answer_lines(results.estimate, diagnosis, desk.unit)
+            lines += answer_lines(results.estimate, diagnosis, desk.unit, results.doubt)
             if diagnosis is None:
                 below += [f"warning: {text}" for text in results.estimate.get("warnings", ())]
             below += believed_lines(results.estimate)
@@ -243,14 +243,17 @@ def _brief(features: Sequence[LevelFeatures]) -> list[str]:
 
 
 def answer_lines(
-    estimate: Mapping[str, Any] | None, diagnosis: Mapping[str, Any] | None, unit: Unit
+    estimate: Mapping[str, Any] | None,
+    diagnosis: Mapping[str, Any] | None,
+    unit: Unit,
+    doubt: str = "",
 ) -> list[str]:
     """Advice, whose numbers they are, the contribution ratio, and each stage beside its limit."""
     from analysis.advice import advise
     from analysis.answer import accept_model
 
     answer = accept_model(estimate, diagnosis)
-    advice = advise(answer, unit)
+    advice = advise(answer, unit, doubt=doubt)
     ratio = answer.contribution_ratio
     told = [] if ratio is None else [f"{ratio_words(ratio)}; {answer.source}"]
     stages = [stage.line for stage in advice.stages] if answer.models else []

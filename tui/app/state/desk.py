@@ -53,6 +53,15 @@ class Results:
     as_is: bool = False
     """Whether it is taken as it stands, also if it looks like a mistake."""
 
+    @property
+    def doubt(self) -> str:
+        """Why no limit is passed or failed by this measurement; empty if nothing is known."""
+        from analysis.observation.incomplete import state_doubt
+
+        state = None if self.response is None else self.response.provenance.get("state")
+        looks = "the response looks like a mistake and is taken as it stands" if self.as_is else ""
+        return "; ".join(filter(None, (looks, state_doubt(state))))
+
 
 @dataclass(slots=True)
 class Desk:
