@@ -9,6 +9,9 @@ READY := .venv/.ready
 
 LOWEST := .venv/lowest
 
+# Tests start some hundred programs; each would compile all that it imports.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: help demo line test tests check lowest clients first-day pictures train training bench blind faults fuzz soak docs audit lock clean
 
 help:

@@ -1,18 +1,22 @@
-"""What holds for every test: Ctrl-C interrupts, and linear algebra keeps to one core.
+"""What holds for every test: Ctrl-C interrupts, linear algebra keeps to one core, bytecode is kept.
 
 Tests run side by side: threads of a library that wait for each other would keep cores from them,
-and how long an example takes says nothing.
+and how long an example takes says nothing. Without kept bytecode each of the some hundred programs
+that they start compiles its imports, which doubles its processor time.
 """
 
 import os
 import signal
 import subprocess
+import sys
 
 import pytest
 from hypothesis import settings
 
 # Before anything loads numpy; what a test starts inherits it.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 
 settings.register_profile("side by side", deadline=None)
