@@ -15,7 +15,6 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
-from daq.errors import ConfigurationError
 from sim.drivetrain import Drivetrain, shaft_end
 from sim.effect import (
     Effect,
@@ -37,7 +36,7 @@ from sim.elements import (
 from sim.rare_effects import RARE
 from sim.unit import Unit
 
-__all__ = ["CATALOGUE", "COMMON", "Effect", "EffectParameter"]
+__all__ = ["CATALOGUE", "COMMON", "Effect", "EffectParameter", "not_of_unit"]
 
 
 def _load_critical(unit: Unit) -> float:
@@ -72,14 +71,6 @@ def _harden_shaft(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetra
     )
 
 
-def _damp_mesh2(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrain:
-    if unit.stage2 is None:
-        raise ConfigurationError(
-            f"effect mesh2-damping: unit {unit.name} has one gear stage; leave it out"
-        )
-    return d.replacing("mesh2", c=v["c_2"])
-
-
 def _add_payload(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrain:
     omega = 2.0 * math.pi * v["f_p"]
     twist = {"th_L": 1.0, "th_p": -1.0}
@@ -112,11 +103,14 @@ def _scaled(*symbols: str) -> Callable[[Unit, Mapping[str, float]], Unit]:
 
 
 def _move_corner(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrain:
-    d2, d1, d0 = unit.electronics.filter_denominator
+    numerator, denominator = unit.electronics.filter_numerator, unit.electronics.filter_denominator
+    if numerator is None or denominator is None:
+        return d
+    d2, d1, d0 = denominator
     scale = v["scale"]
     return d.replacing(
         "tachometer",
-        numerator=unit.electronics.filter_numerator * scale**2,
+        numerator=numerator * scale**2,
         denominator=(d2, d1 * scale, d0 * scale**2),
     )
 
@@ -125,7 +119,8 @@ def _stall_torque(unit: Unit) -> float:
     """Torque at the load for 1 V at the amplifier, a natural scale of load torques, N.m."""
     motor = unit.motor
     ratio = unit.stage1.N_1 * unit.output_ratio
-    return unit.electronics.k_a * motor.k_t / motor.R_m * ratio
+    # A current-controlled amplifier makes a current of the command, without a resistance.
+    return unit.electronics.k_a * motor.k_t / (motor.R_m or 1.0) * ratio
 
 
 def _shaft_at_load(unit: Unit) -> float:
@@ -171,7 +166,7 @@ _ALL = (
         "Gear 2 loses energy while its teeth touch.",
         "thick or fresh grease in gear stage 2",
         "warm gear stage 2 by ten kelvin and measure again; the answer goes with the grease",
-        on_drivetrain=_damp_mesh2,
+        on_drivetrain=lambda d, unit, v: d.replacing("mesh2", c=v["c_2"]),
     ),
     Effect(
         "load-coulomb-friction",
@@ -354,6 +349,25 @@ _ALL = (
 
 CATALOGUE: Mapping[str, Effect] = MappingProxyType({effect.id: effect for effect in _ALL})
 """Every effect by identifier."""
+
+
+def not_of_unit(unit: Unit) -> dict[str, str]:
+    """Effects that a unit cannot have or show, by identifier, and why."""
+    found: dict[str, str] = {}
+    if unit.stages == 1:
+        why = f"unit {unit.name} has one gear stage"
+        found |= dict.fromkeys((name for name in CATALOGUE if name.startswith("mesh2-")), why)
+    if unit.amplifier is not None:
+        why = f"the amplifier of unit {unit.name} controls the current"
+        found |= dict.fromkeys(("motor-resistance", "amplifier-saturation"), why)
+        # Torque is the product of both constants, and nothing else shows either.
+        found["motor-constant"] = f"{why}: amplifier-gain says the same"
+    if unit.sensor is not None and unit.sensor.kind == "encoder":
+        found["tachometer-gain"] = f"unit {unit.name} has an encoder"
+    if unit.electronics.filter_numerator is None:
+        found["filter-corner"] = f"unit {unit.name} has no filter"
+    return found
+
 
 COMMON = tuple(effect.id for effect in _ALL if not effect.rare)
 """Identifiers of those that are suspected first."""

@@ -12,7 +12,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from sim.catalogue import CATALOGUE, COMMON, EffectParameter
+from sim.catalogue import CATALOGUE, COMMON, EffectParameter, not_of_unit
 from sim.effects import EffectSetting
 from sim.unit import Unit
 
@@ -44,14 +44,14 @@ def draw_effect(
     Parameters
     ----------
     unit
-        Whose ranges count. Effects of a second gear stage are left out for a
-        unit that has one.
+        Whose ranges count. Effects that it cannot have are left out.
     band_hz
         What will be measured; a payload swings somewhere within it.
     effects
         Identifiers to draw from.
     """
-    possible = [name for name in effects if unit.stages == 2 or not name.startswith("mesh2-")]
+    foreign = not_of_unit(unit)
+    possible = [name for name in effects if name not in foreign]
     effect = CATALOGUE[possible[int(rng.integers(len(possible)))]]
     values = {p.name: _draw_value(p, unit, band_hz, rng) for p in effect.parameters}
     return EffectSetting(effect.id, MappingProxyType(values))

@@ -8,9 +8,11 @@ and never folded into it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from sim.drive.sensors import Encoder, SampledTachometer
 from sim.elements import (
     Amplifier,
     Damper,
@@ -25,7 +27,7 @@ from sim.elements import (
 from sim.engine.system import Assembly, PiecewiseLinearSystem
 from sim.unit import Unit
 
-__all__ = ["Drivetrain", "paper_drivetrain", "shaft_end"]
+__all__ = ["Drivetrain", "load_side", "motor_side", "paper_drivetrain", "shaft_end"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,34 +58,38 @@ class Drivetrain:
 
 def shaft_end(unit: Unit) -> str:
     """The coordinate at the output end of shaft 1: pinion 2, or the load itself."""
-    return "th_L" if unit.stage2 is None else "th_p2"
+    return load_side(unit) if unit.stage2 is None else "th_p2"
+
+
+def load_side(unit: Unit) -> str:
+    """The coordinate at the end of the gears: the load, or the near side of its coupling."""
+    return "th_L" if unit.load_coupling is None else "th_h"
+
+
+def motor_side(unit: Unit) -> str:
+    """The coordinate of pinion 1: the motor, or the far side of its coupling."""
+    return "th_m" if unit.motor_coupling is None else "th_c"
 
 
 def paper_drivetrain(unit: Unit, ratio: float) -> Drivetrain:
-    """The paper's model of a unit at one contribution ratio.
+    """The paper's model of a unit at one contribution ratio, with what its file has besides.
 
     Angles: th_m motor, th_g1 gear 1, th_s1 middle of shaft 1, th_p2 pinion 2,
     th_L load. A drive with one gear stage is the same up to shaft 1, which
-    ends at the load: no pinion 2 and no mesh 2.
+    ends at the load: no pinion 2 and no mesh 2. With couplings th_c is pinion 1
+    and th_h the last gear.
 
     Raises
     ------
     ConfigurationError
         If the ratio is outside 0 to 1, or not 1 for a drive with one stage.
     """
-    motor, electronics, load, stage1 = unit.motor, unit.electronics, unit.load, unit.stage1
+    motor, load, stage1 = unit.motor, unit.load, unit.stage1
     delta_1, delta_2 = unit.split(ratio).half_plays_rad
     end = shaft_end(unit)
     elements: dict[str, Element] = {
-        "tachometer": Tachometer(
-            "th_m",
-            electronics.k_ts,
-            electronics.filter_numerator,
-            electronics.filter_denominator,
-        ),
-        "motor": Motor(
-            "th_m", motor.L_a, motor.R_m, motor.k_b, motor.k_t, Amplifier(electronics.k_a)
-        ),
+        "tachometer": _sensor(unit),
+        "motor": _motor(unit),
         "rotor": Inertia("th_m", motor.J_m),
         "gear1": Inertia("th_g1", stage1.J_g1),
         "shaft": Inertia("th_s1", stage1.J_s1),
@@ -95,13 +101,75 @@ def paper_drivetrain(unit: Unit, ratio: float) -> Drivetrain:
         "rotor_viscous": Damper({"th_m": 1.0}, motor.B_m),
         "shaft_gear_half": Spring({"th_g1": 1.0, "th_s1": -1.0}, 2.0 * stage1.k_s1),
         "shaft_pinion_half": Spring({"th_s1": 1.0, end: -1.0}, 2.0 * stage1.k_s1),
-        "mesh1": Mesh("mesh1", {"th_m": 1.0 / stage1.N_1, "th_g1": -1.0}, stage1.k_g1, delta_1),
+        "mesh1": Mesh(
+            "mesh1", {motor_side(unit): 1.0 / stage1.N_1, "th_g1": -1.0}, stage1.k_g1, delta_1
+        ),
     }
     if unit.stage2 is not None:
-        twist = {"th_p2": 1.0 / unit.stage2.N, "th_L": -1.0}
+        twist = {"th_p2": 1.0 / unit.stage2.N, load_side(unit): -1.0}
         elements["mesh2"] = Mesh("mesh2", twist, unit.stage2.k_2, delta_2)
     elements |= {
         "motor_friction": DryFriction("motor_friction", "th_m", motor.T_f_m),
         "load_friction": DryFriction("load_friction", "th_L", load.T_f_L),
     }
-    return Drivetrain(elements)
+    return Drivetrain(elements | _couplings(unit))
+
+
+def _motor(unit: Unit) -> Motor:
+    motor, current, sampling = unit.motor, unit.amplifier, unit.sampling
+    hold_hz = sampling.rate_hz if sampling is not None and sampling.holds_command else 0.0
+    amplifier = Amplifier(unit.electronics.k_a, hold_hz=hold_hz)
+    if current is not None:
+        amplifier = replace(amplifier, V_sat=current.current_limit_a)
+        lag_s = 1.0 / (2.0 * math.pi * current.bandwidth_hz)
+        return Motor("th_m", lag_s, 1.0, 0.0, motor.k_t, amplifier)
+    assert motor.L_a is not None
+    assert motor.R_m is not None
+    assert motor.k_b is not None
+    return Motor("th_m", motor.L_a, motor.R_m, motor.k_b, motor.k_t, amplifier)
+
+
+def _sensor(unit: Unit) -> Element:
+    electronics, sensor, sampling = unit.electronics, unit.sensor, unit.sampling
+    filtered = electronics.filter_numerator, electronics.filter_denominator
+    if sensor is not None and sensor.kind == "encoder":
+        assert sampling is not None
+        assert sensor.counts is not None
+        return Encoder(
+            "th_m" if sensor.at == "motor" else "th_L",
+            electronics.k_ts,
+            sampling.rate_hz,
+            sensor.counts,
+            sensor.reads == "speed",
+            sensor.held,
+            *filtered,
+            sensor.delay_s or 0.0,
+        )
+    assert filtered[0] is not None
+    assert filtered[1] is not None
+    late = 0.0 if sensor is None else sensor.delay_s or 0.0
+    coordinate = "th_L" if sensor is not None and sensor.at == "load" else "th_m"
+    known = coordinate, electronics.k_ts, filtered[0], filtered[1]
+    if sensor is not None and sensor.sampled:
+        assert sampling is not None
+        return SampledTachometer(*known, sampling.rate_hz, sensor.held, late)
+    return Tachometer(*known, delay_s=late)
+
+
+def _couplings(unit: Unit) -> dict[str, Element]:
+    found: dict[str, Element] = {}
+    if (motor := unit.motor_coupling) is not None:
+        twist = {"th_m": 1.0, "th_c": -1.0}
+        found |= {
+            "motor_coupling_far": Inertia("th_c", motor.J_cm),
+            "motor_coupling": Spring(twist, motor.k_cm),
+            "motor_coupling_damper": Damper(twist, motor.c_cm),
+        }
+    if (load := unit.load_coupling) is not None:
+        twist = {"th_h": 1.0, "th_L": -1.0}
+        found |= {
+            "load_coupling_near": Inertia("th_h", load.J_cL),
+            "load_coupling": Spring(twist, load.k_cL),
+            "load_coupling_damper": Damper(twist, load.c_cL),
+        }
+    return found

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from daq.errors import ConfigurationError
-from sim.catalogue import CATALOGUE
+from sim.catalogue import CATALOGUE, not_of_unit
 from sim.drivetrain import Drivetrain, paper_drivetrain
 from sim.unit import Unit
 
@@ -78,11 +78,15 @@ def drivetrain_with(unit: Unit, ratio: float, effects: Sequence[EffectSetting] =
     Raises
     ------
     ConfigurationError
-        If the ratio is outside 0 to 1 or the effects contradict each other.
+        If the ratio is outside 0 to 1, the effects contradict each other, or the unit cannot have
+        one.
     """
     if len({setting.id for setting in effects}) != len(effects):
         raise ConfigurationError("an effect is given twice; give each once")
+    foreign = not_of_unit(unit) if effects else {}
     for setting in effects:
+        if setting.id in foreign:
+            raise ConfigurationError(f"effect {setting.id}: {foreign[setting.id]}; leave it out")
         change = CATALOGUE[setting.id].on_unit
         if change is not None:
             unit = change(unit, setting.values)

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
+from sim.drive.sensors import add_filter, read_late
 from sim.engine.system import Assembly, Law
 
 __all__ = [
@@ -166,6 +167,8 @@ class Amplifier:
     V_sat: float | None = None
     V_d: float = 0.0
     uneven: float = 1.0
+    hold_hz: float = 0.0
+    """Rate at which its input is sampled and held, Hz; 0 where it is continuous."""
 
     def kinks(self) -> Iterator[tuple[str, float, float, float]]:
         """Name, weight, limit and centre of the `Law.EXCESS` that bend its characteristic."""
@@ -185,7 +188,11 @@ class Amplifier:
 
 @dataclass(frozen=True, slots=True)
 class Motor:
-    """A DC motor on its amplifier, equations (2) and (5) without the friction."""
+    """A DC motor on its amplifier, equations (2) and (5) without the friction.
+
+    With a current-controlled amplifier the voltage stands for the commanded current: R_m is then
+    1 ohm, k_b 0, and L_a the time constant of the current loop.
+    """
 
     coordinate: str
     L_a: float
@@ -201,15 +208,18 @@ class Motor:
         assembly.add_coupling("i_a", "i_a", -self.R_m / self.L_a)
         assembly.add_coupling("i_a", f"{self.coordinate}'", -self.k_b / self.L_a)
         assembly.add_coupling(self.coordinate, "i_a", self.k_t)
+        hears: dict[str, float] = {}
         if amplifier.tau_a > 0.0:
             assembly.add_signal("V_m")
             assembly.add_coupling("V_m", "V_m", -1.0 / amplifier.tau_a)
-            assembly.add_input("V_m", amplifier.k_a / amplifier.tau_a)
+            self._drive(assembly, "V_m", amplifier.k_a / amplifier.tau_a)
             assembly.add_coupling("i_a", "V_m", linear / self.L_a)
             looks_at, feedthrough = {"V_m": 1.0}, 0.0
         else:
-            assembly.add_input("i_a", linear * amplifier.k_a / self.L_a)
+            self._drive(assembly, "i_a", linear * amplifier.k_a / self.L_a)
             looks_at, feedthrough = {}, amplifier.k_a
+            if amplifier.hold_hz > 0.0:
+                feedthrough, hears = 0.0, {"command": amplifier.k_a}
         for name, weight, limit, centre in amplifier.kinks():
             assembly.add_law(
                 name,
@@ -218,7 +228,18 @@ class Motor:
                 looks_at,
                 feedthrough=feedthrough,
                 parameters=(limit, centre),
+                hears=hears,
             )
+
+    def _drive(self, assembly: Assembly, signal: str, gain: float) -> None:
+        """Let the input, or what is held of it, drive a signal."""
+        rate = self.amplifier.hold_hz
+        if rate > 0.0:
+            assembly.add_law(
+                "command", Law.HOLD, {signal: gain}, {}, feedthrough=1.0, parameters=(rate,)
+            )
+        else:
+            assembly.add_input(signal, gain)
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,16 +254,15 @@ class Tachometer:
     numerator: float
     denominator: tuple[float, float, float]
     T_d: float = 0.0
+    delay_s: float = 0.0
+    """A delay that the datasheet states; it is exact."""
 
     def enter(self, assembly: Assembly) -> None:
         """Add the filter's output `V_o` and its rate."""
-        d2, d1, d0 = self.denominator
-        assembly.add_signal("V_o")
-        assembly.add_signal("V_o'")
-        assembly.add_coupling("V_o", "V_o'", 1.0)
-        assembly.add_coupling("V_o'", "V_o", -d0 / d2)
-        assembly.add_coupling("V_o'", "V_o'", -d1 / d2)
-        assembly.add_coupling("V_o'", f"{self.coordinate}'", self.numerator * self.k_ts / d2)
+        source = {f"{self.coordinate}'": self.k_ts}
+        add_filter(assembly, self.numerator, self.denominator, source)
+        if self.delay_s > 0.0:
+            read_late(assembly, self.delay_s)
         if self.T_d > 0.0:
             # exp(-s T) = 1 - s T / (1 + s T/2 + (s T)^2/12); what is taken off is T times the rate.
             assembly.add_signal("V_T")

@@ -138,9 +138,13 @@ def paper_gains(
 def _numbers(unit: Unit, backlash: StageBacklash) -> _Numbers:
     delta_1, delta_2 = backlash.half_plays_rad
     parameters = unit.parameters
-    a2, a1, a0 = unit.electronics.filter_denominator
+    numerator, denominator = unit.electronics.filter_numerator, unit.electronics.filter_denominator
+    # The paper's units have one.
+    assert numerator is not None
+    assert denominator is not None
+    a2, a1, a0 = denominator
     parameters.update(
-        filter_numerator=unit.electronics.filter_numerator / a2,
+        filter_numerator=numerator / a2,
         filter_a1=a1 / a2,
         filter_a0=a0 / a2,
         delta_1=delta_1,

@@ -7,10 +7,8 @@ more usual cause, with confidence, while it was in no catalogue.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 
-from daq.errors import ConfigurationError
 from sim.drivetrain import Drivetrain
 from sim.effect import Effect, EffectParameter, around, drive_voltage, span, table_1, times
 from sim.unit import Unit
@@ -23,14 +21,6 @@ _P = EffectParameter
 def _mesh2(unit: Unit) -> float:
     """Stiffness of the last mesh, N.m/rad: that of mesh 1 where there is no other."""
     return unit.stage1.k_g1 if unit.stage2 is None else unit.stage2.k_2
-
-
-def _soften_mesh2(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrain:
-    if unit.stage2 is None:
-        raise ConfigurationError(
-            f"effect mesh2-stiffness: unit {unit.name} has one gear stage; leave it out"
-        )
-    return d.replacing("mesh2", k=v["k_2"])
 
 
 def _with_amplifier(d: Drivetrain, **changed: float) -> Drivetrain:
@@ -66,7 +56,7 @@ RARE = (
         "The teeth of gear 2 are softer or stiffer than the datasheet has them.",
         "a plastic or cracked gear in stage 2, or its bearing giving way",
         "hold pinion 2, put a known torque on the load and read the twist with a dial gauge",
-        on_drivetrain=_soften_mesh2,
+        on_drivetrain=lambda d, unit, v: d.replacing("mesh2", k=v["k_2"]),
         rare=True,
     ),
     Effect(

@@ -325,11 +325,12 @@ def _shares(plan: SweepPlan, workers: int) -> list[slice]:
 
 
 def _linear_key(system: PiecewiseLinearSystem) -> bytes:
-    parts = [system.A, system.b, system.f, system.o]
+    reading = np.array([system.reading.delay_s, system.reading.sample_s])
+    parts = [system.A, system.b, system.f, system.o, reading]
     for law in system.nonlinearities:
         stribeck = float(law.law is Law.FRICTION and law.parameters[1] != 0.0)
-        fixed = np.array([law.law, law.feedthrough, law.stiffness, law.damping, stribeck])
-        parts += [law.inlet, law.outlet, fixed]
+        fixed = np.array([law.law, law.feedthrough, law.stiffness, law.damping, stribeck, law.read])
+        parts += [law.inlet, law.outlet, fixed, np.array(law.hears).ravel()]
     return b"".join(np.ascontiguousarray(part, dtype=float).tobytes() for part in parts)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.effects import EffectSetting, drivetrain_with
+from sim.engine.layout import HELD
 from sim.engine.system import Law, PiecewiseLinearSystem
 from sim.unit import Unit
 
@@ -53,7 +54,11 @@ class Servo:
 
 
 def states_at_start(servos: Sequence[Servo], levels: int) -> NDArray[np.float64]:
-    """States (n, servos x levels) at rest, each mesh somewhere inside its play."""
+    """States (n, servos x levels) at rest, each mesh somewhere inside its play.
+
+    Of a system with a clock there are five more rows for each sampled law
+    (`sim.engine.layout.HELD`): the seed draws when the clock ticks, and where an encoder stands.
+    """
     system = servos[0].system
     meshes = [law for law in system.nonlinearities if law.law is Law.PLAY]
     columns = []
@@ -64,7 +69,8 @@ def states_at_start(servos: Sequence[Servo], levels: int) -> NDArray[np.float64]
         # The smallest angles that put each mesh there leave every spring but
         # the meshes unwound only if they are compliant; springs are excluded
         # by solving for the meshes' deflections and zero elastic energy elsewhere.
-        columns.append(_at_rest(system, meshes, where))
+        still = _at_rest(system, meshes, where)
+        columns.append(np.concatenate([still, _held(servo.system, still, rng)]))
     return np.concatenate(columns, axis=1)
 
 
@@ -82,6 +88,21 @@ def _at_rest(
     rows = np.vstack([outlets, elastic / max(np.abs(elastic).max(), 1e-300)])
     wanted = np.vstack([where.T, np.zeros((n, len(where)))])
     return np.linalg.lstsq(rows, wanted, rcond=None)[0]
+
+
+def _held(
+    system: PiecewiseLinearSystem, still: NDArray[np.float64], rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """What sampled laws hold at the start (5 per law, levels)."""
+    held = np.zeros((HELD * len(system.sampled), still.shape[1]))
+    phase = rng.random(still.shape[1]) if system.sampled else 0.0
+    for i, law in enumerate(system.sampled):
+        held[HELD * i] = phase
+        if law.law is not Law.HOLD:
+            offset = rng.random(still.shape[1])
+            held[HELD * i + 1] = offset
+            held[HELD * i + 2] = np.floor(law.outlet @ still / law.parameters[1] + offset)
+    return held
 
 
 def parameters_of(servos: Sequence[Servo], levels: int) -> NDArray[np.float64]:

@@ -25,17 +25,20 @@ DEFAULT = "default"
 USUAL = 0.05
 """Of a datasheet of which nobody said how good it is."""
 
-_EXACT = ("filter_numerator", "N_1", "N")
-"""Teeth are counted, and the filter's gain is the tachometer's: no tolerance if not by name."""
+_EXACT = ("filter_numerator", "N_1", "N", "delay_s")
+"""Teeth are counted, the filter's gain is the tachometer's, and a delay is so many samples: no
+tolerance if not by name."""
 
 RESPONSE_SCALES = ("k_ts", "filter_numerator")
 """They scale the whole response and do nothing else."""
 
 _TOLERATED = (
     "L_a", "R_m", "k_b", "k_t", "J_m", "B_m", "T_f_m", "k_a", "k_ts", "filter_numerator",
-    "N_1", "k_g1", "J_g1", "k_s1", "J_s1", "J_p2", "N", "k_2", "J_L", "T_f_L",
+    "N_1", "k_g1", "J_g1", "k_s1", "J_s1", "J_p2", "N", "k_2", "J_L", "T_f_L", "bandwidth_hz",
+    "delay_s", "k_cm", "c_cm", "J_cm", "k_cL", "c_cL", "J_cL",
 )  # fmt: skip
-"""Table 1 but for the backlash, whose departure is the effect total-backlash."""
+"""Table 1 but for the backlash, whose departure is the effect total-backlash; and what drives have
+that are not the paper's."""
 
 
 def believed_shares(

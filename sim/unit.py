@@ -18,6 +18,15 @@ from daq.errors import ConfigurationError
 from daq.untrusted.toml_files import read_toml
 from sim.acceptance import Acceptance
 from sim.commissioning import Commissioning
+from sim.drive.sections import (
+    OPTIONAL_SECTIONS,
+    CurrentAmplifier,
+    LoadCoupling,
+    MotorCoupling,
+    Sampling,
+    Sensor,
+    find_contradiction,
+)
 from sim.tolerance import Share, believed_shares, find_fault
 
 __all__ = ["StageBacklash", "Unit", "load_unit", "stage_backlash", "unit_from_mapping"]
@@ -37,11 +46,11 @@ class _Section(BaseModel):
 class Motor(_Section):
     """Armature circuit and rotor, equations (2) and (5)."""
 
-    L_a: Positive
-    """Armature inductance, H."""
-    R_m: Positive
+    L_a: Positive | None = None
+    """Armature inductance, H; left out with a current-controlled amplifier, as are the next two."""
+    R_m: Positive | None = None
     """Armature resistance, ohm."""
-    k_b: Positive
+    k_b: Positive | None = None
     """Back-EMF constant, V.s/rad."""
     k_t: Positive
     """Torque constant, N.m/A."""
@@ -57,12 +66,12 @@ class Electronics(_Section):
     """Amplifier, tachometer and filter, equations (1), (3) and (4)."""
 
     k_a: Positive
-    """Amplifier gain."""
+    """Amplifier gain; A/V of one that controls the current."""
     k_ts: Positive
-    """Tachometer gain, V.s/rad."""
-    filter_numerator: Positive
-    """Numerator of G_f, 1/s^2."""
-    filter_denominator: tuple[Positive, NonNegative, Positive]
+    """Tachometer gain, V.s/rad; of an encoder that reads positions V/rad."""
+    filter_numerator: Positive | None = None
+    """Numerator of G_f, 1/s^2; an encoder may have no filter."""
+    filter_denominator: tuple[Positive, NonNegative, Positive] | None = None
     """Coefficients of s^2, s and 1 in the denominator of G_f."""
 
 
@@ -135,6 +144,11 @@ class Unit(_Section):
     load: Load
     backlash: Backlash
     limits: Limits
+    amplifier: CurrentAmplifier | None = None
+    sampling: Sampling | None = None
+    sensor: Sensor | None = None
+    motor_coupling: MotorCoupling | None = None
+    load_coupling: LoadCoupling | None = None
     acceptance: Acceptance | None = None
     """What `--judge` decides by, with ``b1_deg`` and ``b2_deg`` of the limits."""
     tolerance: Mapping[str, Share] | None = None
@@ -147,6 +161,13 @@ class Unit(_Section):
     @model_validator(mode="after")
     def _has_known_tolerances(self) -> Self:
         fault = find_fault(self.parameters, self.tolerance or {})
+        if fault:
+            raise ValueError(fault)
+        return self
+
+    @model_validator(mode="after")
+    def _has_no_contradiction(self) -> Self:
+        fault = find_contradiction(self)
         if fault:
             raise ValueError(fault)
         return self
@@ -198,6 +219,7 @@ class Unit(_Section):
             self.stage2,
             self.load,
             self.backlash,
+            *(getattr(self, name) for name in OPTIONAL_SECTIONS),
         )
         return {
             name: value
@@ -243,7 +265,8 @@ class Unit(_Section):
 
         Whatever is stored of a unit, and every seed, depends on this alone.
         """
-        return self.model_dump(mode="json", exclude=_NO_PHYSICS)
+        known = self.model_dump(mode="json", exclude=_NO_PHYSICS)
+        return {k: v for k, v in known.items() if v is not None or k not in OPTIONAL_SECTIONS}
 
     def with_parameters(self, **changes: float) -> Unit:
         """A copy with some parameters changed by symbol, checked like a file.
@@ -253,7 +276,7 @@ class Unit(_Section):
         ConfigurationError
             If a symbol does not exist or a value is not allowed.
         """
-        document = self.model_dump(by_alias=True)
+        document = self.model_dump(by_alias=True, exclude_none=True)
         known = self.parameters
         for symbol, value in changes.items():
             if symbol not in known:

@@ -96,9 +96,8 @@ def feature_spread(unit: Unit) -> tuple[float, float]:
     """
     shares = unit.tolerances
     frequency = 0.5 * math.hypot(shares["J_L"], shares["k_s1"])
-    return frequency, math.hypot(
-        *(shares[s] for s in ("k_a", "k_t", "R_m", "J_m", *RESPONSE_SCALES))
-    )
+    scales = ("k_a", "k_t", "R_m", "J_m", *RESPONSE_SCALES)
+    return frequency, math.hypot(*(shares.get(s, 0.0) for s in scales))
 
 
 class _Key:
@@ -122,7 +121,7 @@ def _spread_of(key: _Key) -> Spread:
     symbols += [s for s in shares if s not in (*_FIRST, *RESPONSE_SCALES)]
     symbols = [s for s in symbols if shares[s] > 0.0] or [_FIRST[0]]
     tolerance = np.array([max(shares[s], _LEAST) for s in symbols])
-    gain = max(math.hypot(*(shares[s] for s in RESPONSE_SCALES)), _LEAST)
+    gain = max(math.hypot(*(shares.get(s, 0.0) for s in RESPONSE_SCALES)), _LEAST)
     if len(symbols) <= _MOST:
         every = np.eye(len(symbols))
         return Spread(tuple(symbols), every, every, tolerance, gain)

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.ensemble.machine import LEAST_SHARE, Machine
-from sim.catalogue import CATALOGUE, EffectParameter
+from sim.catalogue import CATALOGUE, EffectParameter, not_of_unit
 from sim.effects import EffectSetting
 from sim.unit import Unit
 
@@ -165,6 +165,7 @@ class Hypothesis:
 
 def every_single_cause(unit: Unit) -> Iterator[Hypothesis]:
     """The hypotheses of one usual effect each, in the order of the catalogue."""
+    foreign = not_of_unit(unit)
     for effect in CATALOGUE.values():
-        if not effect.rare:
+        if not effect.rare and effect.id not in foreign:
             yield Hypothesis(unit, (effect.id,))

@@ -22,6 +22,7 @@ from analysis.inference.prior import COUNTS, Prior
 from analysis.inference.runs import Batch
 from analysis.inference.sets import CauseSets
 from analysis.observation.observation import USUAL_NOISE_V
+from sim.catalogue import not_of_unit
 from sim.unit import Unit
 
 __all__ = ["ROWS", "Examples", "Scales", "conditions", "estimated_noise", "read_batch"]
@@ -79,9 +80,9 @@ class Scales:
     most_v: float
 
     @classmethod
-    def of(cls, unit: Unit) -> Scales:
+    def of(cls, unit: Unit, borrowed: bool = False) -> Scales:
         """Scales of a unit of which none are known yet: a few machines are simulated."""
-        return cls(Prior(unit), landmarks(unit), unit.limits.source_vpk)
+        return cls(Prior(unit, borrowed), landmarks(unit), unit.limits.source_vpk)
 
     @classmethod
     def from_facts(cls, unit: Unit, known: Checkpoint) -> Scales:
@@ -96,7 +97,11 @@ class Scales:
     @cached_property
     def size_ends(self) -> NDArray[np.float64]:
         """(P, 2): logarithms of the ends of each size's range."""
-        ends = [p.range(self.prior.unit) for _, p in self.prior.parameters]
+        foreign = not_of_unit(self.prior.unit)
+        ends = [
+            (1.0, 2.0) if effect in foreign else p.range(self.prior.unit)
+            for effect, p in self.prior.parameters
+        ]
         return np.log(np.array([(max(low, 0.01 * high), high) for low, high in ends]))
 
     def place(self, effect: str, parameter: str) -> int:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from analysis.ensemble.machine import Machine, safe_cycles
 from daq.plan import SweepPlan, spaced_frequencies
 from sim.drivetrain import paper_drivetrain
+from sim.engine.linear import smooth_response
 from sim.engine.system import PiecewiseLinearSystem
 from sim.unit import Unit
 
@@ -56,11 +57,8 @@ def reference_response(unit: Unit, frequency_hz: NDArray[np.float64]) -> NDArray
 
     The transfer function with every mesh closed, at s = 2 pi f (i + eta): no pole or zero is near.
     """
-    system = linear_system(unit)
     s = 2.0 * np.pi * np.asarray(frequency_hz, dtype=float) * (1j + _SMOOTHING)
-    eye = np.eye(len(system.b))
-    x = np.linalg.solve(s[..., None, None] * eye - system.A, system.b[:, None].astype(complex))
-    return np.asarray(np.squeeze(system.o @ x, axis=-1))
+    return smooth_response(linear_system(unit), s)
 
 
 def landmarks(unit: Unit) -> Landmarks:

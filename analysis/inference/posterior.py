@@ -25,7 +25,7 @@ from analysis.inference.network import Densities, densities, set_logits, summari
 from analysis.inference.nominal import Nominal, nominal_of, relative
 from analysis.inference.prior import Prior
 from analysis.observation.observation import Observation
-from sim.catalogue import CATALOGUE
+from sim.catalogue import CATALOGUE, not_of_unit
 from sim.unit import Unit
 
 __all__ = ["Posterior", "SetPosterior", "lent_checkpoint", "limits", "swept_levels"]
@@ -80,14 +80,16 @@ class Posterior:
         """The posterior of a unit, from the cache or as it comes with lashbench.
 
         Where there is none, that of another unit: it reads an observation relative to the
-        datasheet, so that much of what it learned holds. None where no other has as many stages.
+        datasheet, so that much of what it learned holds.
         """
         nominal = partial(nominal_of, unit, cache=cache, executor=executor)
         found = find_checkpoint(unit, cache)
         if found is not None:
             return cls(Scales.from_facts(unit, found), found, nominal)
         lent = lent_checkpoint(unit)
-        return None if lent is None else cls(Scales.of(unit), lent, nominal, lent.unit)
+        return (
+            None if lent is None else cls(Scales.of(unit, borrowed=True), lent, nominal, lent.unit)
+        )
 
     def summary(
         self,
@@ -127,9 +129,13 @@ class Posterior:
     def set_probabilities(
         self, summary: NDArray[np.float32], without: Sequence[str] = ()
     ) -> NDArray[np.float64]:
-        """Posterior probability (sets,) of every set of causes; 0 with an effect left out."""
+        """Posterior probability (sets,) of every set of causes; 0 with an effect left out.
+
+        Or with one that the unit cannot have.
+        """
         logits = set_logits(self.checkpoint.weights, self.scales.sets, summary)[0].astype(float)
-        places = [self.scales.prior.effects.index(effect) for effect in without]
+        foreign = not_of_unit(self.scales.prior.unit)
+        places = [i for i, e in enumerate(self.scales.prior.effects) if e in {*without, *foreign}]
         logits[np.isin(self.scales.sets.members, places).any(axis=1)] = -np.inf
         weight = np.exp(logits - logits.max())
         return np.asarray(weight / weight.sum())
@@ -156,8 +162,8 @@ class Posterior:
 
 
 def lent_checkpoint(unit: Unit) -> Checkpoint | None:
-    """A posterior of another unit that has the same causes, sizes and datasheet values."""
-    prior = Prior(unit)
+    """A posterior of another unit, trained for the causes and values of the paper's units."""
+    prior = Prior(unit, borrowed=True)
     counts = len(prior.effects), len(prior.parameters), len(prior.symbols)
     for one in shipped_checkpoints():
         shape = one.shape
@@ -178,6 +184,7 @@ def limits(
     range. What the datasheet says lies inside: it may be so.
     """
     unit, sets = posterior.scales.prior.unit, posterior.scales.sets
+    without = {*without, *not_of_unit(unit)}
     place = {effect: number for number, effect in enumerate(sets.effects)}
     found = []
     for effect in sets.effects:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.ensemble.machine import Machine
-from sim.catalogue import CATALOGUE, EffectParameter
+from sim.catalogue import CATALOGUE, EffectParameter, not_of_unit
 from sim.effects import EffectSetting
 from sim.response import START_SPREAD, Servo
 from sim.unit import Unit
@@ -31,6 +31,12 @@ _RARE_WEIGHT = 0.3
 _EXACT = ("N_1", "N", "b_t_deg", "filter_numerator")
 """Datasheet values without tolerance: gear ratios are counted, total backlash is a cause of its
 own, and the filter's gain at rest is that of the tachometer."""
+
+_TABLE_1 = (
+    "L_a", "R_m", "k_b", "k_t", "J_m", "B_m", "T_f_m", "k_a", "k_ts", "k_g1", "J_g1", "k_s1",
+    "J_s1", "J_p2", "k_2", "J_L", "T_f_L",
+)  # fmt: skip
+"""Datasheet values of the paper's units that may deviate."""
 
 _PAPER = ("R_m", "k_t", "J_L", "k_s1", "k_a", "k_ts")
 _FRICTIONS = ("T_f_m", "T_f_L", "B_m")
@@ -69,19 +75,27 @@ class Prior:
     ----------
     unit
         As its datasheet says.
+    borrowed
+        Whether it is asked in the words of the paper's units, for which the posteriors that come
+        with lashbench were trained: all effects, and the values of their datasheets. What the
+        unit cannot have is then left out of the question.
     """
 
     unit: Unit
+    borrowed: bool = False
 
     @cached_property
     def symbols(self) -> tuple[str, ...]:
         """Datasheet values that may deviate."""
+        if self.borrowed:
+            return _TABLE_1
         return tuple(s for s, v in self.unit.parameters.items() if s not in _EXACT and v != 0.0)
 
     @cached_property
     def effects(self) -> tuple[str, ...]:
         """Effects that this unit can have, in the order of the catalogue."""
-        return tuple(e for e in CATALOGUE if self.unit.stages == 2 or not e.startswith("mesh2-"))
+        foreign = {} if self.borrowed else not_of_unit(self.unit)
+        return tuple(effect for effect in CATALOGUE if effect not in foreign)
 
     @cached_property
     def weights(self) -> NDArray[np.float64]:

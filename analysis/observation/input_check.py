@@ -87,7 +87,8 @@ def check_input(response: FrequencyResponse, unit: Unit) -> Finding:
     """
     refuse_levels(response)
     curves = _curves(response)
-    if not curves:
+    if not curves or (unit.sensor is not None and unit.sensor.at == "load"):
+        # The family is of what the motor shows.
         return Finding(None, False, "", {})
     if all(_is_constant(curve) for curve in curves):
         return Finding(None, True, _FOREIGN.format(unit=unit.name), {})

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.drivetrain import paper_drivetrain
+from sim.engine.linear import chain_factor
 from sim.unit import Unit
 
 __all__ = ["Family", "draw_machines", "neighbours"]
@@ -115,17 +117,31 @@ class Family:
         p = dict(zip(_RANGES, np.exp(logs).T[:, :, None], strict=True))
         s = np.asarray(2j * np.pi * frequency_hz[None, :], dtype=np.complex128)
         motor, electronics = self.unit.motor, self.unit.electronics
-        inertia = motor.J_m * s + motor.B_m * p["motor_loss"]
-        mechanical = inertia + self._train(p, s) / self.unit.stage1.N_1**2
-        k_t, k_b = motor.k_t * p["constant"], motor.k_b * p["constant"]
-        electrical = motor.R_m * p["resistance"] + motor.L_a * s
+        felt = self._train(p, s) / self.unit.stage1.N_1**2
+        if (coupling := self.unit.motor_coupling) is not None:
+            felt = _behind(coupling.k_cm + coupling.c_cm * s, felt + coupling.J_cm * s, s)
+        mechanical = motor.J_m * s + motor.B_m * p["motor_loss"] + felt
+        k_t, k_b = motor.k_t * p["constant"], (motor.k_b or 0.0) * p["constant"]
+        electrical = (motor.R_m or 1.0) * p["resistance"] + (motor.L_a or 0.0) * s
+        if (current := self.unit.amplifier) is not None:
+            electrical = p["resistance"] + s / (2.0 * np.pi * current.bandwidth_hz)
         speed = electronics.k_a * k_t / (electrical * mechanical + k_t * k_b)
-        d2, d1, d0 = electronics.filter_denominator
-        corner = p["corner"]
-        low_pass = electronics.filter_numerator * corner**2
-        low_pass = low_pass / (d2 * s**2 + d1 * corner * s + d0 * corner**2)
-        shown = electronics.k_ts * speed * low_pass / (1.0 + s * p["lag"])
-        return np.asarray(np.log(shown))
+        shown = electronics.k_ts * speed / (1.0 + s * p["lag"])
+        numerator, denominator = electronics.filter_numerator, electronics.filter_denominator
+        if numerator is not None and denominator is not None:
+            d2, d1, d0 = denominator
+            corner = p["corner"]
+            shown = shown * numerator * corner**2 / (d2 * s**2 + d1 * corner * s + d0 * corner**2)
+        return np.asarray(np.log(shown) + np.log(self._read(s)))
+
+    def _read(self, s: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """What a clock, an encoder and a stated delay do."""
+        if self.unit.sampling is None and self.unit.sensor is None:
+            return np.ones_like(s)
+        sensor = self.unit.sensor
+        position = sensor is not None and sensor.reads == "position"
+        system = paper_drivetrain(self.unit, 1.0).system()
+        return chain_factor(system, s) / (s if position else 1.0)
 
     def _train(self, p: Mapping[str, Vector], s: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """Torque over speed (machines, frequencies) at gear 1."""
@@ -140,6 +156,8 @@ class Family:
         swinging = p["payload"] * load.J_L * force / (force + s**2)
         felt = (load.J_L * p["inertia"] + swinging) * s
         felt = felt + critical * p["load_loss"] + at_load * p["cable"] / s
+        if (coupling := self.unit.load_coupling) is not None:
+            felt = _behind(coupling.k_cL + coupling.c_cL * s, felt, s) + coupling.J_cL * s
         if self.unit.stage2 is not None:
             felt = _behind(self.unit.stage2.k_2 + 0.0 * s, felt, s) / self.unit.stage2.N**2
             felt = felt + (stage1.J_p2 or 0.0) * s
@@ -152,5 +170,5 @@ class Family:
 def _behind(
     stiffness: NDArray[np.complex128], felt: NDArray[np.complex128], s: NDArray[np.complex128]
 ) -> NDArray[np.complex128]:
-    """What is felt through a spring."""
+    """What is felt through a spring, or a spring and a damper."""
     return np.asarray(1.0 / (s / stiffness + 1.0 / felt))

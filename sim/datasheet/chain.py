@@ -56,21 +56,29 @@ def inertias_at_motor(unit: Unit) -> dict[str, float]:
         "gear 1": stage1.J_g1 / first**2,
         "shaft 1": stage1.J_s1 / first**2,
     }
+    if unit.motor_coupling is not None:
+        parts["pinion 1"] = unit.motor_coupling.J_cm
     if stage1.J_p2 is not None:
         parts["pinion 2"] = stage1.J_p2 / first**2
+    if unit.load_coupling is not None:
+        parts["hub"] = unit.load_coupling.J_cL / whole**2
     return parts | {"load": unit.load.J_L / whole**2}
 
 
 def describe_chain(unit: Unit) -> list[str]:
     """The drive from motor to load in lines of text of at most 80 characters."""
     stage1, stage2, ratio = unit.stage1, unit.stage2, unit.stage1.N_1 * unit.output_ratio
-    lines = [
-        f"motor      J_m {unit.motor.J_m:.4g} kg.m^2",
+    lines = [*_drive_lines(unit), f"motor      J_m {unit.motor.J_m:.4g} kg.m^2"]
+    if (coupling := unit.motor_coupling) is not None:
+        lines.append(f"  coupling k_cm {coupling.k_cm:.4g} N.m/rad")
+    lines += [
         f"  stage 1  {stage1.N_1:.5g} : 1, mesh k_g1 {stage1.k_g1:.4g} N.m/rad",
         f"shaft 1    k_s1 {stage1.k_s1:.4g} N.m/rad",
     ]
     if stage2 is not None:
         lines.append(f"  stage 2  {stage2.N:.5g} : 1, mesh k_2 {stage2.k_2:.4g} N.m/rad")
+    if (last := unit.load_coupling) is not None:
+        lines.append(f"  coupling k_cL {last.k_cL:.4g} N.m/rad")
     lines.append(f"load       J_L {unit.load.J_L:.4g} kg.m^2")
     parts = inertias_at_motor(unit)
     total, play = sum(parts.values()), unit.backlash.b_t_deg
@@ -83,6 +91,23 @@ def describe_chain(unit: Unit) -> list[str]:
         f"total backlash: {play:.4g} deg at the load, {play * ratio:.4g} deg at the motor",
         *_frequency_lines(unit),
     ]
+    return lines
+
+
+def _drive_lines(unit: Unit) -> list[str]:
+    """Amplifier, clock and sensor, where they are not those of the paper."""
+    lines = []
+    if (current := unit.amplifier) is not None:
+        most = current.current_limit_a
+        limit = "" if most is None else f", at most {most:g} A"
+        lines.append(f"amplifier  controls the current, to {current.bandwidth_hz:g} Hz{limit}")
+    if (clock := unit.sampling) is not None:
+        held = "held" if clock.holds_command else "continuous"
+        lines.append(f"clock      {clock.rate_hz:g} Hz, command {held}")
+    if (sensor := unit.sensor) is not None:
+        counts = "" if sensor.counts is None else f", {sensor.counts:.0f} counts a turn"
+        late = f", {1e3 * sensor.delay_s:g} ms late" if sensor.delay_s else ""
+        lines.append(f"sensor     {sensor.kind} at the {sensor.at}, {sensor.reads}{counts}{late}")
     return lines
 
 

@@ -28,6 +28,11 @@ _SECTIONS = {
     "load": ("J_L", "T_f_L"),
     "backlash": ("b_t_deg",),
     "limits": ("source_vpk", "source_offset_v", "start_hz", "stop_hz"),
+    "amplifier": ("bandwidth_hz", "current_limit_a"),
+    "sampling": ("rate_hz",),
+    "sensor": ("counts", "delay_s"),
+    "motor_coupling": ("k_cm", "c_cm", "J_cm"),
+    "load_coupling": ("k_cL", "c_cL", "J_cL"),
 }
 KEYS = {symbol: f"{name}.{symbol}" for name, symbols in _SECTIONS.items() for symbol in symbols}
 """Where a value stands in a unit file, by symbol."""
@@ -103,6 +108,13 @@ _SINGLES = (
     _single("source_offset_v", (0.0, 100.0), (0.0, 1e5)),
     _single("start_hz", (1e-4, 1e4), (1e-7, 1e7)),
     _single("stop_hz", (1e-2, 1e5), (1e-6, 1e8)),
+    _single("bandwidth_hz", (20.0, 2e4), (0.1, 1e6)),
+    _single("current_limit_a", (0.02, 1e3), (1e-4, 1e6)),
+    _single("rate_hz", (50.0, 1e5), (0.1, 1e5)),
+    _single("counts", (64.0, 5e7), (4.0, 1e9), "counts in a turn are four times the lines"),
+    _single("delay_s", (0.0, 0.02), (0.0, 0.1)),
+    *(_single(symbol, *_STIFFNESS) for symbol in ("k_cm", "k_cL")),
+    *(_single(symbol, *_INERTIA) for symbol in ("J_cm", "J_cL")),
 )
 
 
@@ -111,7 +123,10 @@ def _total(v: Values) -> float:
 
 
 def _stall_torque(v: Values) -> float:
-    return v["k_t"] * v["k_a"] * (v["source_vpk"] + v["source_offset_v"]) / v["R_m"]
+    volts = v["source_vpk"] + v["source_offset_v"]
+    if "R_m" in v:
+        return v["k_t"] * v["k_a"] * volts / v["R_m"]
+    return v["k_t"] * min(v["k_a"] * volts, v.get("current_limit_a", math.inf))
 
 
 def _friction(v: Values) -> float:
@@ -126,7 +141,30 @@ def _part_at_motor(symbol: str) -> Range:
     )  # fmt: skip
 
 
+def _samples_a_cycle(v: Values) -> float:
+    return v["rate_hz"] / v["stop_hz"]
+
+
 _DRIVEN = ("k_t", "k_a", "R_m", "source_vpk", "source_offset_v", "N_1")
+_BY_CURRENT = ("k_t", "k_a", "bandwidth_hz", "source_vpk", "source_offset_v", "N_1")
+
+
+def _frictions(driven: tuple[str, ...]) -> tuple[Range, Range]:
+    return (
+        Range(
+            ("T_f_m", *driven), (0.0, 0.5), (0.0, 5.0), lambda v: v["T_f_m"] / _stall_torque(v),
+            "it is {value} times the motor's torque at the highest source level of [limits]",
+            remedy="friction holds the motor still at every level; raise limits.source_vpk",
+        ),
+        Range(
+            ("T_f_L", "T_f_m", *driven), (0.0, 0.5), (0.0, 5.0), _friction,
+            "friction of motor and load is {value} times the motor's torque at the highest source "
+            "level of [limits]",
+            remedy="friction holds the drive still at every level; raise limits.source_vpk",
+        ),
+    )  # fmt: skip
+
+
 _COMBINED = (
     Range(
         ("k_b", "k_t"), (0.7, 1.4), (0.25, 4.0), lambda v: v["k_b"] / v["k_t"],
@@ -156,17 +194,8 @@ _COMBINED = (
         ("B_m", "J_m"), (0.0, 3e3), (0.0, 1e8), lambda v: v["B_m"] / v["J_m"],
         "B_m/J_m, the rate at which viscous friction stops the motor, is {value} 1/s", "1/s",
     ),
-    Range(
-        ("T_f_m", *_DRIVEN), (0.0, 0.5), (0.0, 5.0), lambda v: v["T_f_m"] / _stall_torque(v),
-        "it is {value} times the motor's torque at the highest source level of [limits]",
-        remedy="friction holds the motor still at every level; raise limits.source_vpk",
-    ),
-    Range(
-        ("T_f_L", "T_f_m", *_DRIVEN), (0.0, 0.5), (0.0, 5.0), _friction,
-        "friction of motor and load is {value} times the motor's torque at the highest source "
-        "level of [limits]",
-        remedy="friction holds the drive still at every level; raise limits.source_vpk",
-    ),
+    *_frictions(_DRIVEN),
+    *_frictions(_BY_CURRENT),
     Range(
         ("k_ts", "k_a", "k_b", "source_vpk"), (0.0, 2000.0), (0.0, 1e9),
         lambda v: v["k_a"] * v["k_ts"] / v["k_b"] * v["source_vpk"],
@@ -193,6 +222,23 @@ _COMBINED = (
         ("start_hz", "stop_hz"), (0.0, 0.9), (0.0, 0.999), lambda v: v["start_hz"] / v["stop_hz"],
         "it is {value} times limits.stop_hz",
         remedy="the limits leave no band for a sweep",
+    ),
+    Range(
+        ("rate_hz", "stop_hz"), (4.0, math.inf), (2.0, math.inf), _samples_a_cycle,
+        "it is {value} times limits.stop_hz",
+        remedy="a clock shows nothing above half of its rate; lower limits.stop_hz",
+    ),
+    Range(
+        ("bandwidth_hz", "stop_hz"), (0.5, math.inf), (0.01, math.inf),
+        lambda v: v["bandwidth_hz"] / v["stop_hz"],
+        "the current loop's bandwidth is {value} times limits.stop_hz",
+    ),
+    Range(
+        ("current_limit_a", "k_a", "source_vpk"), (0.2, math.inf), (0.0, math.inf),
+        lambda v: v["current_limit_a"] / (v["k_a"] * v["source_vpk"]),
+        "it is {value} times the current that limits.source_vpk asks for",
+        remedy="the amplifier clips at most levels; lower limits.source_vpk, or see whether k_a is "
+        "in A/V",
     ),
 )  # fmt: skip
 
@@ -299,17 +345,28 @@ def _distance(value: float, bounds: tuple[float, float]) -> float:
 
 
 def _values(unit: Unit) -> dict[str, float]:
+    limits = unit.limits
+    return (
+        unit.parameters
+        | _filter_values(unit)
+        | {
+            "source_vpk": limits.source_vpk,
+            "source_offset_v": limits.source_offset_v,
+            "start_hz": limits.start_hz,
+            "stop_hz": limits.stop_hz,
+        }
+    )
+
+
+def _filter_values(unit: Unit) -> dict[str, float]:
+    if unit.electronics.filter_denominator is None:
+        return {}
     first, second, third = unit.electronics.filter_denominator
     omega = math.sqrt(third / first)
-    limits = unit.limits
-    return unit.parameters | {
+    return {
         "filter_denominator": third,
         "corner_hz": omega / (2.0 * math.pi),
         "filter_damping": second / (2.0 * first * omega),
-        "source_vpk": limits.source_vpk,
-        "source_offset_v": limits.source_offset_v,
-        "start_hz": limits.start_hz,
-        "stop_hz": limits.stop_hz,
     }
 
 

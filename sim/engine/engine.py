@@ -28,7 +28,7 @@ from sim.engine.layout import STEPS_SEEN, Layout, Structure
 from sim.engine.propagator import Modes, Propagator, build_propagator, find_modes
 from sim.engine.solving import kinds_of, law_coefficients, law_parameters, order_of
 from sim.engine.stepping import Asking, Steps, step_together
-from sim.engine.system import PiecewiseLinearSystem
+from sim.engine.system import PiecewiseLinearSystem, Reading, held
 
 __all__ = ["HARMONICS", "LONGEST_STEP_S", "Motion", "Stretch", "advance", "carry", "carry_each"]
 
@@ -69,8 +69,9 @@ class Motion:
     """What came of one stretch.
 
     `coefficients` (cycles, 4, lanes): V_o = Im(sum_k C_k exp(i k (2 pi f t + phase)))
-    for harmonics k of 1 to 3; C_0 is the mean, in V. `peak` (lanes,): largest
-    |V_o| in the kept cycles, V. `state` (n, lanes): the state at the end. `step_s`: its time step.
+    for harmonics k of 1 to 3, as the bench records it; C_0 is the mean, in V. `peak` (lanes,):
+    largest |V_o| in the kept cycles, V. `state` (n and 5 per sampled law, lanes): the state at the
+    end. `step_s`: its time step.
     """
 
     coefficients: NDArray[np.complex128]
@@ -96,7 +97,8 @@ def advance(
     parameters
         (m, 3, lanes): the parameters of each law in each lane.
     state
-        (n, lanes): physical state at the start; not changed.
+        (n and 5 per sampled law, lanes): physical state at the start, and what sampled laws hold
+        (`sim.servo.states_at_start`); not changed.
     stretches
         What is driven, in order.
     longest_step_s
@@ -238,6 +240,17 @@ class _Moving:
         return np.array([*feedthrough, 0.0])[:, None]
 
     @cached_property
+    def direct(self) -> NDArray[np.float64]:
+        """(m + 1, m): what laws and output see of forces without any state between."""
+        laws = self.system.nonlinearities
+        found = np.zeros((len(laws) + 1, len(laws)))
+        for j, law in enumerate(laws):
+            found[-1, j] = law.read
+            for k, coefficient in law.hears:
+                found[j, k] = coefficient
+        return found
+
+    @cached_property
     def look(self) -> NDArray[np.float64]:
         """(m + 1, p): the same of the coordinates."""
         return self.rows @ self.modes.shapes
@@ -265,6 +278,9 @@ def _dwell(
     through = _times(moving.rows, forced) + moving.through * phasor
     waves = np.stack([through.real, through.imag, moving.through * stretch.offset], axis=1)
     gain = moving.look @ propagator.push
+    if moving.direct.any():
+        gain = gain + moving.direct
+    state, kept = state[: len(system.b)], state[len(system.b) :]
     layout, coefficients = _program(
         moving, propagator, gain, bool(drift.any() or stretch.offset.any())
     )
@@ -277,7 +293,8 @@ def _dwell(
             "force": np.zeros((len(moving.kinds), state.shape[1])),
             "drift": drift,
             "waves": waves.reshape(-1, state.shape[1]),
-            "parameters": law_parameters(moving.kinds, parameters, gain),
+            "parameters": law_parameters(moving.kinds, parameters, gain, propagator.step_s),
+            "held": kept,
         },
         propagator.steps_per_cycle,
         stretch.settle_cycles,
@@ -285,6 +302,8 @@ def _dwell(
     )
     turn = np.exp(-1j * np.outer(np.arange(HARMONICS), stretch.phase))
     turn[0] = 1.0
+    if system.reading != Reading() or moving.direct[-1].any():
+        turn = turn * _recorded(moving, propagator)[:, None]
     # The last forces push the coordinates in the step that is not made any more.
     end = stepped.q + _times(propagator.push, stepped.force)
     # Motion that grew without bound is not finite: `carry` says so.
@@ -294,7 +313,7 @@ def _dwell(
         return Motion(
             _coefficients(stepped.sums, propagator.steps_per_cycle) * turn,
             stepped.peak,
-            _times(modes.shapes, end) + forced.imag,
+            np.concatenate([_times(modes.shapes, end) + forced.imag, stepped.held]),
             propagator.step_s,
         )
 
@@ -326,6 +345,16 @@ def _program(
         law_coefficients(moving.kinds, gain, fixed),
     ]
     return Layout(structure), np.concatenate([part.ravel() for part in parts])
+
+
+def _recorded(moving: _Moving, propagator: Propagator) -> NDArray[np.complex128]:
+    """On each harmonic (4,): what is between the output and the bench's records."""
+    omega = 2j * np.pi * propagator.frequency_hz * np.arange(HARMONICS)
+    factor = moving.system.reading.factor(omega)
+    if moving.direct[-1].any():
+        # The kernel reads means over the steps since it last looked.
+        factor = factor / held(omega * STEPS_SEEN * propagator.step_s)
+    return factor
 
 
 def _times(matrix: NDArray[np.float64], columns: NDArray) -> NDArray:

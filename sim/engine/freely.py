@@ -11,7 +11,6 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from typing import Generic, TypeVar
 
-import numpy as np
 from numpy.typing import NDArray
 
 from sim.engine.independent import Block, wave_table
@@ -69,14 +68,8 @@ class _Dwell:
     """What one asked for, and what came of it so far."""
 
     def __init__(self, asker: int, steps: Steps) -> None:
-        layout, count = steps.layout, steps.count
-        self.asker, self.steps, self.left = asker, steps, count
-        self.stepped = Stepped(
-            np.empty((steps.kept_cycles, SUMS, count)),
-            np.empty(count),
-            np.empty((layout.p, count)),
-            np.empty((layout.m, count)),
-        )
+        self.asker, self.steps, self.left = asker, steps, steps.count
+        self.stepped = Stepped.room(steps.layout, steps.kept_cycles, steps.count)
 
 
 class _Lane:
@@ -100,6 +93,7 @@ class _Lane:
         stepped.peak[self.number] = rows["peak"][0]
         stepped.q[:, self.number] = rows["q"]
         stepped.force[:, self.number] = rows["force"]
+        stepped.held[:, self.number] = rows["held"]
         self.dwell.left -= 1
         return not self.dwell.left
 

@@ -195,6 +195,7 @@ class _Independent(Program):
             self._step(self._own_waves(further, 2))
         at = self._own_waves(emit.add(offset, _INT(2 * STEPS_SEEN * size)), SUMS - 1)
         self._accumulate(at, self._output(at))
+        self._look_anew()
 
     def _go_on(self, lane: Any) -> None:
         """What a lane does when all have made the same number of blocks."""

@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 
 from sim.engine import laws
 from sim.engine.lanes import VECTOR_BYTES, Code, Lanes, greatest
-from sim.engine.layout import PAIR, STEPS_SEEN, STRIBECK, SUMS, Layout, Structure
+from sim.engine.layout import HELD, PAIR, STEPS_SEEN, STRIBECK, SUMS, Layout, Structure
 from sim.engine.machine_code import architecture, compiled, multiplies_and_adds
-from sim.engine.system import Law
+from sim.engine.system import SAMPLED, Law
 
 __all__ = ["FIRST_SWEEPS", "MOST_VECTORS", "Program", "step_cycles"]
 
@@ -150,6 +150,7 @@ class Program:
             with self._emit.if_then(kept):
                 at = self._wave_at(self._emit.add(first, _INT(STEPS_SEEN - 1)))
                 self._accumulate(at, self._output(at))
+            self._look_anew()
         with self._emit.if_then(kept):
             self._hand_over(number)
 
@@ -247,6 +248,8 @@ class Program:
         """The force of law j, or of a pair of them, in some vectors."""
         kind, m = self._structure.kinds[j], self._layout.m
         y0 = self._load("seen", j, some)
+        if kind in SAMPLED:
+            return [self._sampler(j, some).force(y0, ahead[0])]
         a, b, c = (lambda i=i: self._load("parameters", 3 * j + i, some) for i in range(3))
         fixed = [self._take("law", 7 * j + i, some) for i in range(7)]
         if kind == Law.PLAY:
@@ -277,8 +280,23 @@ class Program:
         m = self._layout.m
         force = [self._load("force", j, self._all) for j in range(m)]
         seen = [self._felt(j, there, force, range(m), self._all) for j, there in enumerate(free)]
+        for j in self._layout.sampled:
+            now = self._sampler(j, self._all).after(self._load("seen", j, self._all), seen[j])
+            summed = self._load("held", self._held(j) + 4, self._all) + force[j]
+            for i, kept in zip((0, 2, 3, 4), (*now, summed), strict=True):
+                self._store("held", self._held(j) + i, kept, self._all)
         for j, there in enumerate(seen):
             self._store("seen", j, there, self._all)
+
+    def _held(self, j: int) -> int:
+        """The first of the rows in which sampled law j keeps what it holds."""
+        return HELD * self._layout.sampled.index(j)
+
+    def _sampler(self, j: int, some: Sequence[int]) -> laws.Sampler:
+        kept = (self._load("held", self._held(j) + i, some) for i in range(4))
+        numbers = (self._load("parameters", 3 * j + i, some) for i in range(3))
+        kind = self._structure.kinds[j]
+        return laws.Sampler(kind != Law.HOLD, kind == Law.COUNT_RATE, *kept, *numbers)
 
     def _output(self, at: Any) -> Lanes:
         """The output where the last step ended."""
@@ -288,7 +306,17 @@ class Program:
             at_i = self._take("look", m * p + i, self._all)
             seen = at_i * self._load("q", i, self._all) + seen
         force = [self._load("force", j, self._all) for j in range(m)]
+        for j in self._layout.sampled:
+            # Seen now and then, steps would be seen late by half of the time between.
+            summed = self._load("held", self._held(j) + 4, self._all)
+            force[j] = (summed * (1.0 / STEPS_SEEN)).lanes()
         return self._felt(m, seen, force, range(m), self._all)
+
+    def _look_anew(self) -> None:
+        """Begin the sums of sampled laws anew, once the output was or could have been looked at."""
+        for j in self._layout.sampled:
+            zero = self._code.constant(0.0, len(self._all))
+            self._store("held", self._held(j) + 4, zero, self._all)
 
     def _felt(
         self, j: int, free: Lanes, force: Sequence[Lanes], of: Sequence[int], some: Sequence[int]

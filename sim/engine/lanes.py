@@ -64,6 +64,7 @@ class Code:
         self._fma = ir.Function(module, ir.FunctionType(self.vector, three), f"llvm.fma.{kind}")
         self._fabs = ir.Function(module, ir.FunctionType(self.vector, one), f"llvm.fabs.{kind}")
         kind_of_two = ir.FunctionType(self.vector, [self.vector] * 2)
+        self._floor = ir.Function(module, ir.FunctionType(self.vector, one), f"llvm.floor.{kind}")
         self._copysign = ir.Function(module, kind_of_two, f"llvm.copysign.{kind}")
         self._fused = fused
 
@@ -76,6 +77,10 @@ class Code:
     def magnitude(self, a: Any) -> Any:
         """One vector |a|."""
         return self.builder.call(self._fabs, [a])
+
+    def floor(self, a: Any) -> Any:
+        """One vector of the largest whole numbers that are not above a."""
+        return self.builder.call(self._floor, [a])
 
     def signed_as(self, a: Any, b: Any) -> Any:
         """One vector |a| with the signs of b."""
@@ -225,6 +230,10 @@ class Lanes:
 
     def __abs__(self) -> Lanes:
         return Lanes(self.code, [self.code.magnitude(one) for one in self.vectors])
+
+    def floor(self) -> Lanes:
+        """The largest whole number that is not above it."""
+        return Lanes(self.code, [self.code.floor(one) for one in self.vectors])
 
     def __lt__(self, other: Number) -> Choice:
         return self._compare("<", other)

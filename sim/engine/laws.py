@@ -19,6 +19,7 @@ from sim.engine.lanes import Choice, Lanes, Number, between, greatest, least
 
 __all__ = [
     "PlayOverStep",
+    "Sampler",
     "cubic_force",
     "cubic_pair",
     "excess_force",
@@ -138,6 +139,56 @@ def excess_force(y0: Lanes, y1: Lanes, limit: Lanes) -> Lanes:
     moved = y1 - y0
     q = (c1 - c0) / moved.is_zero().choose(1.0, moved)
     return ((1.0 - q) * (y0 - c0 + y1 - c1) * -0.5).lanes()
+
+
+@dataclass(frozen=True, slots=True)
+class Sampler:
+    """A law that a clock samples: where it stands before a step, and its numbers.
+
+    `phase` of the clock, which ticks at 1; `offset` of the counts; `last` count; `value` that is
+    held. `advance`: of the phase in a step. `per_count`: counts per unit of y, `scale`: value per
+    count, neither used by one that does not count. `differs`: the value is that of the change.
+    """
+
+    counts: bool
+    differs: bool
+    phase: Lanes
+    offset: Lanes
+    last: Lanes
+    value: Lanes
+    advance: Lanes
+    per_count: Lanes
+    scale: Lanes
+
+    def force(self, y0: Lanes, y1: Lanes) -> Lanes:
+        """Mean of the held value over the step, in which y goes from y0 to y1."""
+        ticks, share = self._tick()
+        _, new = self._sampled(y0, y1, share)
+        return ticks.choose((1.0 - share) * (new - self.value) + self.value, self.value)
+
+    def after(self, y0: Lanes, y1: Lanes) -> tuple[Lanes, Lanes, Lanes]:
+        """Phase, last count and value after the step."""
+        ticks, share = self._tick()
+        count, new = self._sampled(y0, y1, share)
+        turned = self.phase + self.advance
+        return (
+            ticks.choose(turned - 1.0, turned),
+            ticks.choose(count, self.last),
+            ticks.choose(new, self.value),
+        )
+
+    def _tick(self) -> tuple[Choice, Lanes]:
+        """Whether the clock ticks, and after which share of the step."""
+        return self.phase + self.advance >= 1.0, (1.0 - self.phase) / self.advance
+
+    def _sampled(self, y0: Lanes, y1: Lanes, share: Lanes) -> tuple[Lanes, Lanes]:
+        """Count and value at the tick."""
+        y = share * (y1 - y0) + y0
+        if not self.counts:
+            return self.last, y
+        count = (y * self.per_count + self.offset).floor()
+        since = self.last if self.differs else self.offset - 0.5
+        return count, ((count - since) * self.scale).lanes()
 
 
 def cubic_mean(y0: Lanes, y1: Lanes, quarter: Lanes) -> Lanes:

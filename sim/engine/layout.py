@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.engine.lanes import VECTOR_BYTES
+from sim.engine.system import SAMPLED
 
-__all__ = ["PAIR", "STEPS_SEEN", "STRIBECK", "SUMS", "Layout", "Structure"]
+__all__ = ["HELD", "PAIR", "STEPS_SEEN", "STRIBECK", "SUMS", "Layout", "Structure"]
 
 STRIBECK = 4
 """Kind of a friction that peaks at rest; the other kinds are those of `sim.engine.system.Law`."""
@@ -23,6 +24,10 @@ PAIR = 5
 
 STEPS_SEEN = 4
 """The output is looked at after so many steps each time; what passed its filter moves slowly."""
+
+HELD = 5
+"""Numbers that a sampled law keeps: phase of its clock, offset of its counts, last count, value,
+and the sum of its forces since the output was last looked at."""
 
 SUMS = 7
 """Sums kept of every cycle; the largest magnitude of the output is kept over all."""
@@ -54,7 +59,8 @@ class Layout:
     Of lanes: `q` coordinates, `seen` what laws and output see at the start of a step,
     `force`, `drift` what is added to the coordinates in every step, `waves` sine,
     cosine and constant part of what the drive alone makes laws and output see,
-    `parameters` three of each law, `sums` and `peak` of the output so far.
+    `parameters` three of each law, `held` five of each sampled law, `sums` and `peak` of the
+    output so far.
 
     Of coefficients, which all lanes share: `carry` (p, 2 or p), `push` (p, m), `look`
     (m + 1, p), `gain` (m + 1, m): see `sim.engine.propagator.Propagator`; look and gain are what
@@ -70,6 +76,11 @@ class Layout:
         return len(self.structure.kinds)
 
     @property
+    def sampled(self) -> tuple[int, ...]:
+        """Numbers of the laws that a clock samples."""
+        return tuple(j for j, kind in enumerate(self.structure.kinds) if kind in SAMPLED)
+
+    @property
     def p(self) -> int:
         """Number of coordinates."""
         return len(self.structure.heard)
@@ -79,7 +90,7 @@ class Layout:
         """Rows of what every lane has."""
         m, p = self.m, self.p
         return _rows(q=p, seen=m + 1, force=m, drift=p, waves=3 * m + 3, parameters=3 * m,
-                     sums=SUMS, peak=1)  # fmt: skip
+                     held=HELD * len(self.sampled), sums=SUMS, peak=1)  # fmt: skip
 
     @cached_property
     def coefficients(self) -> dict[str, range]:

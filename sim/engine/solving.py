@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.engine.layout import PAIR, STRIBECK
-from sim.engine.system import Law, Nonlinearity
+from sim.engine.system import SAMPLED, Law, Nonlinearity
 
 __all__ = ["kinds_of", "law_coefficients", "law_parameters", "order_of"]
 
@@ -116,12 +116,15 @@ def law_coefficients(
 
 
 def law_parameters(
-    kinds: Sequence[int], parameters: NDArray[np.float64], gain: NDArray[np.float64]
+    kinds: Sequence[int],
+    parameters: NDArray[np.float64],
+    gain: NDArray[np.float64],
+    step_s: float,
 ) -> NDArray[np.float64]:
     """(3 m, lanes) parameters, and in free places what follows from them and does not change.
 
     `parameters` (m, 3, lanes). Of a play its lower end, of a friction by how much it can slow the
-    motion down within a step.
+    motion down within a step. Of a sampled law see `sim.engine.laws.Sampler`.
     """
     found = parameters.copy()
     for j, kind in enumerate(kinds):
@@ -129,4 +132,10 @@ def law_parameters(
             found[j, 1] = -found[j, 0]
         elif kind == Law.FRICTION:
             found[j, 1] = gain[j, j] * found[j, 0]
+        elif kind in SAMPLED:
+            rate, size = parameters[j, :2]
+            found[j, 0] = rate * step_s
+            if kind != Law.HOLD:
+                found[j, 1] = 1.0 / size
+                found[j, 2] = size * rate if kind == Law.COUNT_RATE else size
     return found.reshape(3 * len(kinds), found.shape[-1])

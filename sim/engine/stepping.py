@@ -62,13 +62,25 @@ class Stepped:
     """What came of it.
 
     `sums` (cycles, 7, lanes): see `sim.engine.kernel.step_cycles`; `peak` (lanes,): largest
-    magnitude of the output; `q` (p, lanes), `force` (m, lanes): how the lanes end.
+    magnitude of the output; `q` (p, lanes), `force` (m, lanes), `held` (5 per sampled law, lanes):
+    how the lanes end.
     """
 
     sums: NDArray[np.float64]
     peak: NDArray[np.float64]
     q: NDArray[np.float64]
     force: NDArray[np.float64]
+    held: NDArray[np.float64]
+
+    @classmethod
+    def room(cls, layout: Layout, cycles: int, count: int) -> Stepped:
+        """Room for what comes of so many kept cycles and lanes."""
+        rows = {name: len(layout.lanes[name]) for name in ("q", "force", "held")}
+        return cls(
+            np.empty((cycles, SUMS, count)),
+            np.empty(count),
+            *(np.empty((rows[name], count)) for name in rows),
+        )
 
 
 Asking = Generator[Steps, Stepped, T]
@@ -155,15 +167,7 @@ def _step(lot: Sequence[Steps]) -> list[Stepped]:
     """What comes of those that one program steps."""
     layout, cycles = lot[0].layout, lot[0].kept_cycles
     rows = {name: slice(at.start, at.stop) for name, at in layout.lanes.items()}
-    done = [
-        Stepped(
-            np.empty((cycles, SUMS, one.count)),
-            np.empty(one.count),
-            np.empty((layout.p, one.count)),
-            np.empty((layout.m, one.count)),
-        )
-        for one in lot
-    ]
+    done = [Stepped.room(layout, cycles, one.count) for one in lot]
     for call in _calls(lot):
         block = layout.blank(rows["peak"].stop, sum(of.size for of in call.values()))
         own, at = {}, 0
@@ -180,6 +184,7 @@ def _step(lot: Sequence[Steps]) -> list[Stepped]:
             done[i].peak[of] = block[rows["peak"].start, own[i]]
             done[i].q[:, of] = block[rows["q"], own[i]]
             done[i].force[:, of] = block[rows["force"], own[i]]
+            done[i].held[:, of] = block[rows["held"], own[i]]
     return done
 
 

@@ -5,12 +5,12 @@ memoryless, piecewise-linear feedbacks, and the bookkeeping that builds it. It
 knows neither gears nor gimbals, and never touches time.
 
     x'  = A x + b u + f + sum_j g_j p_j          y_j = c_j x + d_j u
-    V_o = o x                                    p_j = law_j(y_j)
+    V_o = o x + sum_j r_j p_j                    p_j = law_j(y_j)
 
 A mesh with play enters as its closed stiffness in A and a bounded force p_j
 that takes the play back out. With the play at zero nothing but the linear
 system remains, and while a mesh is in contact p_j is constant: both cases are
-then stepped exactly.
+then stepped exactly. A law that a clock samples has a memory besides.
 """
 
 from __future__ import annotations
@@ -18,13 +18,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from daq.errors import ConfigurationError
 
-__all__ = ["Assembly", "Law", "Nonlinearity", "PiecewiseLinearSystem"]
+__all__ = ["SAMPLED", "Assembly", "Law", "Nonlinearity", "PiecewiseLinearSystem", "Reading"]
 
 Along = Mapping[str, float]
 """A direction over coordinates: the torque tau acts as tau * coefficient on each of them."""
@@ -41,6 +42,16 @@ class Law(IntEnum):
     """p = clip(z, -limit, limit) - z with z = y - centre. Parameters limit, centre."""
     CUBIC = 3
     """p = -k y^3. Parameter k."""
+    HOLD = 6
+    """p = y at the last tick of a clock. Parameter: its rate in Hz."""
+    COUNT = 7
+    """p = y at the last tick in whole counts. Parameters: rate, size of a count."""
+    COUNT_RATE = 8
+    """p = rate times the change of the counts from tick to tick. Parameters: rate, size."""
+
+
+SAMPLED = frozenset({Law.HOLD, Law.COUNT, Law.COUNT_RATE})
+"""Laws that see y at the ticks of a clock alone. All clocks of a system tick together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +59,9 @@ class Nonlinearity:
     """One scalar feedback p = law(y) of a piecewise-linear system.
 
     `inlet` is g, `outlet` is c (both shape (n,)), `feedthrough` is d;
-    `stiffness` and `damping` are those of a play when it is closed.
+    `stiffness` and `damping` are those of a play when it is closed. `read` is r, what the output
+    takes of p; `smooth` (n,) what a sampled law would see without a clock and without counts;
+    `hears`: numbers of earlier laws whose forces are part of y, with their coefficients.
     """
 
     name: str
@@ -59,6 +72,32 @@ class Nonlinearity:
     stiffness: float
     damping: float
     parameters: tuple[float, float, float]
+    read: float = 0.0
+    smooth: NDArray[np.float64] | None = None
+    hears: tuple[tuple[int, float], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What becomes of the output on its way to the bench's records.
+
+    `delay_s`: it comes so late. `sample_s`: above 0 the bench records samples of this period,
+    and not what is held between them.
+    """
+
+    delay_s: float = 0.0
+    sample_s: float = 0.0
+
+    def factor(self, s: NDArray[Any]) -> NDArray[np.complex128]:
+        """On a Fourier coefficient at complex angular frequencies s, rad/s."""
+        return np.asarray(np.exp(-s * self.delay_s) / held(s * self.sample_s))
+
+
+def held(turn: NDArray[Any]) -> NDArray[np.complex128]:
+    """Gain of holding samples of period T, at s T: (1 - exp(-s T)) / (s T), and 1 at 0."""
+    turn = np.asarray(turn, dtype=complex)
+    still = turn == 0.0
+    return np.where(still, 1.0, -np.expm1(-turn) / np.where(still, 1.0, turn))
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,13 +116,19 @@ class PiecewiseLinearSystem:
     nonlinearities: tuple[Nonlinearity, ...]
     states: tuple[str, ...]
     energy: NDArray[np.float64]
+    reading: Reading = Reading()
+
+    @property
+    def sampled(self) -> tuple[Nonlinearity, ...]:
+        """The laws that a clock samples."""
+        return tuple(law for law in self.nonlinearities if law.law in SAMPLED)
 
     def transfer(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Linear response V_o/u with every mesh closed and no friction, shape of the input."""
+        from sim.engine.linear import sampled_response, smooth_response
+
         s = 2j * np.pi * np.asarray(frequency_hz, dtype=float)
-        eye = np.eye(len(self.b))
-        x = np.linalg.solve(s[..., None, None] * eye - self.A, self.b[:, None].astype(complex))
-        return np.asarray(np.squeeze(self.o @ x, axis=-1))
+        return sampled_response(self, s) if self.sampled else smooth_response(self, s)
 
 
 @dataclass(slots=True)
@@ -98,6 +143,7 @@ class Assembly:
     inertias: dict[str, float] = field(default_factory=dict)
     signals: list[str] = field(default_factory=list)
     output: dict[str, float] = field(default_factory=lambda: {"V_o": 1.0})
+    reading: Reading = Reading()
     _torques: list[tuple[Along, Along, float, float]] = field(default_factory=list)
     _couplings: list[tuple[str, str, float]] = field(default_factory=list)
     _inputs: dict[str, float] = field(default_factory=dict)
@@ -105,6 +151,8 @@ class Assembly:
     _laws: list[tuple[str, Law, Along, Along, float, float, float, tuple[float, ...]]] = field(
         default_factory=list
     )
+    _reads: dict[str, float] = field(default_factory=dict)
+    _hears: dict[str, tuple[tuple[int, float], ...]] = field(default_factory=dict)
 
     def add_inertia(self, coordinate: str, J: float) -> None:
         """Add a coordinate with inertia J in kg.m^2."""
@@ -149,13 +197,19 @@ class Assembly:
         stiffness: float = 0.0,
         damping: float = 0.0,
         parameters: tuple[float, ...] = (),
+        read: float = 0.0,
+        hears: Along | None = None,
     ) -> None:
         """Add a scalar law from a combination of states to torques or signal rates.
 
         `looks_at` and `acts_on` are over state names; in `acts_on` a coordinate
         means a torque, a signal means its rate. For `Law.PLAY` the closed
-        stiffness and damping are added along the same direction.
+        stiffness and damping are added along the same direction. `read`: what the
+        output takes of it; `hears`: what it sees of laws that were added before.
         """
+        places = {known: i for i, (known, *_) in enumerate(self._laws)}
+        self._reads[name] = read
+        self._hears[name] = tuple((places[k], c) for k, c in (hears or {}).items())
         if law is Law.PLAY:
             self.add_torque(looks_at, stiffness, damping)
         self._laws.append(
@@ -193,6 +247,11 @@ class Assembly:
                 stiffness=stiffness,
                 damping=damping,
                 parameters=(*parameters, 0.0, 0.0, 0.0)[:3],  # type: ignore[arg-type]
+                read=self._reads[name],
+                smooth=at.row(looks, "'" if law is Law.COUNT_RATE else "")
+                if law in SAMPLED
+                else None,
+                hears=self._hears[name],
             )
             for name, law, acts, looks, feedthrough, stiffness, damping, parameters in self._laws
         )
@@ -204,6 +263,7 @@ class Assembly:
             nonlinearities=nonlinearities,
             states=at.names,
             energy=energy,
+            reading=self.reading,
         )
 
 

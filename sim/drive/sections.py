@@ -1,0 +1,147 @@
+"""Sections of a unit file for what the paper's drives lack; each may be left out.
+
+Owns their names, units and bounds, and what of a unit file they contradict. They build no
+equations: `sim.drivetrain` does.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+__all__ = [
+    "OPTIONAL_SECTIONS",
+    "CurrentAmplifier",
+    "LoadCoupling",
+    "MotorCoupling",
+    "Sampling",
+    "Sensor",
+    "find_contradiction",
+]
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+OPTIONAL_SECTIONS = ("amplifier", "sampling", "sensor", "motor_coupling", "load_coupling")
+"""Sections of a unit that are not there where a drive is like the paper's."""
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class CurrentAmplifier(_Section):
+    """An amplifier that controls the current; without it the amplifier controls the voltage.
+
+    ``electronics.k_a`` is then in A per V. The back-EMF, the resistance and the inductance of the
+    motor do not matter as long as the amplifier has voltage to spare.
+    """
+
+    kind: Literal["current"]
+    bandwidth_hz: Positive
+    """Of the current loop, as a lag of first order, Hz."""
+    current_limit_a: Positive | None = None
+    """Largest current, A; none where it is left out."""
+
+
+class Sampling(_Section):
+    """A clock that the command, the sensor or both are sampled by."""
+
+    rate_hz: Annotated[float, Field(gt=0, le=1e5)]
+    """Samples a second."""
+    holds_command: bool = True
+    """Whether the amplifier's input is held from sample to sample (zero-order hold)."""
+
+
+class Sensor(_Section):
+    """What the bench reads; without it a tachometer on the motor, read continuously."""
+
+    kind: Literal["tachometer", "encoder"]
+    at: Literal["motor", "load"] = "motor"
+    reads: Literal["speed", "position"] = "speed"
+    """Speed of an encoder is the difference of two samples over the time between them."""
+    counts: Annotated[float, Field(ge=4, le=1e9)] | None = None
+    """Counts of an encoder in a turn, after quadrature: four times its lines."""
+    sampled: bool = False
+    """Of a tachometer: whether it is sampled by the clock of [sampling]; an encoder always is."""
+    held: bool = False
+    """Whether samples are read from an analogue output that holds them; else as recorded."""
+    delay_s: Annotated[float, Field(ge=0, le=0.1)] | None = None
+    """The response is late by so much beyond sampling, over command and sensor together, s."""
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> Self:
+        if self.kind == "encoder" and self.counts is None:
+            raise ValueError("sensor.counts is required by an encoder: counts in a turn")
+        if self.counts is not None and self.counts != round(self.counts):
+            raise ValueError(f"sensor.counts {self.counts:g} is no whole number of counts")
+        if self.kind == "tachometer" and self.counts is not None:
+            raise ValueError("sensor.counts: a tachometer has none; leave it out")
+        if self.kind == "tachometer" and self.reads == "position":
+            raise ValueError("sensor.reads: a tachometer reads speed; use an encoder")
+        if self.kind == "encoder" and self.sampled:
+            raise ValueError("sensor.sampled: an encoder always is; leave it out")
+        if self.held and not self.is_sampled:
+            raise ValueError("sensor.held: nothing is sampled; leave it out or set sensor.sampled")
+        return self
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether it is sampled by the clock."""
+        return self.kind == "encoder" or self.sampled
+
+
+class MotorCoupling(_Section):
+    """An elastic coupling between motor and pinion 1; J_m is then that of the motor side."""
+
+    k_cm: Positive
+    """Torsional stiffness, N.m/rad."""
+    c_cm: NonNegative = 0.0
+    """Damping, N.m.s/rad."""
+    J_cm: Positive
+    """Inertia of pinion 1 with its half of the coupling, kg.m^2."""
+
+
+class LoadCoupling(_Section):
+    """An elastic coupling between the last gear (or shaft 1 of one stage) and the load."""
+
+    k_cL: Positive
+    """Torsional stiffness, N.m/rad."""
+    c_cL: NonNegative = 0.0
+    """Damping, N.m.s/rad."""
+    J_cL: Positive
+    """Inertia of the last gear with its half of the coupling, kg.m^2."""
+
+
+_OF_VOLTAGE = ("L_a", "R_m", "k_b")
+
+
+def find_contradiction(unit: Any) -> str:
+    """What sections of a unit contradict each other in, in words; empty where nothing is."""
+    motor, electronics, sensor = unit.motor, unit.electronics, unit.sensor
+    given = [name for name in _OF_VOLTAGE if getattr(motor, name) is not None]
+    if unit.amplifier is None and len(given) < len(_OF_VOLTAGE):
+        missing = next(name for name in _OF_VOLTAGE if name not in given)
+        return (
+            f"motor.{missing} is required, as the amplifier controls the voltage; one that "
+            "controls the current has a section [amplifier]"
+        )
+    if unit.amplifier is not None and given:
+        return (
+            f"motor.{given[0]} has no influence beside [amplifier], which controls the current; "
+            f"leave out {', '.join(given)}"
+        )
+    filtered = (electronics.filter_numerator, electronics.filter_denominator)
+    encoder = sensor is not None and sensor.kind == "encoder"
+    if None in filtered and not (encoder and filtered == (None, None)):
+        return (
+            "electronics.filter_numerator and filter_denominator are required; a drive with an "
+            "encoder that has no filter has neither"
+        )
+    if sensor is not None and sensor.is_sampled and unit.sampling is None:
+        return "sensor is sampled, and there is no section [sampling] with rate_hz"
+    clocked = sensor is not None and sensor.is_sampled
+    if unit.sampling is not None and not (unit.sampling.holds_command or clocked):
+        return "sampling.holds_command is false and no sensor is sampled; leave out [sampling]"
+    return ""

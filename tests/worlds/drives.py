@@ -1,0 +1,61 @@
+"""Unit files of drives that are not the paper's, as mappings: ADSS with sections of its own."""
+
+import copy
+import tomllib
+
+from daq.configs import config_path
+from sim.unit import unit_from_mapping
+
+ENCODER = {"kind": "encoder", "counts": 4096.0}
+CURRENT = {"kind": "current", "bandwidth_hz": 1000.0, "current_limit_a": 1.6}
+COUPLINGS = {
+    "motor_coupling": {"k_cm": 50.0, "c_cm": 1e-3, "J_cm": 1e-6},
+    "load_coupling": {"k_cL": 3000.0, "c_cL": 0.1, "J_cL": 1e-4},
+}
+SAMPLED = {"rate_hz": 2000.0}
+
+DRIVES = {
+    "command held": {"sampling": SAMPLED},
+    "encoder, speed": {"sampling": SAMPLED, "sensor": ENCODER | {"delay_s": 5e-4}, "filter": None},
+    "encoder, position": {
+        "sampling": SAMPLED | {"holds_command": False},
+        "sensor": ENCODER | {"reads": "position"},
+        "filter": None,
+    },
+    "encoder, held and filtered": {"sampling": SAMPLED, "sensor": ENCODER | {"held": True}},
+    "encoder at the load": {
+        "sampling": SAMPLED,
+        "sensor": ENCODER | {"at": "load", "counts": 4e6},
+        "filter": None,
+    },
+    "tachometer sampled": {
+        "sampling": {"rate_hz": 1000.0},
+        "sensor": {"kind": "tachometer", "sampled": True},
+    },
+    "current": {"amplifier": CURRENT, "electronics": {"k_a": 1.0}, "sampling": SAMPLED},
+    "couplings": COUPLINGS,
+}
+"""Sections to add by what they are; ``filter`` None takes the filter away."""
+
+
+def document(sections, base="adss", free=False):
+    """The parsed unit file; `free`: without friction and play, so that it is linear."""
+    found = tomllib.loads(config_path("units", base).read_text(encoding="utf-8"))
+    del found["tolerance"]
+    for name, section in copy.deepcopy(sections).items():
+        if name == "filter":
+            for key in ("filter_numerator", "filter_denominator"):
+                del found["electronics"][key]
+        else:
+            found[name] = found.get(name, {}) | section
+    if "amplifier" in sections:
+        for key in ("L_a", "R_m", "k_b"):
+            found["motor"].pop(key)
+    if free:
+        found["motor"]["T_f_m"] = found["load"]["T_f_L"] = found["backlash"]["b_t_deg"] = 0.0
+    return found
+
+
+def unit(sections, base="adss", free=False):
+    """The unit of such a file."""
+    return unit_from_mapping(document(sections, base, free), "drive.toml")
