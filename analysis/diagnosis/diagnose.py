@@ -168,7 +168,7 @@ def _diagnose(
     observation = candidates[0].surface.observation
     rng = np.random.default_rng(seed)
     with record.stage("judge"):
-        verdict = record.verdict = judge_candidates(candidates, observation, rng, refined.log_prior)
+        verdict = record.verdict = judge_candidates(candidates, observation, rng, refined.log_odds)
         base = estimate_parameters(verdict.baseline.candidate, observation, rng)
 
     def sharpened(one: Judged) -> ParameterPosterior:

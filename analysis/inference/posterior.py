@@ -96,8 +96,9 @@ class Posterior:
         observation: Observation,
         tolerance: Mapping[str, float],
         total_known: bool = True,
+        readings: NDArray[np.float64] | None = None,
     ) -> NDArray[np.float32]:
-        """What the network keeps of an observation (1, hidden).
+        """What the network keeps of an observation (1, hidden), or of others in its sweep.
 
         Parameters
         ----------
@@ -106,20 +107,23 @@ class Posterior:
             is not named.
         total_known
             Whether the total backlash of the datasheet may be relied on.
+        readings
+            Channels (n, 3, rows) of n readings in the same sweep; those of the observation if not
+            given.
         """
-        sweeps = swept_levels(observation)
+        values = observation.values[None] if readings is None else readings
+        sweeps = swept_levels(observation, values)
         nominal = [self.nominal(part) for part, _ in observation.by_plan()]
         departures, believed = relative(list(zip(sweeps, nominal, strict=True)))
         parts = [self.scales.inputs(*one) for one in zip(sweeps, departures, strict=True)]
         points = np.concatenate([p for p, _ in parts], axis=1)
         facts = np.concatenate([f for _, f in parts], axis=1)
         rows = np.concatenate([facts, np.ones((*facts.shape[:2], 1), dtype=np.float32)], axis=2)
-        shares = [[tolerance.get(symbol, 0.0) for symbol in self.scales.prior.symbols]]
+        shares = [tolerance.get(symbol, 0.0) for symbol in self.scales.prior.symbols]
         known = [np.isfinite(observation.values[channel]).any() for channel in (2, 1)]
         condition = conditions(
-            np.array(shares, dtype=np.float32),
-            np.array([total_known]),
-            *(np.array([one]) for one in known),
+            np.tile(np.array(shares, dtype=np.float32), (len(values), 1)),
+            *(np.full(len(values), one) for one in (total_known, *known)),
         )
         condition = np.concatenate([condition, believed], axis=1)
         return np.asarray(
@@ -211,31 +215,33 @@ def limits(
     return tuple(found)
 
 
-def swept_levels(observation: Observation) -> list[SweptLevels]:
-    """The sweeps of an observation as the network reads them."""
+def swept_levels(observation: Observation, values: NDArray[np.float64]) -> list[SweptLevels]:
+    """Readings (n, 3, rows) in the sweeps of an observation as the network reads them."""
     found = []
     for plan, rows in observation.plans:
-        values, cycles = observation.values[:, rows], plan.integrate_cycles
+        cycles, count = plan.integrate_cycles, len(values)
         levels = np.unique(observation.source_vpk[rows])
         frequency_hz = np.asarray(plan.frequencies_hz)
-        shape = (1, len(levels), len(frequency_hz))
+        shape = (count, len(levels), len(frequency_hz))
         place = (
+            slice(None),
             np.searchsorted(levels, observation.source_vpk[rows]),
             np.searchsorted(frequency_hz, observation.frequency_hz[rows]),
         )
+        log_gain, phase, log_scatter = values[:, :, rows].swapaxes(0, 1)
         gain = np.full(shape, np.nan, dtype=np.complex64)
-        scatter, phase = np.full(shape, np.nan, dtype=np.float32), np.zeros(shape, dtype=bool)
-        gain[0, *place] = np.exp(values[0] + 1j * np.nan_to_num(values[1]))
-        scatter[0, *place] = np.exp(values[2]) * np.sqrt(cycles)
-        phase[0, *place] = np.isfinite(values[1])
+        scatter, known = np.full(shape, np.nan, dtype=np.float32), np.zeros(shape, dtype=bool)
+        gain[place] = np.exp(log_gain + 1j * np.nan_to_num(phase))
+        scatter[place] = np.exp(log_scatter) * np.sqrt(cycles)
+        known[place] = np.isfinite(phase)
         found.append(
             SweptLevels(
                 frequency_hz,
                 levels,
                 gain,
                 scatter,
-                np.array([observation.noise_v], dtype=np.float32),
-                phase,
+                np.full(count, observation.noise_v, dtype=np.float32),
+                known,
                 plan.direction == "down",
                 plan.settle_cycles,
                 cycles,

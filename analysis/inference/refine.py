@@ -29,7 +29,7 @@ Vector = NDArray[np.float64]
 
 __all__ = ["Refined", "refine"]
 
-_SHARE, _MOST = 0.99, 12
+_SHARE, _MOST = 0.99, 16
 """Sets that are refined hold this share of the probability; at most so many."""
 
 _FREQUENCIES = 20
@@ -38,7 +38,7 @@ _FREQUENCIES = 20
 _FIRST_GROUPS = 4
 """Groups of five runs that a set gets at first, and again where it is kept."""
 
-_ROUNDS = ((8, 8.0, 4), (4, 8.0, 6), (4, 4.0, 8))
+_ROUNDS = ((8, 8.0, 4), (6, 6.0, 4), (3, 4.0, 6))
 """Rounds on all frequencies: sets that take part at most, how far behind the first in log odds they
 may lie, and groups that each gets. Parts of the first take part, too: they have fewer sizes to fit
 with, and may be all that there is."""
@@ -55,12 +55,14 @@ in sizes as shares of their range."""
 class Refined:
     """Candidates, the likeliest first, and what the network said.
 
-    `summary` (1, hidden) of the observation; `log_prior`: logarithm of the probability of each set.
+    `summary` (1, hidden) of the observation; `log_prior`: logarithm of the network's probability of
+    each set that was looked at; `log_odds`: of each candidate, with what its runs say.
     """
 
     candidates: list[FittedModel]
     summary: NDArray[np.float32]
     log_prior: dict[Effects, float]
+    log_odds: dict[Effects, float]
 
 
 def refine(
@@ -106,32 +108,33 @@ def refine(
         if starts:
             coarse.simulate_about(starts, _FIRST_GROUPS)
 
+    def odds(pool: ModelPool) -> dict[Effects, float]:
+        # Chance of its own, so that asking changes no run.
+        return log_odds(pool.found, posterior, pool.observation, log_prior, rng.spawn(1)[0])
+
     look_at([*first, *_parts(sets, first[0]), sets.index[()]])
     coarse.re_estimate_noise()
-    leader = _leading(coarse, log_prior, 1, 0.0)[0]
+    leader = _leading(odds(coarse), 1, 0.0)[0]
     look_at(_parts(sets, sets.index[tuple(sorted(map(sets.effects.index, leader)))]))
     (most, behind, groups), *rounds = _ROUNDS
-    kept = _leading(coarse, log_prior, most, behind)
-    coarse.simulate_around_estimate(kept, _FIRST_GROUPS)
+    coarse.simulate_around_estimate(_leading(odds(coarse), most, behind), _FIRST_GROUPS)
     report = part_of(progress, 0.4, 1.0, "comparing the likeliest causes")
     fine = ModelPool(unit, observation, rng, executor, report)
-    places = dict.fromkeys([*_leading(coarse, log_prior, most, behind), ()])
+    places = dict.fromkeys([*_leading(odds(coarse), most, behind), ()])
     fine.simulate_about(
         {k: (coarse.found[k].best.place, _nearer(reaches[k])) for k in places}, groups
     )
     fine.re_estimate_noise()
     for most, behind, groups in rounds:
-        fine.simulate_around_estimate(_leading(fine, log_prior, most, behind), groups)
+        fine.simulate_around_estimate(_leading(odds(fine), most, behind), groups)
     fine.re_estimate_noise()
-    candidates = sorted(fine.found.values(), key=lambda c: -log_odds(c, log_prior))
-    return Refined(candidates, summary, log_prior)
+    ranked = odds(fine)
+    candidates = sorted(fine.found.values(), key=lambda c: -ranked[c.hypothesis.effects])
+    return Refined(candidates, summary, log_prior, ranked)
 
 
-def _leading(
-    pool: ModelPool, log_prior: Mapping[Effects, float], most: int, behind: float
-) -> list[Effects]:
+def _leading(odds: Mapping[Effects, float], most: int, behind: float) -> list[Effects]:
     """The sets with the largest odds, none too far behind, and every part of the first."""
-    odds = {key: log_odds(candidate, log_prior) for key, candidate in pool.found.items()}
     ranked = sorted(odds, key=lambda key: -odds[key])
     near = [key for key in ranked[:most] if odds[key] >= odds[ranked[0]] - behind]
     parts = (key for key in ranked if set(key) < set(ranked[0]))

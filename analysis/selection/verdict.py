@@ -19,7 +19,6 @@ from analysis.checking.goodness_of_fit import judge_adequacy, judge_chance, judg
 from analysis.checking.rejection import FEW, OUT_OF_SIGHT, UNLIKE, find_rejection
 from analysis.emulation.fitted_model import Effects, FittedModel
 from analysis.emulation.likelihood import TEMPERATURE
-from analysis.inference.odds import log_odds
 from analysis.observation.observation import Observation
 
 __all__ = [
@@ -216,24 +215,29 @@ def judge_candidates(
     candidates: Sequence[FittedModel],
     observation: Observation,
     rng: np.random.Generator,
-    log_prior: Mapping[Effects, float] | None = None,
+    log_odds: Mapping[Effects, float] | None = None,
 ) -> Verdict:
     """Judge the leading candidates and the baseline.
 
     Parameters
     ----------
-    log_prior
-        What the network says of each set, as the logarithm of its probability. Sets without one
-        are held for equally likely.
+    log_odds
+        Of each candidate; see `analysis.inference.odds`. Those of the tempered likelihood alone
+        if not given.
 
     Notes
     -----
-    The score is the logarithm of the posterior odds: the network's probability times a power of
-    the likelihood. The network pays for further causes, as it has learned how many there are.
+    The score is the logarithm of the posterior odds, in units of 1 / `TEMPERATURE`. The network
+    pays for further causes, as it has learned how many there are.
     """
-    prior = log_prior or {}
-    chosen = _worth_judging(candidates, prior)
-    judged = _ranked([_unasked(c, observation, prior) for c in chosen])
+    scores = {
+        c.hypothesis.effects: c.best.log_likelihood
+        if log_odds is None
+        else TEMPERATURE * log_odds[c.hypothesis.effects]
+        for c in candidates
+    }
+    chosen = _worth_judging(candidates, scores)
+    judged = _ranked([_unasked(c, observation, scores[c.hypothesis.effects]) for c in chosen])
     while True:
         judged = _ask(judged, rng)
         best = _leader(judged)
@@ -279,13 +283,13 @@ def _exceeds_chance_gain(whole: FittedModel, part: FittedModel, rng: np.random.G
 
 
 def _worth_judging(
-    candidates: Sequence[FittedModel], log_prior: Mapping[Effects, float]
+    candidates: Sequence[FittedModel], scores: Mapping[Effects, float]
 ) -> list[FittedModel]:
     """Those that score best; what they may be held against; the baseline.
 
     That is every part of theirs, and what says the same with fewer sizes.
     """
-    by_score = sorted(candidates, key=lambda c: -log_odds(c, log_prior))
+    by_score = sorted(candidates, key=lambda c: -scores[c.hypothesis.effects])
     chosen = by_score[:_JUDGED]
     for other in by_score[_JUDGED:]:
         effects = set(other.hypothesis.effects)
@@ -362,12 +366,9 @@ def _ranked(judged: Sequence[Judged]) -> tuple[Judged, ...]:
     return tuple(sorted(believed, key=lambda one: -one.score))
 
 
-def _unasked(
-    candidate: FittedModel, observation: Observation, log_prior: Mapping[Effects, float]
-) -> Judged:
+def _unasked(candidate: FittedModel, observation: Observation, score: float) -> Judged:
     """A candidate with its score; what speaks against it is still to be asked."""
     held_out = hold_out(candidate, observation)
-    score = TEMPERATURE * log_odds(candidate, log_prior)
     return Judged(candidate, held_out, score, np.nan, np.nan, 0.0, _NOT_ASKED)
 
 

@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from worlds.judging import TRUE, WRONG, judge, seen
+from worlds.judging import TRUE, WRONG, judge, odds, seen
 from worlds.synthetic import candidate
 
 import analysis.selection.verdict as rules
-from analysis.emulation.likelihood import TEMPERATURE
 
 RARE, TEN_TIMES = ("motor-inertia",), 34.5
 """A rare cause, and what it takes to lead one that is not."""
@@ -79,13 +78,12 @@ def test_what_stands_in_for_a_refused_leader_is_not_named_alone(
     observed = seen(TRUE, 1)
     found = [candidate(observed, effects, 1 + i) for i, effects in enumerate(((), TRUE, WRONG))]
     scores = {(): 0.0, TRUE: 500.0, WRONG: 500.0 + lead}
-    monkeypatch.setattr(rules, "log_odds", lambda c, _: scores[c.hypothesis.effects] / TEMPERATURE)
     monkeypatch.setattr(rules, "judge_chance", lambda *_: 0.0)
     monkeypatch.setattr(
         rules, "find_rejection", lambda c, *_: objection if c.hypothesis.effects == WRONG else ""
     )
     monkeypatch.setattr(rules, "is_equivalent_at_load", lambda *_: alike)
-    verdict = rules.judge_candidates(found, observed, np.random.default_rng(0))
+    verdict = rules.judge_candidates(found, observed, np.random.default_rng(0), odds(scores))
     assert verdict.word == word
     assert verdict.best.effects == (WRONG if word == "unexplained" else TRUE)
     if word != "unexplained":

@@ -8,6 +8,7 @@ from worlds import synthetic
 from worlds.untrained import Untrained
 
 import analysis.diagnosis.diagnose as diagnosis_module
+from analysis.emulation.likelihood import TEMPERATURE
 from analysis.emulation.parameter_posterior import ParameterPosterior
 from analysis.inference.refine import Refined
 from daq.frf import FrequencyResponse
@@ -89,8 +90,14 @@ def diagnosis(
     candidates = [synthetic.candidate(seen, effects) for effects in [(), *judged]]
     posterior = Untrained()
     # The network knows whether anything is hidden, and not what.
-    log_prior = {(): -5.0 if hidden else 5.0}
-    refined = Refined(candidates, posterior.summary(seen, {}), log_prior)
+    log_prior = {one.hypothesis.effects: 0.0 for one in candidates}
+    log_prior[()] = -5.0 if hidden else 5.0
+    log_odds = {
+        one.hypothesis.effects: one.best.log_likelihood / TEMPERATURE
+        + log_prior[one.hypothesis.effects]
+        for one in candidates
+    }
+    refined = Refined(candidates, posterior.summary(seen, {}), log_prior, log_odds)
     monkeypatch.setattr(diagnosis_module, "observe", lambda response: seen)
     monkeypatch.setattr(diagnosis_module, "Posterior", SimpleNamespace(find=lambda *_: posterior))
     monkeypatch.setattr(diagnosis_module, "refine", lambda *_, **__: refined)
