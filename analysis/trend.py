@@ -15,6 +15,9 @@ from daq.errors import InputError
 
 __all__ = ["SECONDS_PER_DAY", "Trend", "fit_trend"]
 
+_SURELY = 1.96
+"""Standard errors from which on a slope is one."""
+
 SECONDS_PER_DAY = 86400.0
 
 
@@ -40,6 +43,32 @@ class Trend:
     slope_std: float | None
     chi2: float
     degrees: int
+    middle_s: float
+    """Moment at which the line passes through the mean."""
+
+    def reaches(self, lower: float | None, upper: float | None) -> tuple[float, float] | None:
+        """When the line meets the limit that it moves towards.
+
+        Parameters
+        ----------
+        lower, upper
+            Limits of the quantity; None where there is none.
+
+        Returns
+        -------
+        tuple or None
+            The limit and the moment in s, by the origin of the times. None if the slope is not
+            significantly different from 0 (95 %), or no limit lies that way.
+        """
+        if self.slope_per_day is None or self.slope_std is None:
+            return None
+        if abs(self.slope_per_day) <= _SURELY * self.slope_std:
+            return None
+        limit = upper if self.slope_per_day > 0 else lower
+        if limit is None:
+            return None
+        days = (limit - self.mean) / self.slope_per_day
+        return limit, self.middle_s + days * SECONDS_PER_DAY
 
 
 def fit_trend(
@@ -75,10 +104,11 @@ def fit_trend(
     days, weight = (times - times.min()) / SECONDS_PER_DAY, 1.0 / np.square(std)
     total = float(weight.sum())
     mean, middle = float(weight @ y / total), float(weight @ days / total)
+    middle_s = float(times.min()) + middle * SECONDS_PER_DAY
     if not np.any(days):
         chi2 = float(weight @ np.square(y - mean))
-        return Trend(mean, total**-0.5, None, None, chi2, len(y) - 1)
+        return Trend(mean, total**-0.5, None, None, chi2, len(y) - 1, middle_s)
     spread = float(weight @ np.square(days - middle))
     slope = float(weight @ ((days - middle) * y) / spread)
     chi2 = float(weight @ np.square(y - mean - slope * (days - middle)))
-    return Trend(mean, total**-0.5, slope, spread**-0.5, chi2, len(y) - 2)
+    return Trend(mean, total**-0.5, slope, spread**-0.5, chi2, len(y) - 2, middle_s)

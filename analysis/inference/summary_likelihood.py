@@ -82,7 +82,8 @@ def summary_likelihoods(
         key: _Regression.of(one.places, (one.summaries - centre) @ directions)
         for key, one in runs.items()
     }
-    scatter = sum(fit.squares for fit in fits.values()) / sum(fit.freedom for fit in fits.values())
+    freedom = sum(fit.freedom for fit in fits.values())
+    scatter = np.sum([fit.squares for fit in fits.values()], axis=0) / freedom
     count = len(scatter)
     scatter = scatter + _SHRINKAGE * np.trace(scatter) / count * np.eye(count)
     at = (observed[0] - centre) @ directions

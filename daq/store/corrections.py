@@ -16,7 +16,7 @@ from daq.store import tables as table
 from daq.store.base import StoreFile, check_length, inserted, now, shared
 from daq.store.listing import Choice, count_lines, read_lacking, read_lines, unit_names
 from daq.store.rows import correction_of, text
-from daq.store_records import CORRECTABLE, Correction, HistoryLine
+from daq.store_records import CORRECTABLE, Correction, HistoryLine, MeasurementState
 
 __all__ = ["CorrectionStore"]
 
@@ -104,6 +104,8 @@ class CorrectionStore(StoreFile):
         last: int | None = None,
         with_points: bool = False,
         exact: bool = False,
+        since: str | None = None,
+        state: MeasurementState | None = None,
     ) -> list[HistoryLine]:
         """Measurements as a list shows them, oldest first: the gist, and what was said of each.
 
@@ -117,9 +119,12 @@ class CorrectionStore(StoreFile):
             Leave out what has no point.
         exact
             Take the unit's name as it stands; else in any case.
+        since, state
+            Only those started then or later (ISO 8601, UTC), and those that stand so.
         """
+        choice = Choice(unit, serial, last, with_points, exact, since=since, state=state)
         with self._reading() as connection:
-            return list(read_lines(connection, Choice(unit, serial, last, with_points, exact)))
+            return list(read_lines(connection, choice))
 
     def each_line(
         self,
@@ -130,19 +135,28 @@ class CorrectionStore(StoreFile):
         with_points: bool = False,
         exact: bool = False,
         answered: bool = False,
+        since: str | None = None,
+        state: MeasurementState | None = None,
     ) -> Iterator[HistoryLine]:
         """As `lines`, one after the other, so that any number takes the memory of one.
 
         With `answered` only those that were ever estimated or diagnosed.
         """
-        choice = Choice(unit, serial, last, with_points, exact, answered)
+        choice = Choice(unit, serial, last, with_points, exact, answered, since, state)
         with self._reading() as connection:
             yield from read_lines(connection, choice)
 
-    def count(self, unit: str | None = None, serial: str | None = None) -> int:
-        """How many measurements there are of a unit (any case) and a serial number."""
+    def count(
+        self,
+        unit: str | None = None,
+        serial: str | None = None,
+        *,
+        since: str | None = None,
+        state: MeasurementState | None = None,
+    ) -> int:
+        """How many measurements there are of a unit (any case) and a serial number, see `lines`."""
         with self._reading() as connection:
-            return count_lines(connection, Choice(unit, serial))
+            return count_lines(connection, Choice(unit, serial, since=since, state=state))
 
     def lacking(
         self,
@@ -151,6 +165,8 @@ class CorrectionStore(StoreFile):
         *,
         last: int | None = None,
         edition: str | None = None,
+        since: str | None = None,
+        state: MeasurementState | None = None,
     ) -> list[int]:
         """Complete measurements, among the last of `lines`, without an estimate in force.
 
@@ -160,7 +176,8 @@ class CorrectionStore(StoreFile):
             Count what failed, or is of another edition than this, as none.
         """
         with self._reading() as connection:
-            return read_lacking(connection, Choice(unit, serial, last), edition)
+            choice = Choice(unit, serial, last, since=since, state=state)
+            return read_lacking(connection, choice, edition)
 
     def unit_names(self) -> list[str]:
         """Names of all units that were measured."""

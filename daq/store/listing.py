@@ -14,7 +14,7 @@ import sqlalchemy as sa
 
 from daq.analyser import SourceState
 from daq.store.rows import document_of, moment, real, state_of, text, whole
-from daq.store_records import LONGEST_NAME, Answer, HistoryLine
+from daq.store_records import LONGEST_NAME, Answer, HistoryLine, MeasurementState
 from daq.untrusted.bounded_text import parse_json
 
 __all__ = [
@@ -86,6 +86,10 @@ class Choice:
         Take the unit's name as it stands.
     answered
         Leave out what was never estimated or diagnosed.
+    since
+        Only what was started then or later: ISO 8601, UTC, as the history keeps it.
+    state
+        Only what stands so: complete, interrupted or aborted.
     """
 
     unit: str | None = None
@@ -94,6 +98,8 @@ class Choice:
     with_points: bool = False
     exact: bool = False
     answered: bool = False
+    since: str | None = None
+    state: MeasurementState | None = None
 
     def asked(self, connection: sa.Connection, query: str, **more: Any) -> sa.CursorResult[Any]:
         """Ask a query that has a place for the conditions; they are such as an index serves."""
@@ -116,6 +122,13 @@ class Choice:
             which.append("m.points > 0")
         if self.answered:
             which.append(_ANSWERED)
+        for column, condition, value in (
+            ("started", ">=", self.since),
+            ("state", "=", self.state),
+        ):
+            if value is not None:
+                values[column] = value
+                which.append(f"m.{column} {condition} :{column}")
         where = f"WHERE {' AND '.join(which)}" if which else ""
         return connection.execute(sa.text(query.format(where=where)), values)
 

@@ -53,3 +53,30 @@ def test_without_two_moments_there_is_no_slope():
 def test_what_cannot_be_fitted_is_refused(times, values, stds):
     with pytest.raises(InputError, match="trend"):
         fit_trend(times, values, stds)
+
+
+@pytest.mark.parametrize(
+    ("slope", "limits", "limit", "day"),
+    [
+        (0.1, (None, 2.0), 2.0, 10.0),
+        (-0.1, (0.5, 2.0), 0.5, 5.0),
+        # Already beyond: when it passed.
+        (0.1, (None, 1.2), 1.2, 2.0),
+    ],
+)
+def test_the_line_meets_the_limit_that_it_moves_towards(slope, limits, limit, day):
+    days = np.array([0.0, 1.0, 3.0, 4.0])
+    trend = fit_trend(1e9 + days * SECONDS_PER_DAY, 1.0 + slope * days, [0.01] * 4)
+    found = trend.reaches(*limits)
+    assert found[0] == limit
+    assert found[1] == pytest.approx(1e9 + day * SECONDS_PER_DAY)
+
+
+@pytest.mark.parametrize(
+    ("slope", "std", "limits"),
+    [(0.1, 0.01, (0.5, None)), (0.1, 1.0, (0.5, 2.0)), (0.0, 0.01, (0.5, 2.0))],
+)
+def test_no_limit_is_met_that_lies_the_other_way_or_by_chance(slope, std, limits):
+    days = np.array([0.0, 1.0, 3.0, 4.0])
+    trend = fit_trend(days * SECONDS_PER_DAY, 1.0 + slope * days, [std] * 4)
+    assert trend.reaches(*limits) is None

@@ -12,6 +12,7 @@ import time
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import asdict, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -59,6 +60,8 @@ def history(
     unit: Annotated[str | None, Parameter(name="--unit")] = None,
     serial: str | None = None,
     last: Whole | None = None,
+    since: str | None = None,
+    state: Literal["complete", "interrupted", "aborted"] | None = None,
     estimate: Literal["none", "some", "all"] = "some",
     cluster: Cluster = None,
     judge: JudgeBy = None,
@@ -83,6 +86,10 @@ def history(
     last
         How many measurements to list, the newest; 200 if left out, and all with --json.
         Trends are of all measurements of whatever is listed.
+    since
+        Only measurements that were started on this day or later, such as 2026-11-01 (UTC).
+    state
+        Only measurements that are complete, interrupted or aborted.
     estimate
         Which missing estimates to make of those that are listed: none, all, those that failed
         or are of an earlier edition once more among them, or some, that is to begin no more of
@@ -93,13 +100,14 @@ def history(
 
     if last is not None and last < 1:
         raise InputError(f"--last {last}: give 1 or more")
+    which: dict[str, Any] = {"since": _moment(since), "state": state}
     limits = limits_to_judge_by(judge)
     db = history_path(db)
     shown = last if last is not None or json else _SHOWN
     with Store(db, read_only=True) as store:
         name = _unit_name(unit, store)
         edition = EDITION if estimate == "all" else None
-        lacking = store.lacking(name, serial, last=shown, edition=edition)
+        lacking = store.lacking(name, serial, last=shown, edition=edition, **which)
     loose: dict[int, Answer] = {}
     if estimate != "none" and lacking:
         with executor_at(cluster) as executor:
@@ -109,14 +117,21 @@ def history(
         if json:
             # The exit code counts, whether or not all was read.
             with readers_may_leave() if limits else nullcontext():
-                _write_json(store, name, serial, shown, making, console)
+                _write_json(store, name, serial, shown, which, making, console)
             return making.exit_code
-        rows = [making.row(line) for line in store.lines(name, serial, last=shown)]
+        rows = [making.row(line) for line in store.lines(name, serial, last=shown, **which)]
         if not rows:
-            console.data("no measurements; lashbench measure --help says how to make one")
+            console.data(
+                "no such measurements"
+                if store.count()
+                else "no measurements; lashbench measure --help says how to make one"
+            )
             return making.exit_code
-        whole = store.count(name, serial)
-        trends = Trends(rows) if whole <= len(rows) else _whole_trends(store, rows, console)
+        whole = store.count(name, serial, **which)
+        if whole <= len(rows):
+            trends = Trends(rows, limits)
+        else:
+            trends = _whole_trends(store, rows, which, limits, console)
         told = [part for line in trend_lines(trends.rows()) for part in wrapped(line, indent="  ")]
         lines = [*_measured(rows), *_judged(rows), *_corrected(store, rows), *_estimated(rows)]
         lines += told
@@ -143,23 +158,35 @@ def _unit_name(unit: str | None, store: Store) -> str | None:
         raise InputError(f"{error}; units in this history: {names}") from error
 
 
+def _moment(since: str | None) -> str | None:
+    """A day, or a moment, as the history keeps moments: ISO 8601, UTC."""
+    if since is None:
+        return None
+    try:
+        found = datetime.fromisoformat(since)
+        found = found.replace(tzinfo=UTC) if found.tzinfo is None else found.astimezone(UTC)
+    except (ValueError, OverflowError):
+        raise InputError(f"--since {since}: give a day such as 2026-11-01") from None
+    return found.isoformat(timespec="microseconds")
+
+
 class _Rows:
     """Rows, with the estimates that could not be kept, and judged where there are limits."""
 
     def __init__(self, store: Store, loose: Mapping[int, Answer], limits: LimitSet | None) -> None:
         self._store = store
         self._loose = loose
-        self._limits = limits
+        self.limits = limits
         self._verdicts: list[Verdict] = []
 
     def row(self, line: HistoryLine) -> dict[str, Any]:
         """A measurement as a row."""
         line = replace(line, estimate=self._loose.get(line.id, line.estimate))
         row = measurement_row(line)
-        if self._limits is not None:
+        if self.limits is not None:
             from tui.measurements.judging import judge_line
 
-            judgement = judge_line(self._store, line, self._limits)
+            judgement = judge_line(self._store, line, self.limits)
             self._verdicts.append(judgement.verdict)
             row["judgement"] = judgement.to_json()
         return row
@@ -167,7 +194,7 @@ class _Rows:
     @property
     def exit_code(self) -> int:
         """0, or what the worst judgement means: 6 for FAIL, 7 for UNDECIDED."""
-        if self._limits is None:
+        if self.limits is None:
             return 0
         from analysis.acceptance import EXIT_CODES, combine
 
@@ -179,14 +206,15 @@ def _write_json(
     unit: str | None,
     serial: str | None,
     last: int | None,
+    which: Mapping[str, Any],
     making: _Rows,
     console: Console,
 ) -> None:
     """The document, put together on the disk: a history may be longer than the memory."""
-    trends, count, whole = Trends(), 0, store.count(unit, serial)
+    trends, count, whole = Trends((), making.limits), 0, store.count(unit, serial, **which)
     with TemporaryFile("w+", encoding="utf-8") as out:
         out.write('{"measurements": [')
-        for line in store.each_line(unit, serial, last=last):
+        for line in store.each_line(unit, serial, last=last, **which):
             row = making.row(line)
             trends.add(row)
             if row["corrections"]:
@@ -203,13 +231,19 @@ def _write_json(
         console.data_from(out)
 
 
-def _whole_trends(store: Store, rows: Sequence[Mapping[str, Any]], console: Console) -> Trends:
+def _whole_trends(
+    store: Store,
+    rows: Sequence[Mapping[str, Any]],
+    which: Mapping[str, Any],
+    limits: LimitSet | None,
+    console: Console,
+) -> Trends:
     """Trends of what is listed, over all measurements of each unit and serial number."""
-    trends = Trends()
+    trends = Trends((), limits)
     groups = dict.fromkeys((row["unit"], row["serial"]) for row in rows)
     for count, (unit, serial) in enumerate(groups):
         console.progress(count / len(groups), "reading the history")
-        for line in store.each_line(unit, serial, exact=True, answered=True):
+        for line in store.each_line(unit, serial, exact=True, answered=True, **which):
             if line.estimate is not None or line.diagnosis is not None:
                 trends.add(measurement_row(line))
     return trends

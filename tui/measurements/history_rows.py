@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 from daq.errors import FileFormatError
 
 if TYPE_CHECKING:
+    from analysis.acceptance import LimitSet
+    from analysis.trend import Trend
     from daq.store_records import Answer, Correction, HistoryLine
 
 __all__ = [
@@ -27,6 +29,12 @@ __all__ = [
 
 QUANTITIES = ("contribution_ratio", "b1_deg", "b2_deg")
 """What is followed over time, by its name in an estimate's document."""
+
+_LIMITED = dict(zip(QUANTITIES, ("r", "b1_deg", "b2_deg"), strict=True))
+"""What a table of limits calls them."""
+
+_HORIZON_S = 365 * 86400.0
+"""So long after the last measurement a limit must be reached for an alarm."""
 
 _SECONDS_PER_DAY = 86400.0
 _SCATTER = 4.0
@@ -170,7 +178,10 @@ class Trends:
     Only what is accepted counts, and only with an error.
     """
 
-    def __init__(self, rows: Iterable[Mapping[str, Any]] = ()) -> None:
+    def __init__(
+        self, rows: Iterable[Mapping[str, Any]] = (), limits: LimitSet | None = None
+    ) -> None:
+        self._limits = limits
         self._series: dict[tuple[str, str, str], _Series] = {}
         for row in rows:
             self.add(row)
@@ -193,7 +204,8 @@ class Trends:
 
         trends = []
         for (unit, serial, name), series in self._series.items():
-            trend = fit_trend(_moments_s(series.moments), series.values, series.stds)
+            moments_s = _moments_s(series.moments)
+            trend = fit_trend(moments_s, series.values, series.stds)
             if trend is None:
                 continue
             slope = {"value": trend.slope_per_day, "std": trend.slope_std}
@@ -207,9 +219,29 @@ class Trends:
                     "per_day": None if trend.slope_per_day is None else slope,
                     "chi2": trend.chi2,
                     "degrees": trend.degrees,
+                    "alarm": self._alarm(name, trend, max(moments_s)),
                 }
             )
         return trends
+
+    def _alarm(self, quantity: str, trend: Trend, last_s: float) -> dict[str, Any] | None:
+        """The limit that a quantity moves towards, and when it is there, if within a year."""
+        from datetime import UTC, datetime
+
+        if self._limits is None:
+            return None
+        found = [
+            trend.reaches(bound.lower, bound.upper)
+            for name, bound in self._limits.acceptance.bounds()
+            if name == _LIMITED[quantity]
+        ]
+        near = [one for one in found if one is not None and one[1] <= last_s + _HORIZON_S]
+        if not near:
+            return None
+        limit, moment_s = min(near, key=lambda one: one[1])
+        reached = moment_s <= last_s
+        day = datetime.fromtimestamp(moment_s, UTC).date().isoformat()
+        return {"limit": limit, "date": day, "reached": reached}
 
 
 def _moments_s(moments: Sequence[str]) -> list[float]:
@@ -238,7 +270,15 @@ def trend_lines(trends: Sequence[dict[str, Any]]) -> list[str]:
         slope = trend["per_day"]
         if slope is not None:
             line += f", {30 * slope['value']:+.3g} +- {30 * slope['std']:.2g} in 30 days"
+        if trend["alarm"] is not None:
+            line += f"; ALARM: {_alarm_words(trend['alarm'])}"
         if trend["chi2"] > _SCATTER * max(trend["degrees"], 1):
             line += "; they differ by more than their errors"
         lines.append(line)
     return ["", *lines] if lines else []
+
+
+def _alarm_words(alarm: Mapping[str, Any]) -> str:
+    if alarm["reached"]:
+        return f"the line passed the limit {alarm['limit']:g} on {alarm['date']}"
+    return f"at this rate it reaches the limit {alarm['limit']:g} on {alarm['date']}"

@@ -4,6 +4,7 @@ import json
 import math
 import re
 import sqlite3
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -95,6 +96,61 @@ def test_history_shows_the_trend_with_error_bars(run, db):
     # A line through 0.30, 0.40, 0.55 a week apart rises by 0.125 a week.
     assert "+0.536 +- 0.15 in 30 days" in out
     assert "differ by more than their errors" not in out
+
+
+def test_an_alarm_tells_when_a_limit_will_be_reached(run, db, tmp_path):
+    for _ in range(3):
+        run(*measuring("--serial", "S"))
+    with Store(db) as store:
+        for measurement, ratio in ((1, 0.30), (2, 0.40), (3, 0.55)):
+            estimated(store, measurement, ratio)
+    with closing(sqlite3.connect(db)) as raw:
+        for day in (1, 8, 15):
+            raw.execute(
+                "UPDATE measurements SET started = ? WHERE id = ?",
+                (f"2026-11-{day:02d}T12:00:00+00:00", (day + 6) // 7),
+            )
+        raw.commit()
+    limits = tmp_path / "limits.toml"
+
+    def judged(bounds, *options):
+        limits.write_text(f'schema = 1\nname = "line"\n[acceptance]\nr = [{bounds}]\n')
+        return run("history", "--judge", str(limits), "--estimate", "none", *options)[1]
+
+    # 0.417 at the 8th, and 0.125 a week: 0.70 is reached 15.9 days later.
+    (trend, *_) = json.loads(judged("{ upper = 0.7 }", "--json"))["trends"]
+    assert trend["alarm"] == {"limit": 0.7, "date": "2026-11-24", "reached": False}
+    assert "ALARM: at this rate it reaches the limit 0.7 on 2026-11-24" in flowed(
+        judged("{ upper = 0.7 }")
+    )
+    assert "passed the limit 0.45 on 2026-11-10" in flowed(judged("{ upper = 0.45 }"))
+    assert "ALARM" not in judged("{ lower = 0.1 }")
+
+
+def flowed(text):
+    return " ".join(text.split())
+
+
+def test_history_of_a_day_and_of_a_state(run, db, monkeypatch):
+    stopped(run, monkeypatch)
+    run(*measuring())
+    with closing(sqlite3.connect(db)) as raw:
+        raw.execute("UPDATE measurements SET started = '2026-10-31T23:59:59.000000+00:00' WHERE id = 1")
+        raw.commit()
+
+    def listed(*options):
+        _, out, _ = run("history", "--json", "--estimate", "none", *options)
+        return [row["id"] for row in json.loads(out)["measurements"]]
+
+    assert listed() == [1, 2]
+    assert listed("--since", "2026-11-01") == [2]
+    assert listed("--since", "2026-11-01T00:59:59+01:00") == [1, 2]
+    assert listed("--state", "interrupted") == [1]
+    assert listed("--state", "interrupted", "--since", "2026-11-01") == []
+    assert "no such measurements" in run("history", "--state", "aborted")[1]
+    code, _, err = run("history", "--since", "yesterday")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "--since yesterday: give a day such as 2026-11-01" in err
 
 
 def test_values_that_do_not_agree_are_not_passed_off_as_one(run, db):
