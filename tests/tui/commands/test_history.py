@@ -135,7 +135,10 @@ def test_history_of_a_day_and_of_a_state(run, db, monkeypatch):
     stopped(run, monkeypatch)
     run(*measuring())
     with closing(sqlite3.connect(db)) as raw:
-        raw.execute("UPDATE measurements SET started = '2026-10-31T23:59:59.000000+00:00' WHERE id = 1")
+        raw.execute(
+            "UPDATE measurements SET started = ? WHERE id = 1",
+            ("2026-10-31T23:59:59.000000+00:00",),
+        )
         raw.commit()
 
     def listed(*options):
