@@ -102,7 +102,7 @@ def test_any_pair_in_any_noise_is_read_sanely(parameters):
     check_sane(noisy_pair(*parameters))
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=40)
 @given(wild(60), st.floats(-5, 5))
 def test_gain_does_not_move_frequencies(parameters, log_factor):
     one = noisy_pair(*parameters)
@@ -118,7 +118,7 @@ def test_gain_does_not_move_frequencies(parameters, log_factor):
     same_features(extract(one), extract(other), gain_db=20 * log_factor)
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=40)
 @given(wild(60), st.sampled_from([1e-3, 1 / 60, 2 * math.pi, 1e3]))
 def test_the_unit_of_frequency_does_not_matter(parameters, factor):
     one = noisy_pair(*parameters)
@@ -133,7 +133,7 @@ def test_the_unit_of_frequency_does_not_matter(parameters, factor):
     same_features(extract(one), extract(other), hz=factor)
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=40)
 @given(wild(60), st.randoms(use_true_random=False))
 def test_the_order_of_the_rows_does_not_matter(parameters, random):
     one = noisy_pair(*parameters)
@@ -157,7 +157,7 @@ def same_features(left, right, hz=1.0, gain_db=0.0):
 def test_noise_widens_the_bars_of_any_pair():
     ratios = []
     f = np.linspace(20, 110, 181)
-    for seed in range(60):
+    for seed in range(40):
         rng = np.random.default_rng(seed)
         zero, pole = rng.uniform(30, 60), rng.uniform(65, 100)
         zetas = rng.uniform(0.01, 0.2, 2)
@@ -172,7 +172,7 @@ def test_noise_widens_the_bars_of_any_pair():
         for a, b in ((quiet.arf, loud.arf), (quiet.rf, loud.rf)):
             if a is not None and b is not None:
                 ratios.append(b.std_hz / a.std_hz)
-    assert len(ratios) > 80
+    assert len(ratios) > 50
     assert 5 < np.median(ratios) < 7
     assert np.mean(np.array(ratios) > 2) > 0.95
 

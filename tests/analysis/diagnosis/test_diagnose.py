@@ -111,15 +111,10 @@ def test_one_level_without_phase_still_gets_a_verdict_and_asks_for_more(cache):
     json.dumps(document, allow_nan=False)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "number",
-    [
-        # One every day, the cheapest that hides something; all twelve take a quarter of an hour.
-        f"{i:02d}" if i == 5 else pytest.param(f"{i:02d}", marks=pytest.mark.study)
-        for i in range(1, 13)
-    ],
-)
+# A quarter of an hour. Every day the verb diagnoses one response that hides a large effect
+# (`tests/tui/commands/test_diagnose.py`).
+@pytest.mark.study
+@pytest.mark.parametrize("number", [f"{i:02d}" for i in range(1, 13)])
 def test_practice_sets_of_another_program(number, tmp_path, practice_cache):
     response = read_response(PRACTICE / f"practice-{number}.csv")
     judge_practice(number, response, practice_cache, tmp_path)

@@ -9,7 +9,7 @@ from worlds.linear_truths import NOTED, TWO_PERCENT, Truth, pair
 from analysis.resonance import extract
 from daq.frf import DB_PER_NEPER, FrequencyResponse
 
-DRAWS = 100
+DRAWS = 60
 
 
 def readings(truth, noise, draws=DRAWS, **how):
@@ -68,7 +68,7 @@ def test_linear_truth_is_read_within_bounds_and_bars(truth, how):
     assert error[1] < 0.02
     assert np.all(error[3:] < 0.01)
     covered = np.mean(np.abs(off) < 1.96 * std, axis=0)
-    assert np.all(covered >= 0.88), covered
+    assert np.all(covered >= 0.85), covered
     assert np.mean(covered) < 0.99
     # The mean is off by no more than chance allows: no bias behind the scatter.
     assert np.all(np.abs(off.mean(axis=0)) < 4 * error / math.sqrt(DRAWS))
@@ -81,7 +81,7 @@ def test_twice_the_noise_power_on_the_noted_truth_stays_within_bounds():
     assert error[1] < 0.02
     assert np.all(error[3:] < 0.01)
     covered = np.mean(np.abs(off) < 1.96 * std, axis=0)
-    assert np.all(covered >= 0.88), covered
+    assert np.all(covered >= 0.85), covered
     assert np.mean(covered) < 0.99
 
 
@@ -89,7 +89,7 @@ def test_gain_alone_is_read_with_wider_bars():
     off, std = readings(NOTED, TWO_PERCENT, phase=False)
     _, std_with_phase = readings(NOTED, TWO_PERCENT, draws=20)
     covered = np.mean(np.abs(off) < 1.96 * std, axis=0)
-    assert np.all(covered >= 0.88), covered
+    assert np.all(covered >= 0.85), covered
     assert np.mean(covered) < 0.99
     assert np.all(rms(std) > 1.2 * rms(std_with_phase))
     assert rms(off)[0] < 0.02
@@ -145,11 +145,11 @@ def cramer_rao(truth, noise):
 def test_no_unbiased_reader_could_do_much_better(truth):
     off, std = readings(truth, TWO_PERCENT)
     least = cramer_rao(truth, TWO_PERCENT)
-    # 100 draws know a standard deviation to 7 %.
-    assert np.all(rms(off)[:2] < 1.25 * least), (rms(off)[:2], least)
-    assert np.all(rms(off)[:2] > 0.8 * least), (rms(off)[:2], least)
+    # 60 draws know a standard deviation to 9 %.
+    assert np.all(rms(off)[:2] < 1.3 * least), (rms(off)[:2], least)
+    assert np.all(rms(off)[:2] > 0.75 * least), (rms(off)[:2], least)
     covered = np.mean(np.abs(off) < 1.96 * std, axis=0)
-    assert np.all(covered >= 0.88), covered
+    assert np.all(covered >= 0.85), covered
     assert np.mean(covered) < 0.99
 
 

@@ -5,9 +5,21 @@ import json
 import pytest
 
 from daq.configs import config_path
+from daq.formats import write_response
+from daq.plan import SweepPlan, spaced_frequencies
+from sim.response import simulate
+from sim.unit import load_unit
 from tui.cli import main
 
-FEATURES = ["estimate", "--arf-hz", "128", "--rf-hz", "137", "--unit"]
+PLAN = SweepPlan(spaced_frequencies(115.0, 160.0, 13), (2.5,), settle_cycles=6, integrate_cycles=8)
+
+
+@pytest.fixture(scope="module")
+def estimate(tmp_path_factory):
+    """An estimate of a short sweep, as far as the unit."""
+    path = tmp_path_factory.mktemp("sweep") / "sweep.csv"
+    write_response(simulate(load_unit("adss"), 0.4, PLAN, seed=3), path)
+    return ["estimate", str(path), "--unit"]
 
 
 @pytest.fixture
@@ -23,22 +35,22 @@ def answer(words, capsys):
     return json.loads(capsys.readouterr().out)
 
 
-def test_every_answer_says_what_was_believed(silent, capsys):
-    shipped = answer([*FEATURES, "adss"], capsys)
+def test_every_answer_says_what_was_believed(estimate, silent, capsys):
+    shipped = answer([*estimate, "adss"], capsys)
     assert shipped["tolerance"]["R_m"] == 0.005
     assert shipped["tolerance"]["J_m"] == 0.0
     assert shipped["tolerance_from"]["R_m"] == "unit file"
-    usual = answer([*FEATURES, silent], capsys)
+    usual = answer([*estimate, silent], capsys)
     assert usual["tolerance"]["R_m"] == usual["tolerance"]["J_m"] == 0.05
     assert usual["tolerance"]["N_1"] == 0.0
     assert set(usual["tolerance_from"].values()) == {"default"}
-    told = answer([*FEATURES, "adss", "--tolerance", "5%", "--tolerance", "R_m=0.08"], capsys)
+    told = answer([*estimate, "adss", "--tolerance", "5%", "--tolerance", "R_m=0.08"], capsys)
     assert told["tolerance"] == usual["tolerance"] | {"R_m": 0.08}
     assert told["tolerance_from"]["k_t"] == "option"
-    # It is used: two frequencies of a unit that is hardly known tell less.
+    # It is used: a sweep of a unit that is hardly known tells less.
     stds = [one["contribution_ratio"]["std"] for one in (shipped, usual)]
     assert stds[0] < stds[1]
-    assert main([*FEATURES, silent]) == 0
+    assert main([*estimate, silent]) == 0
     assert "datasheet believed to 5 %: all values (by default" in capsys.readouterr().out
 
 
@@ -57,7 +69,7 @@ def test_every_answer_says_what_was_believed(silent, capsys):
 @pytest.mark.parametrize(
     "verb",
     [
-        FEATURES[:-1],
+        ["estimate", "--arf-hz", "128", "--rf-hz", "137"],
         ["diagnose", "--paper"],
         ["report", "no.csv", "--out", "no.html"],
         ["prepare", "--level", "1", "--start", "100", "--stop", "120", "--points", "3"],
