@@ -7,6 +7,6 @@ pytest.register_assert_rewrite("outputs.report_pages")
 
 
 @pytest.fixture
-def runs(monkeypatch):
-    """A hunt reads the synthetic world; what it asks for is counted."""
-    return synthetic_runs.simulate_in(monkeypatch)
+def world():
+    """The synthetic world as an executor; what is asked of it is counted."""
+    return synthetic_runs.World()

@@ -7,11 +7,8 @@ from collections import Counter
 import numpy as np
 from worlds import synthetic
 
-from analysis.ensemble import runs as population
 from analysis.ensemble.datasheet_spread import spread_of
 from analysis.ensemble.model import Hypothesis
-from analysis.ensemble.runs import Population
-from analysis.inference import model_pool as hunt
 
 ADSS = synthetic.ADSS
 
@@ -26,29 +23,33 @@ def read(effects, place, rng, deviations=None, scatter=1.0):
     return plain + sum(synthetic.effect_slope((e,)) * size for e, size in sizes.items())
 
 
-def simulate_in(monkeypatch) -> Counter:
-    """Read this world wherever a hunt would simulate; how many runs of each set were asked for."""
-    count = Counter()
+class World:
+    """An executor whose machines are those of this world.
 
-    def simulate(unit, groups, observation, rng, executor=None, progress=None):
-        found = {}
-        spread = spread_of(unit)
-        for group, signs in zip(groups, population._signs(groups, spread, rng), strict=True):
-            key, off = group.hypothesis.effects, signs * synthetic.SIGMAS
-            channels = np.array([read(key, place, rng, off) for place in group.places])
-            mean = np.exp(channels[:, 0] + 1j * channels[:, 1])
-            deviations = np.tile(off, (len(mean), 1))
-            made = Population(group.places, deviations, mean, np.exp(2.0 * channels[:, 2]))
-            found[key] = found[key].joined(made) if key in found else made
-            count[key] += len(mean)
-        return found
+    `count`: runs of each set of effects so far; `rounds`: families asked for, call by call.
+    """
 
-    monkeypatch.setattr(hunt, "simulate_groups", simulate)
-    return count
+    def __init__(self, scatter=1.0):
+        self.scatter = scatter
+        self.count, self.rounds = Counter(), []
+
+    def each(self, work, tasks, progress=None):
+        self.rounds.append(len(tasks))
+        return [self._readings(family) for family in tasks]
+
+    def _readings(self, family):
+        channels = np.array([self._run(family.unit, machine) for machine in family.machines])
+        return np.exp(channels[:, 0] + 1j * channels[:, 1]), np.exp(2.0 * channels[:, 2])
+
+    def _run(self, unit, machine):
+        effects = tuple(effect.id for effect in machine.effects)
+        self.count[effects] += 1
+        values = [value for effect in machine.effects for value in effect.values.values()]
+        place = Hypothesis(unit, effects).place(machine.ratio, values)
+        off = spread_of(unit).along(machine.deviations)
+        return read(effects, place, np.random.default_rng(machine.seed), off, self.scatter)
 
 
 def observed(effects, sizes, rng):
     """An observation of a machine with these effects at a ratio of 0.4."""
-    # Others would simulate a servo that has nothing to do with this world.
-    assert hunt.simulate_groups is not population.simulate_groups, "ask for the fixture `runs`"
     return synthetic.observation(read(effects, np.array([0.4, *sizes]), rng))

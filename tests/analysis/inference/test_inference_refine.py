@@ -16,9 +16,11 @@ def observed(effects, sizes, seed=1):
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_what_is_hidden_is_found_among_what_is_proposed(runs, seed):
+def test_what_is_hidden_is_found_among_what_is_proposed(world, seed):
     """A network that favours three causes alike, and says nothing of the ratio."""
-    found = refine(Untrained((LAG, LOAD, MESH)), observed((LOAD,), [0.8], seed), seed=seed)
+    found = refine(
+        Untrained((LAG, LOAD, MESH)), observed((LOAD,), [0.8], seed), seed=seed, executor=world
+    )
     verdict = judge_candidates(
         found.candidates, found.candidates[0].surface.observation, np.random.default_rng(seed)
     )
@@ -26,16 +28,18 @@ def test_what_is_hidden_is_found_among_what_is_proposed(runs, seed):
     assert verdict.best.candidate.best.place == pytest.approx([0.4, 0.8], abs=0.1)
 
 
-def test_a_pair_is_found_where_only_its_causes_were_proposed(runs):
+def test_a_pair_is_found_where_only_its_causes_were_proposed(world):
     """Sets that hold the leader and one more cause are looked at, too."""
-    found = refine(Untrained((LAG, LOAD)), observed((LAG, LOAD), [0.7, 0.3]))
+    found = refine(Untrained((LAG, LOAD)), observed((LAG, LOAD), [0.7, 0.3]), executor=world)
     leader = found.candidates[0]
     assert leader.hypothesis.effects == (LAG, LOAD)
     assert leader.best.place == pytest.approx([0.4, 0.7, 0.3], abs=0.1)
 
 
-def test_every_part_of_what_is_proposed_first_is_looked_at(runs):
-    found = refine(Untrained((LAG, LOAD, MESH)), observed((LAG, LOAD, MESH), [0.8, 0.3, 0.7]))
+def test_every_part_of_what_is_proposed_first_is_looked_at(world):
+    found = refine(
+        Untrained((LAG, LOAD, MESH)), observed((LAG, LOAD, MESH), [0.8, 0.3, 0.7]), executor=world
+    )
     first = max(found.log_prior, key=lambda effects: found.log_prior[effects])
     for effect in first:
         assert tuple(sorted(set(first) - {effect})) in found.log_prior
@@ -44,20 +48,24 @@ def test_every_part_of_what_is_proposed_first_is_looked_at(runs):
     assert {(), (LAG, LOAD, MESH)} <= keys <= set(found.log_prior)
 
 
-def test_every_part_of_what_leads_is_looked_at(runs):
+def test_every_part_of_what_leads_is_looked_at(world):
     """Three causes are proposed and two are there: the two are compared with the three."""
-    found = refine(Untrained((LAG, LOAD, MESH)), observed((LAG, MESH), [0.8, 0.7]))
+    found = refine(Untrained((LAG, LOAD, MESH)), observed((LAG, MESH), [0.8, 0.7]), executor=world)
     assert (LAG, MESH) in {one.hypothesis.effects for one in found.candidates}
 
 
-def test_what_is_left_out_of_the_catalogue_is_not_simulated(runs):
-    found = refine(Untrained((LAG, LOAD)), observed((LOAD,), [0.8]), without=(LOAD,))
-    assert runs
+def test_what_is_left_out_of_the_catalogue_is_not_simulated(world):
+    found = refine(
+        Untrained((LAG, LOAD)), observed((LOAD,), [0.8]), without=(LOAD,), executor=world
+    )
+    assert world.count
     assert not any(LOAD in one.hypothesis.effects for one in found.candidates)
 
 
-def test_the_same_seed_gives_the_same_candidates(runs):
+def test_the_same_seed_gives_the_same_candidates(world):
     seen = observed((LOAD,), [0.8])
-    first, again = (refine(Untrained((LAG, LOAD)), seen, seed=3).candidates for _ in range(2))
+    first, again = (
+        refine(Untrained((LAG, LOAD)), seen, seed=3, executor=world).candidates for _ in range(2)
+    )
     assert [one.hypothesis.effects for one in first] == [one.hypothesis.effects for one in again]
     assert [o.best.log_likelihood for o in first] == [o.best.log_likelihood for o in again]

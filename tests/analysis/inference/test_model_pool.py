@@ -10,12 +10,13 @@ LOAD = ("load-inertia",)
 
 
 @pytest.fixture
-def looking(runs):
+def looking(world):
     """A hunt for a load of a known inertia, with nothing simulated yet."""
 
     def begun(seed):
         rng = np.random.default_rng(seed)
-        return ModelPool(synthetic.ADSS, synthetic_runs.observed(LOAD, [0.8], rng), rng, None, None)
+        seen = synthetic_runs.observed(LOAD, [0.8], rng)
+        return ModelPool(synthetic.ADSS, seen, rng, world, None)
 
     return begun
 
