@@ -70,13 +70,17 @@ class LineBench:
         (folder / "recipe.toml").write_text(RECIPE)
         (folder / "limits.toml").write_text(LIMITS)
 
+    def words(self, *words: str) -> list:
+        """The verb with what every line of this bench has."""
+        return [
+            "line", "--recipe", self.folder / "recipe.toml", "--judge",
+            self.folder / "limits.toml", "--instrument", self.address, "--db", self.db, "--yes",
+            *words,
+        ]  # fmt: skip
+
     def start(self, *words: str) -> subprocess.Popen:
         """The program, waiting for serial numbers."""
-        command = [
-            sys.executable, "-m", "tui.cli", "line", "--recipe", self.folder / "recipe.toml",
-            "--judge", self.folder / "limits.toml", "--instrument", self.address,
-            "--db", self.db, "--out", self.out, "--yes", *words,
-        ]  # fmt: skip
+        command = [sys.executable, "-m", "tui.cli", *self.words("--out", self.out, *words)]
         return subprocess.Popen(
             list(map(str, command)), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             stderr=subprocess.PIPE, text=True, bufsize=1,

@@ -109,7 +109,7 @@ def line(
     results = Results(out or history.with_suffix(".line.jsonl"), csv)
     belt = Line(
         name, read_unit(name, console), instrument or _address(place), recipe, bench, adaptive,
-        operator, history, limits, diagnose, console,
+        operator, history, limits, diagnose, results.path, console,
     )  # fmt: skip
     request = belt.request("", 1)  # everything is refused now that would be refused later
     confirm_driving(belt.instrument, request, history, yes)
@@ -205,6 +205,13 @@ class _Dialogue:
             self._keep(belt.judge(pending))
             return True
         begun = f"{pending.points} of {pending.planned} points"
+        if not (self._is_terminal or pending.newest):
+            self._taken_up = ""
+            self._console.note(
+                f"warning: {serial} is not finished ({begun}), and others were measured after it; "
+                "scan it again when it is on the bench"
+            )
+            return True
         if self._is_terminal:
             self._console.note(
                 f"{serial} is not finished ({begun}). If it is on the bench, press Enter or scan "

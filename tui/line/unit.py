@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from daq.errors import LashbenchError, MeasurementError
 from tui.line.results import Result, Results, Word
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from analysis.acceptance import LimitSet
     from daq.session_events import Finished
     from daq.session_request import SessionRequest
+    from daq.store import Store
     from daq.store_records import Measurement
     from sim.unit import Unit
 
@@ -43,6 +45,8 @@ class Pending:
     points: int
     planned: int
     complete: bool
+    newest: bool
+    """Whether nothing was measured after it, so that its unit may still be on the bench."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +65,9 @@ class Line:
         What is judged by; None to measure only.
     diagnose
         Diagnose where a limit asks for it.
+    out
+        The file of results. It is kept with each measurement: what another file's line measured
+        is that line's.
     """
 
     unit_name: str
@@ -73,6 +80,7 @@ class Line:
     db: Path
     limits: LimitSet | None
     diagnose: bool
+    out: Path
     console: Console
 
     def request(self, serial: str, attempt: int, resume: int | None = None) -> SessionRequest:
@@ -92,25 +100,31 @@ class Line:
         )  # fmt: skip
         if request.header is None:
             return request
-        mark = json.dumps({"attempt": attempt})
+        mark = json.dumps({"attempt": attempt, "results": str(self.out.resolve())})
         configurations = {**request.header.configurations, _MARK: mark}
         return replace(request, header=replace(request.header, configurations=configurations))
 
     def pending(self, results: Results) -> Pending | None:
-        """The newest measurement of a line, if it has no result."""
+        """The newest measurement of the line with these results, if it has none there."""
         from daq.store import Store
 
         if not self.db.exists():
             return None
         with Store(self.db, read_only=True) as store:
-            for line in reversed(list(store.lines(last=_LOOKED_AT))):
+            lines = list(store.lines(last=_LOOKED_AT))
+            for line in reversed(lines):
                 found = store.measurement(line.id)
                 if _MARK not in found.header.configurations:
                     continue
+                mark = _mark(found)
+                if mark.get("results", str(self.out.resolve())) != str(self.out.resolve()):
+                    continue
                 judged = results.of_measurement(self.db, line.id) is not None
+                # Marks of earlier versions name no file; a note says that there is a result.
+                judged |= "results" not in mark and _is_noted(store, line.id, _MARK)
                 if judged or found.state == "aborted" or found.header.unit != self.unit.name:
                     return None
-                return _pending(found)
+                return _pending(found, mark, line.id == lines[-1].id)
         return None
 
     def measure(self, serial: str, attempt: int, resume: int | None = None) -> Result | None:
@@ -215,14 +229,27 @@ class Line:
         from daq.store import Store
 
         with Store(self.db, read_only=True) as store:
-            return any(event.kind == kind for event in store.events(measurement))
+            return _is_noted(store, measurement, kind)
 
 
-def _pending(found: Measurement) -> Pending:
+def _is_noted(store: Store, measurement: int, kind: str) -> bool:
+    return any(event.kind == kind for event in store.events(measurement))
+
+
+def _mark(found: Measurement) -> Mapping[str, Any]:
+    """What a line said of its measurement; empty where it cannot be read."""
+    try:
+        mark = json.loads(found.header.configurations[_MARK])
+    except (ValueError, RecursionError):
+        return {}
+    return mark if isinstance(mark, dict) else {}
+
+
+def _pending(found: Measurement, mark: Mapping[str, Any], newest: bool) -> Pending:
     attempt = 1
-    with suppress(ValueError, TypeError, KeyError):
-        attempt = max(1, int(json.loads(found.header.configurations[_MARK])["attempt"]))
+    with suppress(ValueError, TypeError, KeyError, OverflowError):
+        attempt = max(1, int(mark["attempt"]))
     return Pending(
         found.id, found.header.serial, attempt, found.points, found.header.plan.points,
-        found.state == "complete",
+        found.state == "complete", newest,
     )  # fmt: skip

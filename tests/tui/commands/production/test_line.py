@@ -3,6 +3,7 @@
 import io
 import json
 import os
+import sqlite3
 import sys
 
 import pytest
@@ -92,6 +93,75 @@ def test_what_was_not_written_is_judged_from_the_history_and_a_retest_is_marked(
         again = bench.results()
         assert [one["attempt"] for one in again] == [1, 2]
         assert again[-1]["judgement"] == json.loads(whole.splitlines()[-1])["judgement"]
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch, capsys):
+    """A line in this process, with what is scanned on a pipe; exit code, stdout and stderr."""
+    from tui import cli
+
+    with line_bench(tmp_path) as bench:
+
+        def call(serials, *words):
+            read, write = os.pipe()
+            os.write(write, "".join(f"{serial}\n" for serial in serials).encode())
+            os.close(write)
+            with os.fdopen(read) as stream:
+                monkeypatch.setattr(sys, "stdin", stream)
+                code = cli.main([str(word) for word in bench.words(*words)])
+            return code, *capsys.readouterr()
+
+        yield bench, call
+
+
+def cut(db, measurement):
+    """Leave of a measurement what a crash would: some points, and no end."""
+    with sqlite3.connect(db) as opened:
+        opened.execute("UPDATE measurements SET state = 'interrupted' WHERE id = ?", [measurement])
+        opened.execute(
+            "DELETE FROM points WHERE measurement_id = ? AND requested_hz > 150", [measurement]
+        )
+        opened.execute(
+            "UPDATE measurements SET points = "
+            "(SELECT count(*) FROM points WHERE measurement_id = measurements.id)"
+        )
+
+
+def serials(path):
+    return [json.loads(line)["serial"] for line in path.read_text().splitlines()]
+
+
+def test_a_second_file_of_results_takes_up_nothing_of_the_first(here, tmp_path):
+    """Each file has its units: none is judged into another, or driven under an old serial."""
+    first, second = tmp_path / "first.jsonl", tmp_path / "second.jsonl"
+    bench, run = here
+    assert run("A", "--out", first)[0] == 0
+    # A complete unit of the first file is not judged into the second.
+    code, out, _ = run("", "--out", second)
+    assert (code, out, second.exists()) == (0, "no unit yet\n", False)
+    assert run("B", "--out", first)[0] == 0
+    first.write_text(first.read_text().splitlines(keepends=True)[0])
+    cut(bench.db, 2)
+    # Another unit is on the bench: it is not measured as B.
+    code, out, _ = run("C", "--out", second)
+    assert (code, out.startswith("PASS       C  ADSS  measurement 3")) == (0, True)
+    # Nor does the first line go on with B by itself now.
+    code, out, err = run("D", "--out", first)
+    assert (code, out.startswith("PASS       D  ADSS  measurement 4")) == (0, True)
+    assert "warning: B is not finished" in err
+    assert (serials(first), serials(second)) == (["A", "D"], ["C"])
+    assert bench.points(2) < 21
+
+
+def test_a_line_goes_on_with_its_own_unit(here, tmp_path):
+    first = tmp_path / "first.jsonl"
+    bench, run = here
+    assert run("A", "--out", first)[0] == 0
+    first.unlink()
+    cut(bench.db, 1)
+    code, out, _ = run("", "--out", first)
+    assert (code, out.splitlines()[0]) == (0, "PASS       A  ADSS  measurement 1")
+    assert (serials(first), bench.points(1)) == (["A"], 21)
 
 
 def test_a_unit_that_does_not_answer_is_told_and_a_bench_that_fails_stops_the_line(tmp_path):
