@@ -15,14 +15,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator, NullLocator
 
+from analysis.drawing.palette import LEVEL_COLOURS
+from analysis.drawing.picture import save_picture
 from analysis.resonance import LevelFeatures
-from daq.formats.atomic import replacing
 from daq.frf import FrequencyResponse, PointFlag
 from daq.untrusted.visible_text import visible_line
 
 __all__ = ["draw_response", "save_response_figure"]
 
-_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 _MARKERS = "osD^vP"
 
 
@@ -42,7 +42,7 @@ def draw_response(response: FrequencyResponse, features: Sequence[LevelFeatures]
     found = {_key(feature.source_vpk): feature for feature in features}
     for index, level in enumerate(map(_key, response.levels_vpk.tolist())):
         style: dict[str, Any] = {
-            "color": _COLOURS[index % len(_COLOURS)],
+            "color": LEVEL_COLOURS[index % len(LEVEL_COLOURS)],
             "marker": _MARKERS[index % len(_MARKERS)],
             "markersize": 3.0,
         }
@@ -62,10 +62,7 @@ def save_response_figure(
     response: FrequencyResponse, features: Sequence[LevelFeatures], path: Path
 ) -> None:
     """Write `draw_response` as a picture; the suffix names its kind."""
-    with replacing(path) as stream:
-        draw_response(response, features).savefig(
-            stream, format=path.suffix.removeprefix(".") or "png", dpi=130
-        )
+    save_picture(draw_response(response, features), path)
 
 
 def _draw_level(

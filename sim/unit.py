@@ -35,7 +35,7 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
-_NO_PHYSICS = {"schema_", "schema", "name", "limits", "acceptance", "tolerance", "commissioning"}
+NO_PHYSICS = {"schema_", "schema", "name", "limits", "acceptance", "tolerance", "commissioning"}
 """Sections of a unit that do not decide how it moves."""
 
 
@@ -265,7 +265,7 @@ class Unit(_Section):
 
         Whatever is stored of a unit, and every seed, depends on this alone.
         """
-        known = self.model_dump(mode="json", exclude=_NO_PHYSICS)
+        known = self.model_dump(mode="json", exclude=NO_PHYSICS)
         return {k: v for k, v in known.items() if v is not None or k not in OPTIONAL_SECTIONS}
 
     def with_parameters(self, **changes: float) -> Unit:
@@ -285,7 +285,7 @@ class Unit(_Section):
                     f"use one of: {', '.join(sorted(known))}"
                 )
             for name, section in document.items():
-                if name in _NO_PHYSICS or not isinstance(section, dict):
+                if name in NO_PHYSICS or not isinstance(section, dict):
                     continue
                 if symbol in section:
                     section[symbol] = float(value)

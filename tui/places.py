@@ -12,7 +12,17 @@ from pathlib import Path
 
 from daq.errors import InputError
 
-__all__ = ["cache_folder", "look_at_caches", "history_path", "log_path", "profiles_folder"]
+__all__ = [
+    "cache_folder",
+    "history_path",
+    "log_path",
+    "look_at_caches",
+    "measurement_number",
+    "profiles_folder",
+]
+
+_MOST_DIGITS = 18
+"""What an identifier in a history can have."""
 
 
 def history_path(given: Path | None, *, create: bool = False) -> Path:
@@ -43,6 +53,16 @@ def history_path(given: Path | None, *, create: bool = False) -> Path:
                 f"{folder}: cannot be made ({error.strerror or error}); give --db FILE"
             ) from error
     return folder / "lashbench.db"
+
+
+def measurement_number(source: str, db: Path | None) -> int | None:
+    """The identifier of a measurement that is meant by FILE_OR_ID; None if it names a file.
+
+    Digits are an identifier, unless no history is named and there is such a file.
+    """
+    if not (source.isascii() and source.isdecimal() and len(source) <= _MOST_DIGITS):
+        return None
+    return int(source) if db is not None or not Path(source).is_file() else None
 
 
 def profiles_folder() -> Path:

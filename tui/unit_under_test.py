@@ -6,15 +6,33 @@ Owns that what is unusual in a unit file is told once, before the work. It judge
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from daq.errors import InputError
 from tui.options import tolerance_shares
 
 if TYPE_CHECKING:
     from sim.unit import Unit
     from tui.text.output import Console
 
-__all__ = ["read_unit"]
+__all__ = ["read_unit", "unit_title"]
+
+_LONGEST_TITLE = 64
+
+
+def unit_title(out: Path, name: str | None) -> str:
+    """The name of a unit in the file `out`: the one given, else that of the file.
+
+    Raises
+    ------
+    InputError
+        If a unit cannot have that name.
+    """
+    title = out.stem.upper() if name is None else name
+    if not title.strip() or len(title) > _LONGEST_TITLE or not title.isprintable():
+        raise InputError(f"unit name {title!r}: give 1 to {_LONGEST_TITLE} characters on one line")
+    return title
 
 
 def read_unit(

@@ -1,7 +1,8 @@
 """Coordinates of a drive's parameters in which the prior is standard normal.
 
 Owns which parameters are identified and the map between coordinates and values. A tolerance of
-zero means that a value is exact; it has no coordinate. It simulates nothing.
+zero means that a value is exact, and a share of zero is zero; neither has a coordinate. It
+simulates nothing.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from analysis.ensemble.machine import Machine
+from daq.errors import InputError
 from sim.tolerance import RESPONSE_SCALES
 from sim.unit import Unit
 
@@ -48,9 +50,21 @@ class Coordinates:
 
     @classmethod
     def of(cls, unit: Unit, *, total_backlash_unknown: bool = False) -> Self:
-        """All parameters of a unit whose tolerance is not zero, and the ratio of two stages."""
-        held = {s: share for s, share in unit.tolerances.items() if share > 0.0}
+        """All parameters that are not zero nor exact, and the ratio of two stages.
+
+        Raises
+        ------
+        InputError
+            If a total backlash of zero is to be identified.
+        """
+        known = unit.parameters
+        held = {s: share for s, share in unit.tolerances.items() if share > 0.0 < known[s]}
         if total_backlash_unknown:
+            if known[_BACKLASH] == 0.0:
+                raise InputError(
+                    f"unit {unit.name}: backlash.b_t_deg is 0, and a multiple of it would be 0, "
+                    "too; write about how much it is to identify the total backlash"
+                )
             held[_BACKLASH] = _BACKLASH_SPREAD
         if unit.stages == 2:
             held[RATIO] = float("nan")

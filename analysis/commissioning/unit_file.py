@@ -6,6 +6,7 @@ comments and limits stay. It identifies nothing.
 
 from __future__ import annotations
 
+from collections.abc import MutableMapping
 from datetime import date
 from typing import Any
 
@@ -14,7 +15,9 @@ from tomlkit.items import Table
 
 from analysis.commissioning.commission import Commissioned
 from analysis.commissioning.coordinates import RATIO
+from daq.untrusted.bounded_text import parse_toml
 from sim.tolerance import DEFAULT, MOST
+from sim.unit import NO_PHYSICS, unit_from_mapping
 
 __all__ = ["commissioned_unit_text"]
 
@@ -34,6 +37,11 @@ def commissioned_unit_text(datasheet: str, found: Commissioned, name: str, today
     name
         Name of the unit in the new file.
 
+    Raises
+    ------
+    ConfigurationError
+        If the text would be no unit file.
+
     Notes
     -----
     ``[tolerance]`` holds the error of each value if the others are as identified: a later sweep
@@ -44,7 +52,7 @@ def commissioned_unit_text(datasheet: str, found: Commissioned, name: str, today
     document["name"] = name
     identified = {p.symbol: p for p in found.parameters if p.symbol != RATIO}
     for key, section in document.items():
-        if not isinstance(section, Table) or key in ("tolerance", "commissioning", "limits"):
+        if not isinstance(section, MutableMapping) or key in NO_PHYSICS:
             continue
         for symbol in set(section) & set(identified):
             section[symbol] = _rounded(identified[symbol].value)
@@ -62,7 +70,9 @@ def commissioned_unit_text(datasheet: str, found: Commissioned, name: str, today
     document.pop("commissioning", None)
     document.add("tolerance", tolerance)
     document.add("commissioning", _commissioning(found, today))
-    return tomlkit.dumps(document)
+    text = tomlkit.dumps(document)
+    unit_from_mapping(parse_toml(text), f"unit {name}")
+    return text
 
 
 def _commissioning(found: Commissioned, today: date) -> Table:

@@ -13,15 +13,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.diagnosis.diagnose import Diagnosis
+from analysis.drawing.palette import BLUE, VERMILION
+from analysis.drawing.picture import save_picture
 from analysis.observation.observation import Observation
 from analysis.selection.verdict import Judged
-from daq.formats.atomic import file_stem, replacing
+from daq.formats.atomic import file_stem
 from daq.frf import DB_PER_NEPER
 from daq.untrusted.visible_text import visible_line
 
 __all__ = ["draw_diagnosis", "probability_figure", "residual_figure"]
 
-_PLAIN, _EXTENDED, _INK = "#d55e00", "#0072b2", "#333333"
+_PLAIN, _EXTENDED, _INK = VERMILION, BLUE, "#333333"
 _CHANNELS = ((0, DB_PER_NEPER, "gain (dB)"), (1, 180.0 / np.pi, "phase (deg)"))
 _NARROWEST_SHARE = 1e-3
 
@@ -35,8 +37,7 @@ def draw_diagnosis(diagnosis: Diagnosis, folder: Path) -> list[Path]:
         ("probabilities", probability_figure(diagnosis)),
     ):
         path = folder / f"{file_stem(diagnosis.unit)}-diagnosis-{name}.png"
-        with replacing(path) as stream:
-            figure.savefig(stream, format="png", dpi=130)
+        save_picture(figure, path)
         written.append(path)
     return written
 

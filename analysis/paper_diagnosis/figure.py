@@ -14,13 +14,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
+from analysis.drawing.palette import BLUE, GREEN, VERMILION
+from analysis.drawing.picture import save_picture
 from analysis.paper_diagnosis.diagnose import PaperDiagnosis
 from analysis.paper_diagnosis.posterior import Belief, Judged
-from daq.formats.atomic import file_stem, replacing
+from daq.formats.atomic import file_stem
 
 __all__ = ["draw", "paper_diagnosis_figure"]
 
-_PLAIN, _DAMPED, _BEST, _INK = "#d55e00", "#009e73", "#0072b2", "#111111"
+_PLAIN, _DAMPED, _BEST, _INK = VERMILION, GREEN, BLUE, "#111111"
 _TITLES = {"ratio-free": "ratio unknown", "ratio-as-measured": "ratio as measured"}
 _FEATURES = (("ARF", 0, "v"), ("RF", 2, "^"))
 _BARS = 8
@@ -30,8 +32,7 @@ def draw(diagnosis: PaperDiagnosis, directory: Path) -> list[Path]:
     """Write the figure of one unit as PNG into a directory, made if missing."""
     directory.mkdir(parents=True, exist_ok=True)
     path = directory / f"{file_stem(diagnosis.unit)}-paper-diagnosis.png"
-    with replacing(path) as stream:
-        paper_diagnosis_figure([diagnosis]).savefig(stream, format="png", dpi=130)
+    save_picture(paper_diagnosis_figure([diagnosis]), path)
     return [path]
 
 

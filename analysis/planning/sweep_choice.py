@@ -14,6 +14,7 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
+import tomlkit
 from numpy.typing import NDArray
 
 from analysis.commissioning.coordinates import RATIO, Coordinates
@@ -25,6 +26,8 @@ from analysis.inference.plans import landmarks
 from analysis.observation.observation import USUAL_NOISE_V, Observation, unread
 from daq.errors import InputError
 from daq.plan import SweepPlan, spaced_frequencies
+from daq.recipe import Recipe
+from daq.untrusted.bounded_text import parse_toml
 from sim.unit import Unit
 
 __all__ = ["Planned", "plan_sweep"]
@@ -64,7 +67,7 @@ class Planned:
 
     `arf_hz`, `rf_hz`: 5 %, 50 % and 95 % quantiles over drives as the datasheet allows, at the
     middle level; None where most show none. `ratio_std`: expected error of the contribution ratio
-    by a linear estimate, and `usual_std` that of a sweep of the middle level alone in the same
+    by a linear estimate, and `usual_std` that of the best sweep of one level in the same
     time. `still_vpk`: levels that friction holds. `limits`: what the unit's limits cut off.
     """
 
@@ -123,25 +126,30 @@ class Planned:
         return lines + [f"  {text}" for text in self.limits]
 
     def recipe(self) -> str:
-        """The text of a recipe file (TOML)."""
+        """The text of a recipe file (TOML) of this plan."""
         f = self.plan.frequencies_hz
-        return "\n".join([
-            f"# {self.unit}: sweep with an expected error of the contribution ratio of "
-            f"{self.ratio_std:.2f}.",
-            "",
-            "schema = 1",
-            f'name = "{self.unit}"',
-            "",
-            "[sweep]",
-            f"levels_vpk = [{', '.join(f'{level:g}' for level in self.plan.levels_vpk)}]",
-            f"start_hz = {f[0]:.6g}",
-            f"stop_hz = {f[-1]:.6g}",
-            f"points = {len(f)}",
-            'spacing = "log"',
-            f"settle_cycles = {self.plan.settle_cycles}",
-            f"integrate_cycles = {self.plan.integrate_cycles}",
-            "",
-        ])  # fmt: skip
+        document = tomlkit.document()
+        document.add(
+            tomlkit.comment(
+                f"expected error of the contribution ratio of this sweep: {self.ratio_std:.2f}"
+            )
+        )
+        document.add("schema", tomlkit.item(1))
+        document.add("name", tomlkit.item(self.unit))
+        sweep = tomlkit.table()
+        sweep.update({
+            "levels_vpk": list(self.plan.levels_vpk),
+            "start_hz": f[0],
+            "stop_hz": f[-1],
+            "points": len(f),
+            "spacing": "log",
+            "settle_cycles": self.plan.settle_cycles,
+            "integrate_cycles": self.plan.integrate_cycles,
+        })  # fmt: skip
+        document.add("sweep", sweep)
+        text = tomlkit.dumps(document)
+        Recipe.model_validate(parse_toml(text))
+        return text
 
 
 def plan_sweep(
@@ -190,12 +198,12 @@ def plan_sweep(
     least = min(std for std, _, _ in found)
     std, _, plan = min((one for one in found if one[0] <= _ENOUGH * least), key=lambda one: one[1])
     single = [std for std, _, one in found if len(one.levels_vpk) == 1]
-    gain_db = drawn.y.reshape(len(drawn.z), 3, len(wide.levels_vpk), -1)[:, 0]
-    middle = gain_db[:, len(wide.levels_vpk) // 2]
+    log_gain = drawn.y.reshape(len(drawn.z), 3, len(wide.levels_vpk), -1)[:, 0]
+    middle = log_gain[:, len(wide.levels_vpk) // 2]
     arf, rf = _features(np.array(wide.frequencies_hz), middle)
     return Planned(
         unit.name, plan, plan.duration_s / 60.0, arf, rf, std, min(single, default=std),
-        _still(wide, gain_db), cut,
+        _still(wide, log_gain), cut,
     )  # fmt: skip
 
 

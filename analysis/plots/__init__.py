@@ -5,8 +5,8 @@ Owns what such a picture shows and how it is written. It estimates nothing and o
 
 from __future__ import annotations
 
+from analysis.drawing.picture import PICTURES, checked_picture, save_picture
 from analysis.plots.overlay import Curve, draw_overlay, save_overlay
-from analysis.plots.picture import PICTURES, checked_picture, save_picture
 from analysis.plots.predicted import predicted
 
 __all__ = [

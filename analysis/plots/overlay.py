@@ -20,7 +20,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator, NullFormatter, ScalarFormatter
 from numpy.typing import NDArray
 
-from analysis.plots.picture import save_picture
+from analysis.drawing.palette import LEVEL_COLOURS
+from analysis.drawing.picture import save_picture
 from analysis.plots.traces import Trace, level_traces, on_one_branch
 from daq.errors import InputError
 from daq.frf import FrequencyResponse
@@ -28,8 +29,7 @@ from daq.untrusted.visible_text import visible_line
 
 __all__ = ["MOST_CURVES", "Curve", "draw_overlay", "save_overlay"]
 
-_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000")
-"""Okabe and Ito (2008), without the yellow that is not seen on white."""
+_COLOURS = (*LEVEL_COLOURS, "#000000")
 _MARKERS = "osD^vPX<>*hd"
 _DASHES = ("-", (0, (1, 1)), (0, (5, 1, 1, 1)), (0, (3, 1, 1, 1, 1, 1)))
 MOST_CURVES = len(_COLOURS) * len(_DASHES)

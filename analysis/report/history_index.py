@@ -29,15 +29,23 @@ _BLOCK = re.compile(r'<script type="application/json" id="lashbench-report">(.*?
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 
 
-def reports_in(folder: Path, history: str, origin: Path) -> dict[int, str]:
+def reports_in(
+    folder: Path, history: str, begun: Mapping[int, str], origin: Path
+) -> dict[int, str]:
     """Reports on measurements of a history, as links from a page in the folder `origin`.
 
-    The newest report on a measurement counts. What is no report is passed over.
+    The newest report on a measurement counts. What is no report is passed over, and one on a
+    measurement of another history with the same file name.
+
+    Parameters
+    ----------
+    begun
+        When each measurement was started, by its number.
     """
     found: dict[int, str] = {}
     pages = [path for path in folder.glob("*.htm*") if path.is_file()]
     for path in sorted(pages, key=_made)[-_MOST_FILES:]:
-        number = _measurement_of(path, history)
+        number = _measurement_of(path, history, begun)
         if number is not None:
             relative = os.path.relpath(path.resolve(), origin.resolve())
             found[number] = quote(Path(relative).as_posix())
@@ -50,7 +58,7 @@ def _made(path: Path) -> float:
     return 0.0
 
 
-def _measurement_of(path: Path, history: str) -> int | None:
+def _measurement_of(path: Path, history: str, begun: Mapping[int, str]) -> int | None:
     """The measurement that a page reports on; None if it is no report, or of another history."""
     try:
         with path.open("rb") as file:
@@ -61,12 +69,14 @@ def _measurement_of(path: Path, history: str) -> int | None:
         return None
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         return None
-    origin = document.get("origin")
-    if not isinstance(origin, dict):
+    origin, measured = document.get("origin"), document.get("measurement")
+    if not isinstance(origin, dict) or not isinstance(measured, dict):
         return None
     number = origin.get("measurement")
+    if not isinstance(number, int) or number not in begun:
+        return None
     named = origin.get("name") == f"measurement {number} of {history}"
-    return number if named and isinstance(number, int) else None
+    return number if named and measured.get("started") == begun[number] else None
 
 
 def write_index(

@@ -19,6 +19,7 @@ from matplotlib.figure import Figure
 from analysis.answer import span_of
 from analysis.diagnosis import Diagnosis
 from analysis.diagnosis.figures import probability_figure, residual_figure
+from analysis.drawing.palette import BLUE, VERMILION
 from analysis.report.html import Markup
 from analysis.resonance import LevelFeatures
 from analysis.resonance.records import with_error
@@ -27,7 +28,7 @@ from daq.frf import FrequencyResponse
 
 __all__ = ["backlash_svg", "bode_svg", "diagnosis_svgs", "figure_svg"]
 
-_BLUE, _GREY, _RED = "#0072b2", "#999999", "#d55e00"
+_BLUE, _GREY, _RED = BLUE, "#999999", VERMILION
 _MOST_READINGS = 2000
 """Of a response whose readings tell their numbers: each takes 200 bytes twice."""
 _NAMED = re.compile(r'(\bid="|\bhref="#|url\(#)')

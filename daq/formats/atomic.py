@@ -18,7 +18,15 @@ from typing import BinaryIO
 
 from daq.errors import InputError, LashbenchError
 
-__all__ = ["append_line", "checked_target", "file_stem", "keeping", "replacing", "write_text"]
+__all__ = [
+    "append_line",
+    "checked_target",
+    "file_stem",
+    "keeping",
+    "new_target",
+    "replacing",
+    "write_text",
+]
 
 _PIECE = 1 << 16
 
@@ -154,8 +162,8 @@ def checked_target(path: Path, *reads: str | Path) -> Path:
     Parameters
     ----------
     reads
-        What the same work reads, as files or as names of something else: none of these files is
-        written over.
+        What the same work reads or writes otherwise, as files or as names of something else: none
+        of these files is written over. A `Path` is meant also where its file is not there yet.
 
     Raises
     ------
@@ -173,13 +181,33 @@ def checked_target(path: Path, *reads: str | Path) -> Path:
         if not target.parent.is_dir():
             raise InputError(f"{path}: there is no directory {target.parent}; make it first")
         for one in reads:
-            if target.exists() and os.path.exists(one) and os.path.samefile(one, target):
+            if _is_same(target, one):
                 raise InputError(f"{path}: is the file that is read; give another name")
     except (OSError, RuntimeError, ValueError) as error:
         raise InputError(f"{path}: is not a usable file name ({error})") from error
     if not os.access(target.parent, os.W_OK):
         raise InputError(f"{path}: the directory {target.parent} may not be written")
     return target
+
+
+def new_target(path: Path) -> Path:
+    """As `checked_target`, of a file that is not there yet.
+
+    Raises
+    ------
+    InputError
+        If it is there, or as `checked_target`.
+    """
+    target = checked_target(path)
+    if target.exists():
+        raise InputError(f"{path}: is there already and is left as it is; give another name")
+    return target
+
+
+def _is_same(target: Path, one: str | Path) -> bool:
+    if target.exists() and os.path.exists(one):
+        return os.path.samefile(one, target)
+    return isinstance(one, Path) and one.resolve() == target
 
 
 def _is_own(link: Path) -> bool:

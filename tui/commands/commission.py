@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from daq.errors import InputError
 from tui.executors import executor_at
 from tui.options import Cluster, Json, Tolerance, UnitName
 from tui.reading_options import NO_OPTIONS, ReadingOptions, read_files
 from tui.text.output import Injected
-from tui.unit_under_test import read_unit
+from tui.unit_under_test import read_unit, unit_title
 
 __all__ = ["commission"]
 
@@ -54,17 +53,13 @@ def commission(
     """
     from datetime import date
 
-    from daq.formats.atomic import checked_target, write_text
+    from daq.formats.atomic import new_target, write_text
 
-    if checked_target(out).exists():
-        raise InputError(f"{out}: is there already and is left as it is; give another name")
-    title = out.stem.upper() if name is None else name
-    if not title.strip() or len(title) > 64 or not title.isprintable():
-        raise InputError(f"unit name {title!r}: give 1 to 64 characters on one line")
+    new_target(out)
+    title = unit_title(out, name)
     from analysis.commissioning import commission_drive, commissioned_unit_text
     from analysis.observation.input_check import check_inputs
     from daq.configs import config_path
-    from sim.unit import load_unit
 
     subject = read_unit(unit, console, tolerance)
     responses = read_files([file, *further], given, console)
@@ -77,7 +72,6 @@ def commission(
         )  # fmt: skip
     datasheet = config_path("units", unit).read_text(encoding="utf-8")
     write_text(out, commissioned_unit_text(datasheet, found, title, date.today()))
-    load_unit(str(out))
     for text in found.warnings:
         console.note(f"warning: {text}")
     if json:

@@ -51,11 +51,12 @@ def index(
         raise InputError(f"{out}: the page is HTML; give a name that ends in .html")
     if last < 1:
         raise InputError(f"--last {last}: give 1 or more")
-    target = checked_target(out)
+    history = history_path(db)
+    target = checked_target(out, history, *([judge] if judge else []))
     folder = target.parent if reports is None else reports
     if not folder.is_dir():
         raise InputError(f"--reports {folder}: there is no such directory")
-    limits, history = limits_to_judge_by(judge), history_path(db)
+    limits = limits_to_judge_by(judge)
     with Store(history, read_only=True) as store:
         rows = []
         for line in store.lines(last=last):
@@ -64,6 +65,7 @@ def index(
                 row["judgement"] = judge_line(store, line, limits).to_json()
             rows.append(row)
         whole = store.count()
-    links = reports_in(folder, history.name, target.parent)
+    begun = {row["id"]: row["started"] for row in rows}
+    links = reports_in(folder, history.name, begun, target.parent)
     write_index(out, history.name, rows, links, whole)
     console.note(f"wrote {out}: {len(rows)} measurements, {len(links)} with a report")

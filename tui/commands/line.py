@@ -106,7 +106,8 @@ def line(
     name = unit or _unit_of(way)
     hook = None if on_result is None else Hook(on_result)
     history = history_path(db, create=True)
-    results = Results(out or history.with_suffix(".line.jsonl"), csv)
+    named = [one for one in (recipe, unit, bench, judge) if one is not None]
+    results = Results(out or history.with_suffix(".line.jsonl"), csv, [history, *named])
     belt = Line(
         name, read_unit(name, console), instrument or _address(place), recipe, bench, adaptive,
         operator, history, limits, diagnose, results.path, console,
@@ -302,7 +303,7 @@ class _Dialogue:
         return True
 
     def _keep(self, result: Result) -> None:
-        """On the disk first, then the label, then the command."""
+        """On the disk first, then the label, the table and the command."""
         try:
             self._results.add(result)
         except LashbenchError as error:
@@ -313,6 +314,10 @@ class _Dialogue:
         self._belt.note(result.measurement, "line", f"{result.verdict} for {result.serial}")
         with readers_may_leave():
             self._console.data(result.label)
+        try:
+            self._results.write_table()
+        except LashbenchError as error:
+            self._console.note(f"warning: --csv {error}; the result is in {self._results.path}")
         self._tell_hook(result)
 
     def _tell_hook(self, result: Result) -> None:

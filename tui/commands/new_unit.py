@@ -12,6 +12,8 @@ from typing import Literal
 
 from daq.errors import ConfigurationError, InputError
 from tui.text.output import Console, Injected
+from tui.text.shell_quote import pasted
+from tui.unit_under_test import unit_title
 
 __all__ = ["new_unit"]
 
@@ -49,13 +51,10 @@ def new_unit(
         return
     if out is None:
         raise InputError("nothing to do; give --out FILE to write or --check FILE to look at")
-    from daq.formats.atomic import checked_target, write_text
+    from daq.formats.atomic import new_target, write_text
 
-    title = out.stem.upper() if name is None else name
-    if not title.strip() or len(title) > 64 or not title.isprintable():
-        raise InputError(f"unit name {title!r}: give 1 to 64 characters on one line")
-    if checked_target(out).exists():
-        raise InputError(f"{out}: is there already and is left as it is; give another name")
+    title = unit_title(out, name)
+    new_target(out)
     text = _asked(stages, console) if ask else _template(2 if stages is None else stages)
     write_text(out, _named(text, title, out))
     _tell_of(out, ask, console)
@@ -70,10 +69,9 @@ def _template(stages: int) -> str:
 def _named(text: str, title: str, out: Path) -> str:
     """The text of a template with the unit's name, and the file's in its commands."""
     import json
-    import shlex
 
     heading, rest = text.split("\n", 1)
-    shown = shlex.quote(str(out)) if str(out).isprintable() else "FILE"
+    shown = pasted([str(out)]) if str(out).isprintable() else "FILE"
     quoted = json.dumps(title, ensure_ascii=False)
     rest = rest.replace('name = "NAME"', f"name = {quoted}", 1).replace("FILE", shown, 1)
     return f"{heading.replace('NAME', title, 1)}\n{rest}"
@@ -107,7 +105,8 @@ def _tell_of(out: Path, asked: bool, console: Console) -> None:
     for text in find_unusual(unit):
         console.note(f"warning: {text}")
     if asked:
-        console.note(f"wrote {out}; what follows from it: lashbench new-unit --check {out}")
+        words = pasted(["lashbench", "new-unit", "--check", str(out)])
+        console.note(f"wrote {out}; what follows from it: {words}")
         return
     console.note(f"wrote {out}; every number in it is an example: put in those of your drive")
 

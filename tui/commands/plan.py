@@ -11,6 +11,7 @@ from daq.errors import InputError
 from tui.executors import executor_at
 from tui.options import Cluster, Json, Real, Tolerance, UnitName
 from tui.text.output import Injected
+from tui.text.shell_quote import pasted
 from tui.unit_under_test import read_unit
 
 __all__ = ["plan"]
@@ -40,27 +41,23 @@ def plan(
     out
         Recipe file (TOML) to write for ``measure --recipe``; one that exists is left alone.
     """
-    from daq.formats.atomic import checked_target, write_text
+    from daq.formats.atomic import new_target, write_text
 
     if not 0.0 < minutes <= _LONGEST_MIN:
         raise InputError(f"--minutes {minutes:g}: give more than 0 and at most {_LONGEST_MIN:g}")
-    if out is not None and checked_target(out).exists():
-        raise InputError(f"{out}: is there already and is left as it is; give another name")
+    if out is not None:
+        new_target(out)
     from analysis.planning import plan_sweep
 
     subject = read_unit(unit, console, tolerance)
     with executor_at(cluster) as executor:
         found = plan_sweep(subject, minutes, executor=executor, progress=console.progress)
     if out is not None:
-        from daq.recipe import load_recipe
-
         write_text(out, found.recipe())
-        load_recipe(str(out))
     if json:
         console.document(found.to_json())
     else:
         console.data("\n".join(found.summary()))
     if out is not None:
-        console.note(
-            f"wrote {out}; measure by it: lashbench measure --recipe {out} --unit {unit} ..."
-        )
+        words = pasted(["lashbench", "measure", "--recipe", str(out), "--unit", unit])
+        console.note(f"wrote {out}; measure by it: {words} ...")

@@ -20,7 +20,7 @@ from daq.errors import InputError, LashbenchError
 from tui.certificate_options import NO_CERTIFICATE, CertificateOptions, is_pdf
 from tui.judging import features_for, judgement_lines, limits_to_judge_by
 from tui.options import JudgeBy, Tolerance, UnitName
-from tui.places import cache_folder, history_path
+from tui.places import cache_folder, history_path, measurement_number
 from tui.reading_options import NO_OPTIONS, ReadingOptions, read_file
 from tui.text.output import Console, Injected, readers_may_leave
 from tui.text.shell_quote import proposing
@@ -38,9 +38,6 @@ if TYPE_CHECKING:
 __all__ = ["report"]
 
 _WAY_ON = "--as-is takes it as it stands"
-
-_MOST_DIGITS = 18
-"""What an identifier in a history can have."""
 
 
 def report(
@@ -85,7 +82,7 @@ def report(
 
     if out.suffix.lower() not in (".html", ".htm", ".pdf"):
         raise InputError(f"{out}: a report is HTML or PDF; give a name that ends in .html or .pdf")
-    checked_target(out, source, unit, history_path(db))
+    checked_target(out, source, unit, history_path(db), *([judge] if judge else []))
     if is_pdf(out):
         from analysis.report.pdf import find_printer
 
@@ -94,7 +91,8 @@ def report(
     subject = read_unit(unit, console, tolerance)
     remarks: dict[str, str] = {}
     kept: _Kept | None = None
-    if not _is_identifier(source, db):
+    number = measurement_number(source, db)
+    if number is None:
         from analysis.report import file_origin
 
         response, origin = read_file(source, given, console), file_origin(Path(source))
@@ -104,7 +102,7 @@ def report(
             "that complete a file"
         )
     else:
-        kept = _stored(history_path(db), int(source), subject)
+        kept = _stored(history_path(db), number, subject)
         response, origin = kept.response, kept.origin
     issued = certificate.certificate(response.provenance.get("configurations") or {})
     for doubt in unit_doubts([response], subject):
@@ -178,13 +176,6 @@ def _doubt(remarks: Mapping[str, str], response: FrequencyResponse) -> str:
 
     doubts = [remarks["input"]] if "input" in remarks else []
     return "; ".join([*doubts, *filter(None, [state_doubt(response.provenance.get("state"))])])
-
-
-def _is_identifier(source: str, db: Path | None) -> bool:
-    """Digits are an identifier, unless no history is named and there is such a file."""
-    if not (source.isascii() and source.isdecimal() and len(source) <= _MOST_DIGITS):
-        return False
-    return db is not None or not Path(source).is_file()
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -74,7 +74,9 @@ class Results:
     path
         JSON Lines; made with the first result.
     table
-        CSV file with the same results, written anew after each; none if left out.
+        CSV file with the same results, written anew by `write_table`; none if left out.
+    reads
+        What the line reads or writes otherwise, as files or names: neither file may be one of it.
 
     Raises
     ------
@@ -84,18 +86,29 @@ class Results:
         If no file can be made there.
     """
 
-    def __init__(self, path: Path, table: Path | None = None) -> None:
+    def __init__(
+        self, path: Path, table: Path | None = None, reads: Sequence[str | Path] = ()
+    ) -> None:
         self.path = path
         self._table = table
-        checked_target(path)
+        checked_target(path, *reads)
         if table is not None:
-            checked_target(table)
+            checked_target(table, path, *reads)
         self.all: list[Result] = list(_read(path)) if path.exists() else []
 
     def add(self, result: Result) -> None:
         """Append a result; it is on the disk when this returns."""
         append_line(self.path, result.model_dump_json())
         self.all.append(result)
+
+    def write_table(self) -> None:
+        """Write the table, if there is one.
+
+        Raises
+        ------
+        LashbenchError
+            If it cannot be written; the results are kept.
+        """
         if self._table is not None:
             write_text(self._table, self.csv())
 

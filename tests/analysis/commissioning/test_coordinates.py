@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.commissioning.coordinates import RATIO, Coordinates
+from daq.errors import InputError
 from sim.unit import load_unit
 
 ADSS = load_unit("adss").with_tolerance({"default": 0.05})
@@ -29,6 +30,15 @@ def test_exact_values_have_no_coordinate():
     assert not {"N", "N_1", "filter_numerator"} & set(Coordinates.of(ADSS).symbols)
     few = Coordinates.of(load_unit("adss")).symbols
     assert set(few) == {"R_m", "k_t", "k_a", "k_ts", "k_s1", "J_L", RATIO}
+
+
+def test_a_datasheet_value_of_zero_has_no_coordinate():
+    frictionless = ADSS.with_parameters(B_m=0.0, T_f_L=0.0)
+    left = set(Coordinates.of(ADSS).symbols) - set(Coordinates.of(frictionless).symbols)
+    assert left == {"B_m", "T_f_L"} & set(Coordinates.of(ADSS).symbols)
+    assert left
+    with pytest.raises(InputError, match="b_t_deg is 0"):
+        Coordinates.of(ADSS.with_parameters(b_t_deg=0.0), total_backlash_unknown=True)
 
 
 def test_slopes_are_derivatives():

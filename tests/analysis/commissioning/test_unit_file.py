@@ -70,6 +70,45 @@ def test_a_sweep_of_the_datasheets_unit_is_one_of_the_commissioned():
     assert unit_doubts([sweep], load_unit("edss"))
 
 
+LIMITED = (
+    DATASHEET
+    + """
+[acceptance]
+b_t_deg = { upper = 0.09 }
+"""
+)
+
+
+def test_limits_of_acceptance_stay():
+    unit = read(commissioned_unit_text(LIMITED, found(True), "A7", date(2026, 11, 2)))
+    assert unit.acceptance == read(LIMITED).acceptance
+    assert unit.backlash.b_t_deg == pytest.approx(0.08)
+
+
+def without(text, section):
+    """A text without one of its tables."""
+    head, _, rest = text.partition(f"\n[{section}]\n")
+    return head + "\n" + rest[rest.index("\n[") :]
+
+
+@pytest.mark.parametrize(
+    "written",
+    ["load = {{ J_L = {J_L}, T_f_L = {T_f_L} }}", "load.J_L = {J_L}\nload.T_f_L = {T_f_L}",
+     '"load" = {{ "J_L" = {J_L}, T_f_L = {T_f_L} }}'],
+)  # fmt: skip
+def test_values_are_replaced_however_the_table_is_written(written):
+    known = load_unit("adss").parameters
+    text = f"{written.format(**known)}\n{without(DATASHEET, 'load')}"
+    assert read(text) == load_unit("adss")
+    unit = read(commissioned_unit_text(text, found(), "A7", date(2026, 11, 2)))
+    assert unit.parameters == pytest.approx(known | {"R_m": 4.4, "J_L": 2.6e-3})
+
+
+def test_a_text_that_would_be_no_unit_is_refused():
+    with pytest.raises(ConfigurationError, match="motor"):
+        commissioned_unit_text(without(DATASHEET, "motor"), found(), "A7", date(2026, 11, 2))
+
+
 def test_comments_stay():
     text = commissioned_unit_text(DATASHEET, found(), "A7", date(2026, 11, 2))
     assert "armature resistance" in text

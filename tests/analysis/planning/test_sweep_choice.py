@@ -1,6 +1,10 @@
 """A planned sweep: what it says of a unit, and that it is one that can be measured."""
 
+from dataclasses import replace
+
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from analysis.planning import plan_sweep
 from daq.errors import InputError
@@ -34,14 +38,25 @@ def test_features_lie_where_the_paper_found_them(planned):
 
 def test_it_tells_the_ratio_better_than_nothing_does(planned):
     """A ratio of which nothing is known has a standard deviation of 0.29."""
-    assert planned.ratio_std < 0.15
-    assert planned.ratio_std <= 1.05 * planned.usual_std
+    assert 0.01 < planned.ratio_std < 0.15
+
+
+def test_several_levels_tell_it_better_than_one(planned):
+    assert len(planned.plan.levels_vpk) > 1
+    assert planned.ratio_std < 0.9 * planned.usual_std
 
 
 def test_its_recipe_is_one(planned):
     recipe = Recipe.model_validate(parse_toml(planned.recipe()))
     assert recipe.plan().levels_vpk == planned.plan.levels_vpk
-    assert recipe.plan().frequencies_hz == pytest.approx(planned.plan.frequencies_hz, rel=1e-4)
+    # A rounded end could lie outside of the unit's limits.
+    assert recipe.plan().frequencies_hz == pytest.approx(planned.plan.frequencies_hz, rel=1e-12)
+
+
+@given(st.text(min_size=1, max_size=64))
+def test_any_name_of_a_unit_makes_a_recipe(planned, name):
+    recipe = Recipe.model_validate(parse_toml(replace(planned, unit=name).recipe()))
+    assert (recipe.name, recipe.plan().levels_vpk) == (name, planned.plan.levels_vpk)
 
 
 def test_features_outside_the_limits_are_told():

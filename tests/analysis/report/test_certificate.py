@@ -133,9 +133,13 @@ def test_a_browser_prints_it_with_page_numbers(report, tmp_path):
 def test_the_index_links_the_reports_of_its_history(report, tmp_path):
     path, _ = report(origin=Origin("measurement 3 of lab.db", facts={"measurement": 3}))
     (tmp_path / "other.html").write_text("<p>no report</p>")
-    links = reports_in(tmp_path, "lab.db", tmp_path)
+    begun = {3: makings.response().provenance["started"], 4: "2026-01-02T03:04:06+00:00"}
+    links = reports_in(tmp_path, "lab.db", begun, tmp_path)
     assert links == {3: path.name}
-    assert reports_in(tmp_path, "other.db", tmp_path) == {}
+    assert reports_in(tmp_path, "other.db", begun, tmp_path) == {}
+    # Measurement 3 of another bench, whose history has the same name.
+    assert reports_in(tmp_path, "lab.db", begun | {3: "2025-01-01T00:00:00+00:00"}, tmp_path) == {}
+    assert reports_in(tmp_path, "lab.db", {4: begun[4]}, tmp_path) == {}
     row = {"id": 3, "started": "2026-01-02T03:04:05", "unit": makings.NASTY, "serial": "<b>",
            "simulated": False, "state": "complete", "points": 5, "planned": 5,
            "contribution_ratio": {"value": 0.3, "std": 0.02},

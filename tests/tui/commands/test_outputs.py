@@ -41,8 +41,34 @@ def a_unit(path):
     return path
 
 
+def a_line(db):
+    return ["line", "--recipe", "adss", "--instrument", "sim:", "--db", str(db)]
+
+
+def empty(path):
+    path.touch()
+    return path
+
+
 # Name of the file that is read, and the words that would write over it.
 VERBS = {
+    "index": ("bench.html", lambda path: ["index", "--db", str(a_history(path)), "--out",
+                                          str(path)]),
+    "line into its history": ("bench.db", lambda path: [*a_line(a_history(path)), "--out",
+                                                        str(path)]),
+    "a line's table into its history": (
+        "bench.db", lambda path: [*a_line(a_history(path)), "--csv", str(path)],
+    ),
+    "a line's table into its results": (
+        "results.jsonl",
+        lambda path: [*a_line(path.with_name("bench.db")), "--out", str(empty(path)), "--csv",
+                      str(path)],
+    ),
+    "a line's table into its unit": (
+        "unit.toml",
+        lambda path: [*a_line(path.with_name("bench.db")), "--unit", str(a_unit(path)), "--csv",
+                      str(path)],
+    ),
     "frf": ("record.csv", lambda path: [*a_record(path), str(path)]),
     "convert": ("r.csv", lambda path: ["convert", str(a_response(path)), str(path)]),
     "simulate": (

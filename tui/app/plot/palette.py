@@ -13,10 +13,12 @@ from dataclasses import dataclass
 from textual.app import App
 from textual.color import Color, ColorParseError
 
+from analysis.drawing.palette import BLUE, GREEN, ORANGE, PURPLE, SKY_BLUE, VERMILION
+
 __all__ = ["LEAST_CONTRAST", "OKABE_ITO", "Palette", "contrast", "palette_of", "readable"]
 
-OKABE_ITO = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")
-"""Blue, orange, green, purple, sky blue, vermilion."""
+OKABE_ITO = (BLUE, ORANGE, GREEN, PURPLE, SKY_BLUE, VERMILION)
+"""In the order of source levels; the colour of alerts comes last."""
 
 LEAST_CONTRAST = 4.5
 """Of text against its background, WCAG 2.1 level AA."""
@@ -90,7 +92,7 @@ def palette_of(app: App[object]) -> Palette:
         background.hex6,
         ink.hex6,
         background.blend(ink, _GRID).hex6,
-        readable(Color.parse("#d55e00"), background, _ALERT_CONTRAST).hex6,
+        readable(Color.parse(VERMILION), background, _ALERT_CONTRAST).hex6,
         tuple(one.hex6 for one in series),
         tuple(background.blend(one, _TINT).hex6 for one in series),
     )

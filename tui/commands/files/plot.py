@@ -15,7 +15,7 @@ from cyclopts import Parameter
 
 from daq.errors import ConfigurationError, InputError
 from tui.options import Real
-from tui.places import history_path
+from tui.places import history_path, measurement_number
 from tui.reading_options import NO_OPTIONS, ReadingOptions, read_file
 from tui.text.output import Console, Injected
 
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from sim.unit import Unit
 
 __all__ = ["plot"]
-
-_MOST_DIGITS = 18
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,12 +84,12 @@ def plot(
     effect
         Extension of the model, ID:param=value[,param=value]; repeat it for several.
     """
-    from analysis.plots.picture import checked_picture
+    from analysis.drawing.picture import checked_picture
     from sim.effects import parse_effect
 
     if not sources:
         raise InputError("FILE_OR_ID is missing; give a response file or an identifier")
-    numbers = [_identifier(source, db) for source in sources]
+    numbers = [measurement_number(source, db) for source in sources]
     files = [Path(one) for one, number in zip(sources, numbers, strict=True) if number is None]
     history = None if len(files) == len(sources) else history_path(db)
     checked_picture(out, [*files, *([history] if history else [])])
@@ -126,13 +124,6 @@ def plot(
 
     save_overlay(curves, out)
     console.note(f"wrote {out}")
-
-
-def _identifier(source: str, db: Path | None) -> int | None:
-    """Digits are an identifier, unless no history is named and there is such a file."""
-    if not (source.isascii() and source.isdecimal() and len(source) <= _MOST_DIGITS):
-        return None
-    return int(source) if db is not None or not Path(source).is_file() else None
 
 
 def _names(sources: Sequence[str], numbers: Sequence[int | None]) -> list[str]:

@@ -181,6 +181,19 @@ def test_a_unit_that_does_not_answer_is_told_and_a_bench_that_fails_stops_the_li
     assert [one["serial"] for one in bench.results()] == ["DEAD", "B"]
 
 
+def test_a_table_that_cannot_be_written_stops_no_line(here, tmp_path):
+    bench, run = here
+    folder, out = tmp_path / "tables", tmp_path / "results.jsonl"
+    folder.mkdir()
+    words = ["--out", out, "--csv", folder / "units.csv", "--on-result", f"rm -r {folder}"]
+    code, said, err = run(["A", "B"], *words)
+    assert (code, serials(out)) == (0, ["A", "B"])
+    assert said.index("PASS       B ") > said.index("PASS       A ")
+    assert "warning: --csv" in err
+    assert f"the result is in {out}" in err
+    assert "judged again" not in err
+
+
 @given(st.text(st.characters(codec="utf-8"), max_size=30))
 def test_any_serial_is_taken_clean_or_refused(text):
     try:
@@ -248,6 +261,7 @@ def test_a_full_disk_leaves_whole_lines(small_disk):
 def test_no_link_is_followed_out_of_the_table(tmp_path):
     results = Results(tmp_path / "r.jsonl", tmp_path / "r.csv")
     results.add(result("=HYPERLINK(1)", failed=["b1", "b2"], verdict="FAIL"))
+    results.write_table()
     assert "'=HYPERLINK(1),1,FAIL" in (tmp_path / "r.csv").read_text()
     assert "b1; b2" in (tmp_path / "r.csv").read_text()
 

@@ -5,7 +5,6 @@ Owns which kinds there are and how one is written. It must never overwrite what 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -46,10 +45,7 @@ def checked_picture(path: Path, sources: Sequence[Path] = ()) -> str:
             f"{path}: {path.suffix or 'no suffix'} is no kind of picture; give a name that ends "
             f"in {', '.join('.' + one for one in PICTURES)}"
         )
-    target = checked_target(path)
-    for source in sources:
-        if target.exists() and os.path.exists(source) and os.path.samefile(source, target):
-            raise InputError(f"{path}: is the file that is read; give another name")
+    checked_target(path, *sources)
     return kind
 
 
