@@ -114,6 +114,7 @@ def measure(
     instrument: str = "sim:",
     *,
     serial: str = "",
+    bench: str = "default",
     db: str | Path | None = None,
     yes: bool = False,
 ) -> Result:
@@ -123,8 +124,8 @@ def measure(
     ----------
     plan
         What to sweep.
-    unit, instrument, serial
-        As the options of ``lashbench measure``.
+    unit, instrument, serial, bench
+        As the options of ``lashbench measure``, and with the same limits.
     db
         The history; yours, if left out.
     yes
@@ -134,45 +135,40 @@ def measure(
     ------
     InputError
         If `yes` is needed.
+    LimitError
+        If a limit of bench, unit or instrument forbids the plan; nothing was sent.
     MeasurementError
         If the sweep is not complete, or the source is not confirmed off.
     LashbenchError
         As `lashbench measure`.
     """
-    from contextlib import closing
-
-    from daq.analyser import SourceState
-    from daq.control import SessionControl
     from daq.errors import InputError, MeasurementError
-    from daq.limits import load_bench
-    from daq.session_events import Finished, PointStored
-    from daq.session_request import SessionRequest
     from daq.store import Store
-    from daq.store_records import MeasurementHeader
-    from sim.unit import load_unit
-    from tui.bench import bench_session, unit_limits
+    from tui.bench import drives_hardware
+    from tui.measure_options import PlanOptions, session_request
+    from tui.measurements.running import run_session
     from tui.places import history_path
+    from tui.session_words import exit_code, tell_event
+    from tui.text.output import Console
+    from tui.unit_under_test import read_unit
 
-    if not instrument.startswith("sim:") and not yes:
+    if drives_hardware(instrument) and not yes:
         raise InputError(f"{instrument}: drives hardware; see that it is safe, and give yes=True")
-    subject, show = load_unit(unit), _progress()
+    console = Console()
+    subject = read_unit(unit, console)
     history = history_path(None if db is None else Path(db), create=True)
-    header = MeasurementHeader(subject.name, serial, plan, instrument, "lashbench notebook")
-    request = SessionRequest(header, limits=(load_bench().bounds(), unit_limits(subject)))
-    end: Finished | None = None
-    session = bench_session(instrument, subject, history, request, SessionControl())
-    with closing(session) as events:
-        for event in events:
-            if isinstance(event, PointStored):
-                show(event.done / event.total, "measuring")
-            elif isinstance(event, Finished):
-                end = event
-    if end is None or end.source_state is not SourceState.CONFIRMED_OFF:
-        raise MeasurementError("the source is not confirmed off; switch the amplifier off")
-    if end.state != "complete":
+    request = session_request(
+        PlanOptions(), unit, subject, instrument, history,
+        recipe=None, bench=bench, resume=None, remeasure=None, run_in=None,
+        remarks={"serial": serial, "operator": "", "notes": ""}, plan=plan,
+    )  # fmt: skip
+    end, fault = run_session(instrument, subject, history, request, console, tell_event)
+    if fault is not None:
+        raise fault
+    if exit_code(end) != 0:
         raise MeasurementError(
             f"measurement {end.measurement} is {end.state}: {end.reason}; resume it with "
-            "lashbench measure --resume"
+            f"lashbench measure --resume {end.measurement}"
         )
     with Store(history, read_only=True) as store:
         response = store.response(end.measurement)

@@ -1,14 +1,17 @@
 """The names for a notebook: what they load, how results show themselves, and the example."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from instruments.bench_server import linear_analyser, served
 
 import lashbench as lb
 from daq.analyser import SourceState
-from daq.errors import InputError
+from daq.configs import config_path
+from daq.errors import ConfigurationError, InputError, LashbenchError, LimitError
 from daq.frf import FrequencyResponse
 from daq.plan import SweepPlan
 from daq.store import Store
@@ -45,6 +48,9 @@ def test_a_sweep_is_measured_and_kept_with_the_source_off(tmp_path, capsys):
     with Store(tmp_path / "lab.db", read_only=True) as store:
         kept = store.measurement(1)
     assert (kept.state, kept.source_state) == ("complete", SourceState.CONFIRMED_OFF)
+    # With the files of unit and bench, as any other measurement.
+    assert 'name = "ADSS"' in kept.header.configurations["unit"]
+    assert "[limits]" in kept.header.configurations["bench"]
 
 
 def test_hardware_is_not_driven_unasked(tmp_path):
@@ -52,6 +58,30 @@ def test_hardware_is_not_driven_unasked(tmp_path):
     with pytest.raises(InputError, match="yes=True"):
         lb.measure(plan, "adss", "GPIB0::11::INSTR", db=tmp_path / "lab.db")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("instrument", ["sim:", "simulated:", "SIM:"])
+def test_what_cannot_be_measured_is_refused_before_a_history_is_made(tmp_path, instrument):
+    """By a bench of one's own, by the instrument, and by what is no address."""
+    narrow = tmp_path / "narrow.toml"
+    text = config_path("benches", "default").read_text(encoding="utf-8")
+    narrow.write_text(re.sub(r"(?m)^source_vpk = .*$", "source_vpk = 0.5", text), encoding="utf-8")
+    plan = SweepPlan((130.0,), (2.5,))
+    with pytest.raises((LimitError, ConfigurationError)):
+        lb.measure(plan, "adss", instrument, db=tmp_path / "lab.db", bench=str(narrow))
+    assert not (tmp_path / "lab.db").exists()
+
+
+def test_a_fault_says_what_is_kept_and_that_the_source_is_off(tmp_path):
+    frequencies = tuple(float(hz) for hz in range(130, 160))
+    plan = SweepPlan(frequencies, (2.5,), settle_cycles=2, integrate_cycles=3)
+    with (
+        served(
+            linear_analyser(lambda hz: 0.5 + 0.1j, faults=["hardware-error:point=4"])
+        ) as address,
+        pytest.raises(LashbenchError, match=r"\d points? kept, source confirmed off"),
+    ):
+        lb.measure(plan, "adss", address, db=tmp_path / "lab.db", yes=True)
 
 
 def test_half_a_model_is_refused():

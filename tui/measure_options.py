@@ -99,6 +99,7 @@ def session_request(
     run_in: int | None,
     remarks: Mapping[str, str],
     unit_text: str | None = None,
+    plan: SweepPlan | None = None,
 ) -> SessionRequest:
     """Everything a session needs to know, checked against all limits.
 
@@ -108,6 +109,8 @@ def session_request(
         Name or path of the unit's file.
     unit_text
         What that file held, where `unit_name` is no name or path of one any more.
+    plan
+        The whole sweep, in place of `options`.
 
     Raises
     ------
@@ -146,7 +149,7 @@ def session_request(
     else:
         if remeasure is not None:
             raise InputError("--remeasure needs --resume ID: which measurement is it about?")
-        plan = swept_plan(options, way)
+        plan = plan or swept_plan(options, way)
         refinement = _refinement(options, way, plan)
         configurations = {
             "unit": _text("units", unit_name) if unit_text is None else unit_text,

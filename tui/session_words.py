@@ -10,8 +10,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from daq.errors import InputError, LashbenchError, MeasurementError
-from tui.entry import INTERRUPTED
+from daq.errors import InputError, Interrupted, LashbenchError, MeasurementError
 from tui.text.output import Console
 
 if TYPE_CHECKING:
@@ -111,4 +110,4 @@ def exit_code(finished: Finished) -> int:
     state = contract_state(finished)
     if state != "confirmed-off":
         raise MeasurementError(f"SOURCE OFF {state.upper()}: switch it off by hand")
-    return 0 if finished.state == "complete" else INTERRUPTED
+    return 0 if finished.state == "complete" else Interrupted.exit_code

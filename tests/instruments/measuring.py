@@ -17,14 +17,14 @@ def at_point(monkeypatch, number, act):
     """Do something as soon as a point is told."""
     from tui.commands import measure
 
-    whole = measure._tell
+    whole = measure.tell_event
 
     def tell(event, console):
         whole(event, console)
         if isinstance(event, PointStored) and event.done == number:
             act()
 
-    monkeypatch.setattr(measure, "_tell", tell)
+    monkeypatch.setattr(measure, "tell_event", tell)
 
 
 def stopped(run, monkeypatch, points=2):

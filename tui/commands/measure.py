@@ -6,20 +6,18 @@ exit code. The session itself, and that it ends safe, is the engine's.
 
 from __future__ import annotations
 
-from contextlib import closing, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from daq.errors import MeasurementError
 from tui.judging import judgement_lines, limits_to_judge_by
 from tui.measure_options import PlanOptions, read_band, session_request
+from tui.measurements.running import run_session
 from tui.options import Json, JudgeBy, Real, UnitName, Whole
 from tui.places import history_path
-from tui.session_words import complete_error, confirm_driving, contract_state, exit_code
-from tui.session_words import tell_event as _tell
+from tui.session_words import confirm_driving, contract_state, exit_code, tell_event
 from tui.text.output import Console, Injected, readers_may_leave
 from tui.text.shell_quote import pasted
 from tui.unit_under_test import read_unit
@@ -181,31 +179,12 @@ def _run(
     transcript: Path | None,
     told: _Told,
 ) -> int:
-    from daq.control import SessionControl
-    from daq.session_events import Finished
-    from tui.bench import bench_session
-    from tui.signals import listening
-
-    control, finished, console, db = SessionControl(), None, told.console, told.db
-    with (
-        listening(control, console.note),
-        closing(bench_session(instrument, unit, db, request, control, transcript)) as events,
-    ):
-        try:
-            with console.unhurried():
-                for event in events:
-                    # Whoever listened may have left; the measurement goes on without.
-                    with suppress(BrokenPipeError):
-                        _tell(event, console)
-                    if isinstance(event, Finished):
-                        finished = event
-        except Exception as error:
-            if finished is None:
-                raise
-            _report(finished, told)
-            raise complete_error(error, finished) from error
-    if finished is None:
-        raise MeasurementError("the session ended without a word; this is a fault of lashbench")
+    finished, fault = run_session(
+        instrument, unit, told.db, request, told.console, tell_event, transcript
+    )
+    if fault is not None:
+        _report(finished, told)
+        raise fault
     if told.limits is None or finished.state != "complete":
         _report(finished, told)
         return exit_code(finished)

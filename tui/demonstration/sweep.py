@@ -6,12 +6,12 @@ safe, is the engine's.
 
 from __future__ import annotations
 
-from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from daq.errors import MeasurementError
 from tui.demonstration.hidden import BAND_HZ
+from tui.measurements.running import run_session
+from tui.session_words import exit_code
 from tui.text.bode_text import Point, bode_lines
 
 if TYPE_CHECKING:
@@ -50,25 +50,15 @@ def sweep(address: str, unit: Unit, history: Path, console: Console) -> tuple[Fi
     LashbenchError
         As a session does; the source is off, or the message says that it may not be.
     """
-    from daq.control import SessionControl
-    from daq.session_events import Finished
-    from tui.bench import bench_session
-    from tui.signals import listening
+    picture, request = Picture(), _request(address, unit, history)
 
-    control, picture, finished = SessionControl(), Picture(), None
-    request = _request(address, unit, history)
-    with (
-        listening(control, console.note),
-        closing(bench_session(address, unit, history, request, control)) as events,
-    ):
-        for event in events:
-            _show(event, picture, console)
-            if isinstance(event, Finished):
-                finished = event
-    if finished is None:
-        raise MeasurementError("the session ended without a word; this is a fault of lashbench")
-    if finished.source_state.value != "confirmed-off":
-        raise MeasurementError(f"the source was left {finished.source_state.value}")
+    def tell(event: SessionEvent, console: Console) -> None:
+        _show(event, picture, console)
+
+    finished, fault = run_session(address, unit, history, request, console, tell)
+    if fault is not None:
+        raise fault
+    exit_code(finished)  # refuses a source that is not proven off
     return finished, picture
 
 

@@ -9,20 +9,21 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Mapping
-from contextlib import closing, suppress
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from daq.errors import LashbenchError, MeasurementError
+from daq.errors import LashbenchError
 from tui.line.results import Result, Results, Word
 from tui.measure_options import PlanOptions, session_request
-from tui.session_words import complete_error, exit_code, tell_event
+from tui.measurements.running import run_session
+from tui.session_words import contract_state, exit_code, tell_event
 from tui.text.output import Console
 
 if TYPE_CHECKING:
     from analysis.acceptance import LimitSet
-    from daq.session_events import Finished
+    from daq.session_events import Finished, SessionEvent
     from daq.session_request import SessionRequest
     from daq.store import Store
     from daq.store_records import Measurement
@@ -150,33 +151,21 @@ class Line:
 
     def _session(self, request: SessionRequest) -> tuple[Finished, str]:
         """Run a session; how it ended, and what is wrong with the unit if that ended it."""
-        from daq.control import SessionControl
-        from daq.session_events import CheckLine, Finished
-        from tui.bench import bench_session
-        from tui.signals import listening
+        from daq.session_events import CheckLine
 
-        control, finished, why, console = SessionControl(), None, "", self.console
-        with (
-            listening(control, console.note),
-            closing(bench_session(self.instrument, self.unit, self.db, request, control)) as events,
-        ):
-            try:
-                with console.unhurried():
-                    for event in events:
-                        with suppress(BrokenPipeError):
-                            tell_event(event, console)
-                        if isinstance(event, CheckLine) and event.name == "trial point":
-                            why = event.text if event.verdict == "fail" else ""
-                        if isinstance(event, Finished):
-                            finished = event
-            except Exception as error:
-                if finished is None:
-                    raise
-                exit_code(finished)
-                if not why:
-                    raise complete_error(error, finished) from error
-        if finished is None:
-            raise MeasurementError("the session ended without a word; this is a fault of lashbench")
+        why = ""
+
+        def tell(event: SessionEvent, console: Console) -> None:
+            nonlocal why
+            if isinstance(event, CheckLine) and event.name == "trial point":
+                why = event.text if event.verdict == "fail" else ""
+            tell_event(event, console)
+
+        finished, fault = run_session(
+            self.instrument, self.unit, self.db, request, self.console, tell
+        )
+        if fault is not None and (not why or contract_state(finished) != "confirmed-off"):
+            raise fault
         return finished, why
 
     def _result(
