@@ -22,16 +22,16 @@ KNOWN_DB = {20.0: 5.98, 40.0: 0.02, 60.0: -4.46}
 TOLERANCE_DB = 0.4
 """Beyond the scatter over the simulation's seeds, far below the effect of a wrong engine."""
 
-_SERVED = "sim:?ratio=0.3&seed=1"
+SERVED = "sim:?ratio=0.3&seed=1"
 _LEVEL_VPK = 2.5
 _REMEDY = "set lashbench up again; if that does not help, report this line"
 
 
-def check_itself() -> Iterator[Finding]:
+def check_itself(address: str = SERVED) -> Iterator[Finding]:
     """Measure three points on the simulated analyser and compare them."""
     began = time.perf_counter()
     try:
-        state, gains = _measured_db()
+        state, gains = _measured_db(address)
     except LashbenchError as error:
         yield failed("self-test", f"the session failed: {error}", _REMEDY)
         return
@@ -52,7 +52,7 @@ def check_itself() -> Iterator[Finding]:
     yield passed("self-test", f"a session on the simulated analyser reads right, {elapsed:.1f} s")
 
 
-def _measured_db() -> tuple[str, dict[float, float]]:
+def _measured_db(address: str) -> tuple[str, dict[float, float]]:
     """The state of the source after the session, and the gain in dB by frequency in Hz."""
     from daq.control import SessionControl
     from daq.session_events import Finished
@@ -69,11 +69,11 @@ def _measured_db() -> tuple[str, dict[float, float]]:
     with tempfile.TemporaryDirectory(prefix="lashbench-doctor-") as folder:
         history = Path(folder) / "self-test.db"
         request = session_request(
-            options, "adss", unit, _SERVED, history,
+            options, "adss", unit, address, history,
             recipe=None, bench="default", resume=None, remeasure=None, run_in=None,
             remarks={"serial": "", "operator": "self-test", "notes": ""},
         )  # fmt: skip
-        for event in bench_session(_SERVED, unit, history, request, SessionControl()):
+        for event in bench_session(address, unit, history, request, SessionControl()):
             if isinstance(event, Finished):
                 state = event.source_state.value
         with Store(history, read_only=True) as store:

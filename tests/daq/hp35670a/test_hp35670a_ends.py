@@ -108,10 +108,11 @@ def test_a_recorded_session_replays_without_an_instrument(tmp_path):
         points = measured(analyser)
         state = analyser.make_safe()
         analyser.close()
-    replayed = HP35670A(open_transport(f"replay:{path}"))
+    transport = open_transport(f"replay:{path}")
+    replayed = HP35670A(transport)
     assert measured(replayed) == points
     assert replayed.make_safe() is state is SourceState.CONFIRMED_OFF
-    assert replayed._transport.unused == 0
+    assert transport.unused == 0
 
 
 def test_a_replay_with_other_settings_is_told_apart(tmp_path):

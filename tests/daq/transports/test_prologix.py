@@ -24,7 +24,8 @@ def echo_number(message: bytes) -> bytes | None:
 
 
 def opened(adapter: TinyAdapter, address: int = 11) -> PrologixTransport:
-    return PrologixTransport(Adapter(MemoryLink(adapter), address, Deadline.after(1.0)), "test:")
+    adapter.link = MemoryLink(adapter)
+    return PrologixTransport(Adapter(adapter.link, address, Deadline.after(1.0)), "test:")
 
 
 # Bytes
@@ -195,7 +196,7 @@ def test_a_block_cut_short_says_how_much_came():
 def test_a_reply_that_nobody_asked_for_stops_the_next_message():
     adapter = TinyAdapter(lambda _: None)
     transport = opened(adapter)
-    transport._adapter.link.buffer = b"+3\n"
+    adapter.link.buffer = b"+3\n"
     with pytest.raises(ProtocolError, match=r"b'\+3\\n' came unasked for"):
         transport.write("A 1", soon())
     assert adapter.messages == []
@@ -204,7 +205,7 @@ def test_a_reply_that_nobody_asked_for_stops_the_next_message():
 def test_noise_of_nul_bytes_is_no_reply():
     adapter = TinyAdapter(lambda _: None)
     transport = opened(adapter)
-    transport._adapter.link.buffer = b"\0\0"
+    adapter.link.buffer = b"\0\0"
     transport.write("A 1", soon())
     assert adapter.messages == [b"A 1"]
 
@@ -239,7 +240,7 @@ def test_a_device_clear_leaves_no_old_reply_behind():
     with pytest.raises(ProtocolError, match="cut short"):
         ask(transport, "OLD?", soon())
     adapter.queued = b"older still\n"
-    transport._adapter.link.buffer = b"+9\n"
+    adapter.link.buffer = b"+9\n"
     assert transport.device_clear(Deadline.after(1.0))
     assert adapter.cleared == 1
     assert ask(transport, "NEW?", soon()) == "new"
@@ -292,7 +293,7 @@ def test_an_answer_from_before_is_never_taken_for_a_new_one():
         ask(transport, "1?", soon())
     # Now it works off what it was sent meanwhile, version texts and all.
     adapter.silent = False
-    transport._adapter.link.buffer += b"+1\n" + adapter.version.encode() + b"\r\n"
+    adapter.link.buffer += b"+1\n" + adapter.version.encode() + b"\r\n"
     assert ask(transport, "2?", soon()) == "+2"
     assert ask(transport, "3?", soon()) == "+3"
 
@@ -304,7 +305,7 @@ def test_commands_still_go_out_to_a_silent_adapter_and_questions_do_not():
     with pytest.raises(LinkError):
         ask(transport, "1?", soon())
     sent = []
-    transport._adapter.link.adapter.feed = lambda data: sent.append(data) or b""
+    adapter.feed = lambda data: sent.append(data) or b""
     transport.write("SOUR:VOLT 0 VPK", soon())
     assert b"SOUR:VOLT 0 VPK\n" in sent
     with pytest.raises(LinkError, match="adapter is silent"):
@@ -313,6 +314,6 @@ def test_commands_still_go_out_to_a_silent_adapter_and_questions_do_not():
 
 
 def test_closing_lets_the_link_go():
-    transport = opened(TinyAdapter(lambda _: None))
-    transport.close()
-    assert transport._adapter.link.closed
+    adapter = TinyAdapter(lambda _: None)
+    opened(adapter).close()
+    assert adapter.link.closed
