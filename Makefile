@@ -77,7 +77,7 @@ first-day: $(READY)
 	@$(BIN)/lashbench first-day --instrument '$(INSTRUMENT)' --out '$(FIRST_DAY)'
 
 # Every step of the screen in three sizes, dark and light, in build/pictures, and those that the
-# documentation shows: some minutes.
+# documentation shows, of a new session: some minutes.
 pictures: $(READY)
 	@$(BIN)/python tests/screen_pictures.py docs/pictures --every build/pictures
 

@@ -2,8 +2,8 @@
 
 ``python tests/screen_pictures.py docs/pictures`` runs a session on a simulated bench that hides a
 cause, with the real analyses, which takes some minutes, and writes the three pictures that the
-documentation shows. ``--every FOLDER`` writes all steps in all sizes and themes, too. ``--db FILE``
-keeps the history: where it holds a diagnosis, that is shown and not made anew.
+documentation shows. ``--every FOLDER`` writes all steps in all sizes and themes, too. ``--kept``
+shows result and diagnosis of the session before, in seconds (``tests/data/pictured.sql``).
 """
 
 import argparse
@@ -12,6 +12,7 @@ import tempfile
 from contextlib import suppress
 from pathlib import Path
 
+from outputs.pictured import keep_history, make_history
 from outputs.screen import nothing_found, operated
 from textual.pilot import WaitForScreenTimeout
 
@@ -145,9 +146,14 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("docs", type=Path)
     parser.add_argument("--every", type=Path)
-    parser.add_argument("--db", type=Path)
+    parser.add_argument("--kept", action="store_true")
     given = parser.parse_args()
     if given.every is not None:
         given.every.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as scratch:
-        asyncio.run(take(given.docs, given.every, given.db or Path(scratch) / "bench.db"))
+        history = Path(scratch) / "bench.db"
+        if given.kept:
+            make_history(history)
+        asyncio.run(take(given.docs, given.every, history))
+        if not given.kept:
+            keep_history(history)
