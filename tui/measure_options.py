@@ -348,7 +348,7 @@ def _check_same_values(before: Measurement, unit: Unit) -> None:
     InputError
         Names each value that differs.
     """
-    from tui.measurements.reports import unit_as_measured
+    from tui.measurements.measured_unit import unit_as_measured
     from tui.measurements.unit_differences import differing_values
 
     if "unit" not in before.header.configurations:

@@ -6,12 +6,10 @@ adapter's.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import Protocol
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from sim.instrument.gpib_adapter import FakeAdapter
+from sim.instrument.bus import Instrument
 
 __all__ = ["ARDUINO_COMMANDS", "READ_FLAG", "SEND_FLAG"]
 
@@ -21,7 +19,19 @@ _REQUESTS = 0x40
 _ADDRESSES = range(31)
 
 
-def _poll_all(adapter: FakeAdapter, values: list[str]) -> None:
+class Adapter(Protocol):
+    """What these commands ask of an adapter, and change in it."""
+
+    instrument: Instrument
+    own_address: int
+    identity: dict[str, str]
+    verbose: bool
+
+    def say(self, text: str) -> None:
+        """Answer one line."""
+
+
+def _poll_all(adapter: Adapter, values: list[str]) -> None:
     """``++allspoll``: the first that requests service, then an empty line."""
     byte = adapter.instrument.serial_poll() if adapter.own_address < 30 else None
     if byte is not None and byte & _REQUESTS:
@@ -29,7 +39,7 @@ def _poll_all(adapter: FakeAdapter, values: list[str]) -> None:
     adapter.say("")
 
 
-def _find_listeners(adapter: FakeAdapter, values: list[str]) -> None:
+def _find_listeners(adapter: Adapter, values: list[str]) -> None:
     """``++fndl all``, ``++fndl 3-12`` or ``++fndl 5 11``: those that answer, with commas."""
     if not values:
         adapter.say("Missing parameter")
@@ -54,7 +64,7 @@ def _addresses(values: list[str]) -> set[int] | None:
     return None
 
 
-def _identity(adapter: FakeAdapter, values: list[str]) -> None:
+def _identity(adapter: Adapter, values: list[str]) -> None:
     """``++id name|serial|verstr [VALUE]`` and ``++id fwver``."""
     name, text = (values[0].lower(), " ".join(values[1:])) if values else ("", "")
     longest = {"name": 15, "serial": 9, "verstr": 47}
@@ -71,13 +81,13 @@ def _identity(adapter: FakeAdapter, values: list[str]) -> None:
         adapter.identity[name] = f"{int(digits):09d}" if name == "serial" else text
 
 
-def _verbose(adapter: FakeAdapter, values: list[str]) -> None:
+def _verbose(adapter: Adapter, values: list[str]) -> None:
     """``++verbose``: a toggle."""
     adapter.verbose = not adapter.verbose
     adapter.say(f"Verbose: {'ON' if adapter.verbose else 'OFF'}")
 
 
-ARDUINO_COMMANDS: dict[str, Callable[[FakeAdapter, list[str]], None]] = {
+ARDUINO_COMMANDS: dict[str, Callable[[Adapter, list[str]], None]] = {
     "allspoll": _poll_all,
     "fndl": _find_listeners,
     "id": _identity,

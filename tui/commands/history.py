@@ -31,7 +31,7 @@ from tui.measurements.history_rows import (
     told_groups,
     trend_lines,
 )
-from tui.measurements.reports import unit_as_measured
+from tui.measurements.measured_unit import unit_as_measured
 from tui.options import Cluster, Json, JudgeBy, Whole
 from tui.places import cache_folder, history_path
 from tui.text.layout import WIDTH, table_lines, wrapped

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from daq.errors import AnalysisError, ConfigurationError, InputError, LashbenchError
 from tui.judging import features_for
-from tui.measurements.reports import unit_as_measured
+from tui.measurements.measured_unit import unit_as_measured
 from tui.places import cache_folder
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from daq.errors import ConfigurationError, FileFormatError
-from tui.measurements.reports import unit_as_measured
+from tui.measurements.measured_unit import unit_as_measured
 
 if TYPE_CHECKING:
     from daq.frf import FrequencyResponse

@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.errors import FileFormatError
+from daq.formats.foreign.columns import Columns
 from daq.formats.foreign.mapping import assigned_columns
 from daq.formats.foreign.profiles import load_profile
-from daq.formats.foreign.quantities import Columns, response_of
+from daq.formats.foreign.quantities import response_of
 from daq.formats.foreign.table import Table
 from daq.formats.reading import Reading, remarked
 from daq.formats.record import ROW_LIMIT

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.errors import FileFormatError
+from daq.formats.foreign.columns import Columns
 from daq.formats.foreign.functions import COHERENCE, RESPONSE, Axis, Function
-from daq.formats.foreign.quantities import Columns, checked_quantity, response_of
+from daq.formats.foreign.quantities import checked_quantity, response_of
 from daq.formats.foreign.unit_words import frequency_in, gain_in, level_in, phase_in
 from daq.formats.reading import Reading, remarked
 from daq.formats.record import ROW_LIMIT

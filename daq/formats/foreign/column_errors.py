@@ -6,17 +6,15 @@ Owns that choice and the formula. An error of this kind is never scatter of a mo
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from daq.errors import FileFormatError, InputError
+from daq.formats.foreign.columns import Columns
 from daq.formats.reading import Reading
 from daq.frf import DB_PER_NEPER
-
-if TYPE_CHECKING:
-    from daq.formats.foreign.quantities import Columns
 
 __all__ = ["coherence_errors", "column_errors"]
 

@@ -14,11 +14,12 @@ from pathlib import Path
 import numpy as np
 
 from daq.errors import FileFormatError
+from daq.formats.foreign.columns import Columns
 from daq.formats.foreign.decoding import text_in
 from daq.formats.foreign.hp_ascii import is_hp_ascii, table_of_hp_ascii
 from daq.formats.foreign.mapping import Assigned, assigned_columns
 from daq.formats.foreign.profiles import Profile, load_profile, profiles_like
-from daq.formats.foreign.quantities import Columns, response_of
+from daq.formats.foreign.quantities import response_of
 from daq.formats.foreign.table import Table, table_in
 from daq.formats.reading import NOTHING_TOLD, Reading, remarked
 from daq.frf import FrequencyResponse

@@ -181,11 +181,11 @@ class Desk:
         Raises
         ------
         ConfigurationError
-            As `tui.measurements.reports.unit_as_measured`; the one before stays.
+            As `tui.measurements.measured_unit.unit_as_measured`; the one before stays.
         """
         from daq.configs import config_names
         from sim.unit import load_unit
-        from tui.measurements.reports import unit_as_measured
+        from tui.measurements.measured_unit import unit_as_measured
 
         header, unit = measurement.header, unit_as_measured(measurement)
         name = header.unit.lower()

@@ -160,7 +160,7 @@ def _stored(
     """A stored measurement, and the model that was accepted for it unless one is given."""
     from daq.store import Store
     from sim.unit import load_unit
-    from tui.measurements.reports import unit_as_measured
+    from tui.measurements.measured_unit import unit_as_measured
 
     with Store(db, read_only=True) as store:
         response = store.response(number)

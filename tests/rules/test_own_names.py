@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from own_names import found_in, patches, private_names
+from rules.own_names import found_in, patches, private_names
 
 LEFT = {patches: 128, private_names: 56}
 """Of 168 and 75 once. Lower the number with every one that goes; put none in its place."""
@@ -11,7 +11,7 @@ LEFT = {patches: 128, private_names: 56}
 
 @pytest.mark.parametrize("look", LEFT, ids=lambda look: look.__name__)
 def test_no_more_of_the_program_is_patched_or_looked_into(look):
-    found = found_in(Path(__file__).parent, look)
+    found = found_in(Path(__file__).parents[1], look)
     assert len(found) <= LEFT[look], "\n".join(found)
 
 

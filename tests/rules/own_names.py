@@ -103,5 +103,5 @@ def found_in(folder: Path, look) -> list[str]:
 
 if __name__ == "__main__":
     for look in (patches, private_names):
-        found = found_in(Path(__file__).parent, look)
+        found = found_in(Path(__file__).parents[1], look)
         print("\n".join(found), len(found), sep="\n")  # noqa: T201
