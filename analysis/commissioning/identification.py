@@ -16,7 +16,7 @@ from analysis.commissioning.coordinates import Coordinates
 from analysis.commissioning.regression import Gaussian, Round, regress
 from analysis.ensemble.batch import Family, read_families
 from analysis.execution.executor import Executor
-from analysis.observation.observation import Observation, channels_of_readings
+from analysis.observation.observation import CHANNELS, Observation, channels_of_readings
 
 Vector = NDArray[np.float64]
 
@@ -36,14 +36,12 @@ class Identified:
 
     `misfit`: root mean square of what the regression leaves of the measurement over that of the
     simulated drives; 1 is usual. `misfit_rank`: share of the simulated drives that it leaves less
-    of. `stds`: standard deviations (rounds, d) after each round.
+    of.
     """
 
-    coordinates: Coordinates
     posterior: Gaussian
     misfit: float
     misfit_rank: float
-    stds: Vector
 
 
 def identify(
@@ -74,7 +72,6 @@ def identify(
     prior = Gaussian(coordinates.nominal(), np.eye(len(coordinates)))
     at = proposal = prior
     measured = observation.values.ravel()
-    stds = []
     fit = None
     families = max(_PER_COORDINATE * len(coordinates), _LEAST)
     for number in range(_ROUNDS):
@@ -85,11 +82,10 @@ def identify(
         )
         fit = regress(drawn, measured, proposal, prior, last=last)
         at = fit.posterior
-        stds.append(at.std)
         if progress is not None:
             progress((number + 1) / _ROUNDS)
     assert fit is not None
-    return Identified(coordinates, at, fit.misfit, fit.misfit_rank, np.array(stds))
+    return Identified(at, fit.misfit, fit.misfit_rank)
 
 
 def simulate_drives(
@@ -122,7 +118,8 @@ def simulate_drives(
     # What an analyser adds to each reading is drawn: it is part of what the regression leaves.
     disturbed = mean * (gain[:, None] + noise * _complex_normal(rng, mean.shape))
     y = channels_of_readings(disturbed, variance, noise, observation.floor)
-    return Round(z, np.repeat(np.arange(families), _LANES), y.reshape(len(z), -1))
+    angles = np.repeat([name == "phase" for name in CHANNELS], y.shape[-1])
+    return Round(z, np.repeat(np.arange(families), _LANES), y.reshape(len(z), -1), angles)
 
 
 def _with_free_redrawn(

@@ -60,11 +60,26 @@ class Gaussian:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Round:
-    """Simulated drives: coordinates `z` (n, d), `families` (n,) and channels `y` (n, rows)."""
+    """Simulated drives: coordinates `z` (n, d), `families` (n,) and channels `y` (n, rows).
+
+    `angles` (rows,): which channels are angles, rad, known but for whole turns; None is none.
+    """
 
     z: Vector
     families: NDArray[np.int64]
     y: Vector
+    angles: NDArray[np.bool_] | None = None
+
+    def near(self, values: Vector) -> Vector:
+        """Channels (..., rows) with angles within half a turn of the mean of the drives."""
+        if self.angles is None:
+            return values
+        middle = np.angle(np.mean(np.exp(1j * self.y[:, self.angles]), axis=0))
+        found = values.copy()
+        found[..., self.angles] = middle + np.angle(
+            np.exp(1j * (values[..., self.angles] - middle))
+        )
+        return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,8 +104,8 @@ def regress(
     before, the drives are not where it is.
     """
     seen = np.isfinite(measured) & np.all(np.isfinite(drawn.y), axis=0)
-    y, x = drawn.y[:, seen], (drawn.z - proposal.mean) / proposal.std
-    target = measured[seen]
+    y, x = drawn.near(drawn.y)[:, seen], (drawn.z - proposal.mean) / proposal.std
+    target = drawn.near(measured)[seen]
     folds = drawn.families % _FOLDS
     summaries, left = np.empty_like(x), np.empty_like(y)
     for fold in range(_FOLDS):
@@ -134,7 +149,7 @@ def expected_std(
     Root mean square over drives that the estimate has not seen.
     """
     known = columns & np.all(np.isfinite(drawn.y), axis=0)
-    y, x = drawn.y[:, known], (drawn.z - proposal.mean) / proposal.std
+    y, x = drawn.near(drawn.y)[:, known], (drawn.z - proposal.mean) / proposal.std
     folds, left = drawn.families % _FOLDS, np.empty(len(x))
     for fold in range(_FOLDS):
         out = folds == fold

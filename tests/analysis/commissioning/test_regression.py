@@ -47,6 +47,31 @@ def test_the_posterior_is_that_of_the_linear_model(seed, width):
     assert abs(found.posterior.mean[-1]) < 0.35
 
 
+@pytest.mark.parametrize("turns", [-1, 0, 3])
+def test_whole_turns_of_a_phase_change_nothing(turns):
+    """A phase near 180 degrees comes as +179 of one drive and -179 of the next."""
+    rng, slopes, std = world(5)
+    plain = drawn_from(PRIOR, 0.1 * slopes, 0.1 * std, rng)
+    y = 0.1 * (rng.standard_normal(D) @ slopes + std * rng.standard_normal(ROWS))
+    angles = np.arange(ROWS) % 3 == 0
+    offset = np.where(angles, np.pi, 0.0)
+
+    def wrapped(values):
+        turned = np.angle(np.exp(1j * (values + offset))) + 2.0 * np.pi * turns
+        return np.where(angles, turned, values)
+
+    drawn = Round(plain.z, plain.families, wrapped(plain.y), angles)
+    assert np.ptp(drawn.y[:, angles], axis=0).min() > 6.0
+    same, found = (regress(one, at, PRIOR, PRIOR)
+                   for one, at in ((plain, y), (drawn, wrapped(y))))  # fmt: skip
+    np.testing.assert_allclose(found.posterior.mean, same.posterior.mean, atol=1e-6)
+    assert found.misfit == pytest.approx(same.misfit)
+    everything = np.ones(ROWS, dtype=bool)
+    assert expected_std(drawn, PRIOR, everything, plain.z[:, 0]) == pytest.approx(
+        expected_std(plain, PRIOR, everything, plain.z[:, 0])
+    )
+
+
 def test_intervals_hold_the_truth():
     """95 % intervals of 60 worlds with three coordinates: 171 of 180, by chance 162 or more."""
     held = 0
