@@ -5,7 +5,7 @@ Owns the rule, the limits and what was decided. It measures and estimates nothin
 
 from __future__ import annotations
 
-from analysis.acceptance.decision import EXIT_CODES, Verdict, combine, decide
+from analysis.acceptance.decision import EXIT_CODES, Verdict, combine, decide, reasons
 from analysis.acceptance.judgement import Item, Judgement, judge, judge_stages
 from analysis.acceptance.limits import LimitSet, limits_of_stages, limits_of_unit, load_limits
 
@@ -22,4 +22,5 @@ __all__ = [
     "limits_of_stages",
     "limits_of_unit",
     "load_limits",
+    "reasons",
 ]

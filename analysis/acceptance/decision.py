@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-__all__ = ["EXIT_CODES", "RULE", "Verdict", "combine", "decide", "false_pass_share"]
+__all__ = ["EXIT_CODES", "RULE", "Verdict", "combine", "decide", "false_pass_share", "reasons"]
 
 Verdict = Literal["PASS", "FAIL", "UNDECIDED"]
 
@@ -52,6 +52,13 @@ def combine(verdicts: Sequence[Verdict]) -> Verdict:
     if not verdicts or "UNDECIDED" in verdicts:
         return "UNDECIDED"
     return "PASS"
+
+
+def reasons(failed: Sequence[str], undecided: Sequence[str]) -> str:
+    """What a verdict rests on, in words: the names of what failed, and of what is undecided."""
+    told = [f"out of limits: {', '.join(failed)}"] if failed else []
+    told += [f"undecided: {', '.join(undecided)}"] if undecided else []
+    return "; ".join(told)
 
 
 def false_pass_share(k: float) -> float:

@@ -18,6 +18,7 @@ from analysis.acceptance.decision import (
     combine,
     decide,
     false_pass_share,
+    reasons,
 )
 from analysis.acceptance.limits import LimitSet, limits_of_stages
 from analysis.answer import Answer, accept_model
@@ -181,9 +182,8 @@ class Judgement:
     @property
     def headline(self) -> str:
         """The verdict and what it rests on, in one sentence."""
-        what = [f"out of limits: {', '.join(self.failed)}"] if self.failed else []
-        what += [f"undecided: {', '.join(self.open)}"] if self.open else []
-        return f"{'; '.join([f'{self.verdict} by limits {self.limits.name}', *what])}."
+        said = f"{self.verdict} by limits {self.limits.name}", reasons(self.failed, self.open)
+        return f"{'; '.join(filter(None, said))}."
 
     @property
     def rule(self) -> str:

@@ -1,6 +1,6 @@
-"""Whether a size is where no bench has it, where every bench does, or where none could see it.
+"""Whether a size is where no bench has it, or where none could see it.
 
-Owns what "at the end of a plausible range", "within its tolerance" and "out of sight" mean:
+Owns what "at the end of a plausible range" and "out of sight" mean:
 the cause is another then. It simulates nothing and passes no verdict.
 """
 
@@ -17,7 +17,6 @@ __all__ = [
     "EDGE",
     "is_out_of_sight",
     "is_pressed",
-    "may_be_within_tolerance",
 ]
 
 EDGE = 0.02
@@ -65,21 +64,4 @@ def is_out_of_sight(candidate: FittedModel, place: NDArray[np.float64] | None = 
     return any(
         CATALOGUE[effect].resonance == parameter.name and not low < value < high
         for (effect, parameter), value in values
-    )
-
-
-def may_be_within_tolerance(candidate: FittedModel) -> bool:
-    """Whether a datasheet value is no further off than its tolerance, or may as well not be.
-
-    The second is asked of several causes alone: one of them may be there for what the other
-    leaves, and a value that is hardly off, or not for sure, then explains nothing.
-    """
-    hypothesis, best, fit = candidate.hypothesis, candidate.best, candidate.surface.fit
-    if any(hypothesis.within_tolerance(best.place)):
-        return True
-    if len(hypothesis.effects) < 2:
-        return False
-    return any(
-        fit(place).log_likelihood > best.log_likelihood - _AS_GOOD
-        for place in hypothesis.brought_within_tolerance(best.place)
     )

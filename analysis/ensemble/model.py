@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.ensemble.machine import LEAST_SHARE, Machine
+from analysis.ensemble.machine import Machine
 from sim.catalogue import CATALOGUE, EffectParameter, not_of_unit
 from sim.effects import EffectSetting
 from sim.unit import Unit
@@ -142,15 +142,6 @@ class Hypothesis:
         within = zip(self.parameters, wide, self.within_tolerance(place), strict=True)
         beyond = {effect for (effect, _), one, near in within if not (one and near)}
         return tuple(effect for effect in self.effects if effect in beyond)
-
-    def brought_within_tolerance(self, place: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
-        """Places (d,) like one, each with one datasheet value off by just its tolerance."""
-        for at, (_, parameter) in enumerate(self.parameters):
-            if (known := parameter.nominal(self.unit)) is not None:
-                values = self.values(place)
-                off = np.sign(values[at] - known) * parameter.within(self.unit)
-                values[at] = known * max(1.0 + off, LEAST_SHARE)
-                yield self.place(place[0], list(values))
 
     @property
     def rare(self) -> int:

@@ -76,10 +76,6 @@ def certificate_data(certificate: Certificate, data: Data) -> dict[str, Any]:
     }
 
 
-def _day(day: date | None) -> str | None:
-    return None if day is None else day.isoformat()
-
-
 def issued(data: Data) -> list[str]:
     """Number, day and issuer of the report."""
     told = data["certificate"]

@@ -16,7 +16,7 @@ from typing import Any
 from urllib.parse import quote
 
 from analysis.report.document import FORMAT
-from analysis.report.html import Markup, element, joined
+from analysis.report.html import Markup, document, element, joined
 from analysis.report.style import STYLE
 from analysis.resonance.records import with_error
 from daq.formats.atomic import write_text
@@ -26,7 +26,6 @@ __all__ = ["reports_in", "write_index"]
 _MOST_BYTES = 32 << 20
 _MOST_FILES = 10_000
 _BLOCK = re.compile(r'<script type="application/json" id="lashbench-report">(.*?)</script>', re.S)
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 
 
 def reports_in(
@@ -114,21 +113,7 @@ def write_index(
         element("p", f"{len(rows)} measurements, newest first.{left}"),
         element("table", element("thead", head), element("tbody", lines)),
     )
-    title = f"History: {history}"
-    page = element(
-        "html",
-        element(
-            "head",
-            element("meta", charset="utf-8"),
-            element("meta", http_equiv="Content-Security-Policy", content=_POLICY),
-            element("meta", name="viewport", content="width=device-width, initial-scale=1"),
-            element("title", title),
-            element("style", Markup(STYLE)),
-        ),
-        element("body", element("main", body)),
-        lang="en",
-    )
-    write_text(path, f"<!DOCTYPE html>\n{page}\n")
+    write_text(path, document(f"History: {history}", body, STYLE))
 
 
 def _line(row: Mapping[str, Any], link: str | None, judged: bool) -> Markup:

@@ -12,7 +12,10 @@ from typing import Any
 
 from daq.untrusted.visible_text import visible
 
-__all__ = ["Markup", "data_block", "element", "joined", "table"]
+__all__ = ["Markup", "data_block", "document", "element", "joined", "table"]
+
+_POLICY = "default-src 'none'; style-src 'unsafe-inline'"
+"""Held by every browser: the page can fetch nothing and run nothing."""
 
 _VOID = frozenset({"meta", "br", "hr", "col", "img"})
 
@@ -75,6 +78,31 @@ def table(
         for row in rows
     ]
     return element("table", *top, element("tbody", lines), **attributes)
+
+
+def document(title: str, body: Markup, style: str, *, pictures: bool = False) -> str:
+    """A whole page in English that can fetch nothing and run nothing.
+
+    Parameters
+    ----------
+    style
+        Its style sheet, which is not escaped.
+    pictures
+        Whether pictures within the page are shown.
+    """
+    head = (
+        element("meta", charset="utf-8"),
+        element(
+            "meta",
+            http_equiv="Content-Security-Policy",
+            content=f"{_POLICY}; img-src data:" if pictures else _POLICY,
+        ),
+        element("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        element("title", title),
+        element("style", Markup(style)),
+    )
+    page = element("html", element("head", head), element("body", element("main", body)), lang="en")
+    return f"<!DOCTYPE html>\n{page}\n"
 
 
 def data_block(content: Mapping[str, Any], identifier: str) -> Markup:

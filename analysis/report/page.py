@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Protocol
@@ -28,7 +28,7 @@ from analysis.report.certificate import (
     page_style,
 )
 from analysis.report.document import Origin, report_data
-from analysis.report.html import Markup, data_block, element, joined
+from analysis.report.html import data_block, document, joined
 from analysis.report.style import STYLE
 from analysis.report.svg_figures import backlash_svg, bode_svg, diagnosis_svgs
 from analysis.resonance import extract
@@ -40,9 +40,6 @@ from daq.store import Store
 from sim.unit import Unit, unit_from_mapping
 
 __all__ = ["Diagnosed", "file_origin", "stored_origin", "write_report"]
-
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'"
-"""Held by every browser: the page can fetch nothing and run nothing."""
 
 
 class Diagnosed(Protocol):
@@ -134,7 +131,8 @@ def write_report(
         approval_section(data),
         data_block(data, "lashbench-report"),
     )
-    write_text(path, _page(f"Backlash report: {unit.name}", body, page_style(data), bool(logo)))
+    title, style = f"Backlash report: {unit.name}", STYLE + page_style(data)
+    write_text(path, document(title, body, style, pictures=bool(logo)))
     return path
 
 
@@ -218,16 +216,3 @@ def _other_unit(text: str, unit: Unit) -> bool:
     except (ConfigurationError, tomllib.TOMLDecodeError):
         # What cannot be read any more is another file at any rate.
         return True
-
-
-def _page(title: str, body: Markup, paper: Markup, has_logo: bool) -> str:
-    policy = f"{_POLICY}; img-src data:" if has_logo else _POLICY
-    head: Sequence[Markup] = (
-        element("meta", charset="utf-8"),
-        element("meta", http_equiv="Content-Security-Policy", content=policy),
-        element("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        element("title", title),
-        element("style", Markup(STYLE + paper)),
-    )
-    page = element("html", element("head", head), element("body", element("main", body)), lang="en")
-    return f"<!DOCTYPE html>\n{page}\n"

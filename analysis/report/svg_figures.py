@@ -24,7 +24,7 @@ from analysis.report.html import Markup
 from analysis.resonance import LevelFeatures
 from analysis.resonance.records import with_error
 from analysis.response_figure import draw_response
-from daq.frf import FrequencyResponse
+from daq.frf import FrequencyResponse, PointFlag
 
 __all__ = ["backlash_svg", "bode_svg", "diagnosis_svgs", "figure_svg"]
 
@@ -66,13 +66,16 @@ def _readings(figure: Figure, response: FrequencyResponse) -> Callable[[], Itera
         for number, hz in enumerate(response.frequency_hz):
             level = response.source_vpk[number]
             place = f"{hz:.6g} Hz" + (f", {level:g} V" if np.isfinite(level) else "")
+            is_spoilt = bool(response.flags[number] & PointFlag.SPOILT)
             for axes, value, error, unit in (
                 (gain, response.gain_db[number], response.gain_std_db[number], "dB"),
                 (phase, response.phase_deg[number], response.phase_std_deg[number], "deg"),
             ):
-                if np.isfinite(value):
+                # Of a spoilt reading the gain alone is drawn, hollow.
+                if np.isfinite(value) and not (is_spoilt and axes is phase):
                     x, y = axes.transData.transform((hz, value))
-                    yield _Reading(x, height - y, f"{place}: {with_error(value, error)} {unit}")
+                    said = f"spoilt, {value:.4g}" if is_spoilt else with_error(value, error)
+                    yield _Reading(x, height - y, f"{place}: {said} {unit}")
 
     return find
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from sim.datasheet.catalogue_units import unit_in_files, units_of
+from sim.datasheet.chain import natural_frequencies
 
 if TYPE_CHECKING:
     from sim.unit import Unit
@@ -395,7 +396,5 @@ def _resonance_slip(unit: Unit) -> str:
 
 
 def _arf_and_rf(unit: Unit) -> tuple[float, float]:
-    from sim.datasheet.chain import natural_frequencies
-
     found = natural_frequencies(unit)
     return found.anti_resonances_hz[0], found.resonances_hz[0]

@@ -319,13 +319,14 @@ def _measured(rows: Sequence[dict[str, Any]]) -> list[str]:
 
 def _judged(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """The verdict of each measurement, where there are limits, and what is wrong or open."""
+    from analysis.acceptance import reasons
+
     lines = []
     for row in rows:
         judged = row.get("judgement")
         if judged is not None:
-            what = [f"out of limits: {', '.join(judged['failed'])}"] if judged["failed"] else []
-            what += [f"undecided: {', '.join(judged['undecided'])}"] if judged["undecided"] else []
-            text = f"{judged['verdict']:9}  #{row['id']}  {'; '.join(what)}"
+            what = reasons(judged["failed"], judged["undecided"])
+            text = f"{judged['verdict']:9}  #{row['id']}  {what}"
             lines += wrapped(text.rstrip(), indent="  ")
     if not lines:
         return []

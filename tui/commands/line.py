@@ -166,6 +166,8 @@ class _Dialogue:
         self._console = console
         self._is_terminal = sys.stdin.isatty()
         self._unfit = 0
+        self._is_ended = False
+        """Whether the end was typed where something else was asked for."""
         self._taken_up = ""
         """Serial number of the unit that was gone on with, which may be scanned once more."""
 
@@ -175,7 +177,7 @@ class _Dialogue:
         pending = self._belt.pending(self._results)
         if pending is not None and not self._take_up(pending):
             return INTERRUPTED
-        while (serial := self._scanned("serial")) is not None:
+        while not self._is_ended and (serial := self._scanned("serial")) is not None:
             if not self._unit(serial):
                 return INTERRUPTED
         return 0
@@ -220,6 +222,7 @@ class _Dialogue:
             )
             found = self._scanned("serial", may_be_empty=True)
             if found is None:
+                self._is_ended = True
                 return True
             if found not in ("", serial):
                 self._taken_up = ""
@@ -265,19 +268,29 @@ class _Dialogue:
                 self._console.note(f"{last}; skipped")
                 return True
             if self._duplicates == "ask" and self._is_terminal:
-                self._console.prompt(f"{last}; measure it again as a retest? [y/N] ")
-                answer = (self._scanner.line() or "").strip()
+                answer = self._answer(f"{last}; measure it again as a retest? [y/N] ")
                 if answer.lower() not in ("y", "yes"):
                     return self._unit_after(answer, serial)
             else:
                 self._console.note(f"{last}; this is retest {len(before)}")
         return self._measured(serial, len(before) + 1)
 
+    def _answer(self, question: str) -> str:
+        """What is typed or scanned in answer; the counts are shown between, and the end is one."""
+        while True:
+            self._console.prompt(question)
+            text = self._scanner.line()
+            answer = _END if text is None else text.strip()
+            if answer != _TALLY:
+                self._is_ended = answer == _END
+                return answer
+            self.tally()
+
     def _unit_after(self, answer: str, serial: str) -> bool:
         """What was scanned in place of an answer is the next unit."""
         from tui.line.scanner import clean_serial
 
-        if answer.lower() in ("", "n", "no", _END, _TALLY):
+        if answer.lower() in ("", "n", "no", _END):
             return True
         try:
             found = clean_serial(answer)

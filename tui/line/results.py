@@ -15,6 +15,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from analysis.acceptance.decision import reasons
 from daq.errors import FileFormatError
 from daq.formats.atomic import append_line, checked_target, write_text
 
@@ -57,13 +58,10 @@ class Result(BaseModel):
     def label(self) -> str:
         """The line that is printed for the unit."""
         again = f"  retest {self.attempt - 1}" if self.attempt > 1 else ""
-        why = f"  out of limits: {', '.join(self.failed)}" if self.failed else ""
-        if not why and self.undecided:
-            why = f"  undecided: {', '.join(self.undecided)}"
-        if not why and self.reasons:
-            why = f"  {self.reasons[0]}"
+        why = reasons(self.failed, self.undecided) or next(iter(self.reasons), "")
         number = f"measurement {self.measurement}"
-        return f"{self.verdict:9}  {self.serial}  {self.unit}  {number}{again}{why}"
+        label = f"{self.verdict:9}  {self.serial}  {self.unit}  {number}{again}"
+        return f"{label}  {why}" if why else label
 
 
 class Results:

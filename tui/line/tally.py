@@ -23,16 +23,17 @@ def tally_lines(results: Sequence[Result]) -> list[str]:
         return ["no unit yet"]
     last = {one.serial: one for one in results}
     first = [one for one in results if one.attempt == 1]
+    judged_first = [one for one in first if one.verdict != "MEASURED"]
     verdicts = Counter(one.verdict for one in last.values())
     counts = [f"{verdicts[word]} {word}" for word in ("PASS", "FAIL", "UNDECIDED", "MEASURED")
               if verdicts[word]]  # fmt: skip
     lines = [f"{len(last)} units: {', '.join(counts)}; {len(results) - len(first)} retests"]
     judged = [one for one in last.values() if one.verdict != "MEASURED"]
     if judged:
-        passed = sum(one.verdict == "PASS" for one in first)
+        passed = sum(one.verdict == "PASS" for one in judged_first)
         lines.append(
             f"yield {_share(verdicts['PASS'], len(judged))}, "
-            f"at the first attempt {_share(passed, len(first))}"
+            f"at the first attempt {_share(passed, len(judged_first))}"
         )
     for word, reasons in (("FAIL", "failed"), ("UNDECIDED", "undecided")):
         found = [one for one in last.values() if one.verdict == word]

@@ -2,6 +2,7 @@
 
 import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from datetime import date
 
 import pytest
@@ -17,6 +18,7 @@ from analysis.report.history_index import reports_in, write_index
 from analysis.report.logo import logo_address
 from analysis.report.pdf import print_pdf
 from daq.errors import ConfigurationError
+from daq.frf import PointFlag
 from sim.acceptance import Acceptance
 
 PNG = b"\x89PNG\r\n\x1a\n" + b"0" * 20
@@ -118,6 +120,19 @@ def test_a_reading_tells_its_numbers_where_its_mark_is(report):
     assert places <= near
     titles = [spot.find(f"{SVG}title").text for spot in spots]
     assert re.fullmatch(r"100 Hz, 1.5 V: -\d+\.\d+ ± 0\.050 dB", titles[0])
+
+
+def test_a_spoilt_reading_is_told_as_one_and_has_no_phase(report):
+    whole = makings.response()
+    flags = whole.flags.copy()
+    flags[3] = PointFlag.SPOILT
+    path, _ = report(response=replace(whole, flags=flags))
+    picture = re.search(r"<svg.*?</svg>", path.read_text(encoding="utf-8"), re.DOTALL)[0]
+    titles = [one.find(f"{SVG}title").text for one in ET.fromstring(picture).iter(f"{SVG}circle")]
+    place = f"{whole.frequency_hz[3]:.6g} Hz, {whole.source_vpk[3]:g} V: "
+    (told,) = [text for text in titles if text.startswith(place)]
+    assert re.fullmatch(r"spoilt, -\d+\.\d+ dB", told.removeprefix(place))
+    assert sum("spoilt" in text for text in titles) == 1
 
 
 def test_a_browser_prints_it_with_page_numbers(report, tmp_path):

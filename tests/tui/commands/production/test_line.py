@@ -102,13 +102,16 @@ def here(tmp_path, monkeypatch, capsys):
 
     with line_bench(tmp_path) as bench:
 
-        def call(serials, *words):
-            read, write = os.pipe()
+        def call(serials, *words, terminal=False):
+            write, read = os.openpty() if terminal else reversed(os.pipe())
             os.write(write, "".join(f"{serial}\n" for serial in serials).encode())
-            os.close(write)
+            if not terminal:
+                os.close(write)
             with os.fdopen(read) as stream:
                 monkeypatch.setattr(sys, "stdin", stream)
                 code = cli.main([str(word) for word in bench.words(*words)])
+            if terminal:
+                os.close(write)
             return code, *capsys.readouterr()
 
         yield bench, call
@@ -151,6 +154,17 @@ def test_a_second_file_of_results_takes_up_nothing_of_the_first(here, tmp_path):
     assert "warning: B is not finished" in err
     assert (serials(first), serials(second)) == (["A", "D"], ["C"])
     assert bench.points(2) < 21
+
+
+def test_the_signs_for_counts_and_end_hold_at_every_question(here, tmp_path):
+    bench, run = here
+    out = tmp_path / "results.jsonl"
+    code, said, err = run(["A", "A", "?", "."], "--out", out, terminal=True)
+    assert (code, serials(out)) == (0, ["A"])
+    # The question is asked once more after the counts, and the end is no answer to it.
+    assert err.count("measure it again as a retest? [y/N]") == 2
+    assert said.count("1 units: 1 PASS; 0 retests") == 2
+    assert err.count("serial> ") == 2
 
 
 def test_a_line_goes_on_with_its_own_unit(here, tmp_path):
@@ -295,6 +309,13 @@ def test_the_counts_are_of_the_last_verdict_of_each_unit():
     assert "3 units: 2 PASS, 1 UNDECIDED; 1 retests" in text
     assert "yield 2/3 (67 %), at the first attempt 1/3 (33 %)" in text
     assert "by: not measured: no answer 1" in text
+
+
+def test_what_was_not_judged_counts_for_no_yield():
+    results = [result("A"), result("B", verdict="MEASURED"), result("B", 2, "FAIL", failed=["b1"])]
+    text = "\n".join(tally_lines(results))
+    assert "2 units: 1 PASS, 1 FAIL; 1 retests" in text
+    assert "yield 1/2 (50 %), at the first attempt 1/1 (100 %)" in text
 
 
 def test_nothing_is_driven_where_something_is_wrong_before(tmp_path, monkeypatch, capsys):
