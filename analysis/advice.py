@@ -84,7 +84,7 @@ def advise(
     )
     limited = [stage for stage in stages if stage.verdict is not None]
     if not answer.models or any("contribution_ratio" not in one for one in answer.models):
-        headline = _without_model(answer, one_stage)
+        headline = _without_model(answer)
     elif limited:
         headline = _by_limits(limited, doubt)
     elif one_stage:
@@ -155,16 +155,11 @@ def _most(answer: Answer, stage: int, unit: Unit | None) -> float | None:
     return float(total["value"] * (unit.output_ratio if stage == 1 else 1.0))
 
 
-def _without_model(answer: Answer, one_stage: bool) -> str:
+def _without_model(answer: Answer) -> str:
     if answer.state == "none":
         return "No advice: nothing was estimated."
     if answer.state in ("open", "accepted", "not judged"):
         return "No advice: the backlash by the models that are left is not known."
-    if one_stage:
-        return (
-            "No advice: the model of this unit does not explain the response, and a drive with "
-            "one gear stage cannot be diagnosed."
-        )
     if answer.diagnosed:
         return "No advice: no model that is known explains this response."
     return (

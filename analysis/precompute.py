@@ -77,13 +77,13 @@ def prepare_unit(
 
     if unit.stages == 1:
         raise InputError(
-            f"unit {unit.name} has one gear stage, and a diagnosis needs two: there is nothing to "
-            "train; estimate tells its backlash, extract its ARF and RF"
+            f"unit {unit.name} has one gear stage: no posterior is trained for it; diagnose uses "
+            "that of the paper's units"
         )
     _check_usable(cache)
     name = posterior_name(unit)
     runs = cache / name.removesuffix(".npz").replace("posterior", "training")
-    start = find_checkpoint(unit) or lent_checkpoint(unit)
+    start = find_checkpoint(unit) or lent_checkpoint(unit, borrowed=False)
     recipe = Recipe(rate=_RATE_FROM_ANOTHER) if start else Recipe()
     return train_unit(
         unit, cache / name, runs, machines, recipe, start, executor=executor, told=told
@@ -125,7 +125,7 @@ def prepare_sweep(
     """
     _check_usable(cache)
     families = every_family(free_axes(unit), observation, spread_of(unit), seed=0)
-    parts = [part for part, _ in observation.by_plan()] if unit.stages == 2 else []
+    parts = [part for part, _ in observation.by_plan()]
 
     def kept() -> list[bool]:
         found = [are_kept(unit, family, observation, cache) for family in families]

@@ -15,7 +15,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
-from sim.drivetrain import Drivetrain, shaft_end
+from sim.drivetrain import Drivetrain, shaft_dampers, shaft_end
 from sim.effect import (
     Effect,
     EffectParameter,
@@ -50,14 +50,11 @@ def _shaft_critical(unit: Unit) -> float:
 
 
 def _add_load_damper(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrain:
-    return d.adding(load_viscous=Damper({"th_L": 1.0}, v["B_L"]))
+    return d.with_elements({"load_viscous": Damper({"th_L": 1.0}, v["B_L"])})
 
 
 def _add_shaft_dampers(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrain:
-    return d.adding(
-        shaft_gear_damper=Damper({"th_g1": 1.0, "th_s1": -1.0}, 2.0 * v["c_s1"]),
-        shaft_pinion_damper=Damper({"th_s1": 1.0, shaft_end(unit): -1.0}, 2.0 * v["c_s1"]),
-    )
+    return d.with_elements(shaft_dampers(unit, v["c_s1"]))
 
 
 def _harden_shaft(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrain:
@@ -139,7 +136,9 @@ _ALL = (
         "grease or a seal dragging on the load, or eddy currents",
         "motor off, pull the load at two speeds with a spring scale; the pull grows with speed",
         on_drivetrain=_add_load_damper,
-        added_inertia=lambda unit, v, omega: v["B_L"] / (1j * omega),
+        added_inertia=lambda unit, v, omega: (
+            (v["B_L"] - unit.parameters.get("B_L", 0.0)) / (1j * omega)
+        ),
     ),
     Effect(
         "shaft-damping",

@@ -12,6 +12,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from sim.drive.sections import Damping
 from sim.drive.sensors import Encoder, SampledTachometer
 from sim.elements import (
     Amplifier,
@@ -27,7 +28,14 @@ from sim.elements import (
 from sim.engine.system import Assembly, PiecewiseLinearSystem
 from sim.unit import Unit
 
-__all__ = ["Drivetrain", "load_side", "motor_side", "paper_drivetrain", "shaft_end"]
+__all__ = [
+    "Drivetrain",
+    "load_side",
+    "motor_side",
+    "paper_drivetrain",
+    "shaft_dampers",
+    "shaft_end",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +49,10 @@ class Drivetrain:
         twice = set(elements) & set(self.elements)
         if twice:
             raise ValueError(f"elements {sorted(twice)} exist already; use replacing()")
+        return Drivetrain({**self.elements, **elements})
+
+    def with_elements(self, elements: Mapping[str, Element]) -> Drivetrain:
+        """A copy with elements in place of those of the same name, or besides where none is."""
         return Drivetrain({**self.elements, **elements})
 
     def replacing(self, name: str, **fields: object) -> Drivetrain:
@@ -85,6 +97,7 @@ def paper_drivetrain(unit: Unit, ratio: float) -> Drivetrain:
         If the ratio is outside 0 to 1, or not 1 for a drive with one stage.
     """
     motor, load, stage1 = unit.motor, unit.load, unit.stage1
+    damping = unit.damping or Damping()
     delta_1, delta_2 = unit.split(ratio).half_plays_rad
     end = shaft_end(unit)
     elements: dict[str, Element] = {
@@ -102,17 +115,33 @@ def paper_drivetrain(unit: Unit, ratio: float) -> Drivetrain:
         "shaft_gear_half": Spring({"th_g1": 1.0, "th_s1": -1.0}, 2.0 * stage1.k_s1),
         "shaft_pinion_half": Spring({"th_s1": 1.0, end: -1.0}, 2.0 * stage1.k_s1),
         "mesh1": Mesh(
-            "mesh1", {motor_side(unit): 1.0 / stage1.N_1, "th_g1": -1.0}, stage1.k_g1, delta_1
+            "mesh1",
+            {motor_side(unit): 1.0 / stage1.N_1, "th_g1": -1.0},
+            stage1.k_g1,
+            delta_1,
+            damping.c_g1 or 0.0,
         ),
     }
     if unit.stage2 is not None:
         twist = {"th_p2": 1.0 / unit.stage2.N, load_side(unit): -1.0}
-        elements["mesh2"] = Mesh("mesh2", twist, unit.stage2.k_2, delta_2)
+        elements["mesh2"] = Mesh("mesh2", twist, unit.stage2.k_2, delta_2, damping.c_2 or 0.0)
     elements |= {
         "motor_friction": DryFriction("motor_friction", "th_m", motor.T_f_m),
         "load_friction": DryFriction("load_friction", "th_L", load.T_f_L),
     }
+    if damping.B_L is not None:
+        elements["load_viscous"] = Damper({"th_L": 1.0}, damping.B_L)
+    if damping.c_s1 is not None:
+        elements |= shaft_dampers(unit, damping.c_s1)
     return Drivetrain(elements | _couplings(unit))
+
+
+def shaft_dampers(unit: Unit, c_s1: float) -> dict[str, Element]:
+    """A damper 2 c_s1 beside each half of shaft 1."""
+    return {
+        "shaft_gear_damper": Damper({"th_g1": 1.0, "th_s1": -1.0}, 2.0 * c_s1),
+        "shaft_pinion_damper": Damper({"th_s1": 1.0, shaft_end(unit): -1.0}, 2.0 * c_s1),
+    }
 
 
 def _motor(unit: Unit) -> Motor:

@@ -21,6 +21,7 @@ from sim.commissioning import Commissioning
 from sim.drive.sections import (
     OPTIONAL_SECTIONS,
     CurrentAmplifier,
+    Damping,
     LoadCoupling,
     MotorCoupling,
     Sampling,
@@ -144,6 +145,7 @@ class Unit(_Section):
     load: Load
     backlash: Backlash
     limits: Limits
+    damping: Damping | None = None
     amplifier: CurrentAmplifier | None = None
     sampling: Sampling | None = None
     sensor: Sensor | None = None

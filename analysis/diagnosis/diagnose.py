@@ -27,6 +27,7 @@ from analysis.emulation.fitted_model import FittedModel
 from analysis.emulation.model_parameters import estimate_parameters, widen_if_open
 from analysis.emulation.parameter_posterior import ParameterPosterior
 from analysis.ensemble.datasheet_belief import HINT, believed_document, is_usually_off, trusts_much
+from analysis.estimate.backlash import ratio_of
 from analysis.execution.blas import on_one_core
 from analysis.execution.executor import Executor
 from analysis.execution.progress import Progress, part_of
@@ -42,7 +43,7 @@ from analysis.selection.cancellation import UNDOING, confirm_causes
 from analysis.selection.credible_set import require_credible_set
 from analysis.selection.datasheet_test import compare_with_datasheet
 from analysis.selection.verdict import Judged, Verdict, judge_candidates
-from daq.errors import AnalysisError, InputError
+from daq.errors import AnalysisError
 from daq.frf import FrequencyResponse
 from sim.engine.effort import counting
 from sim.unit import Unit
@@ -95,17 +96,11 @@ def diagnose_response(
         If a response has no usable point, all hold too few frequencies, a
         motion grew without bound.
     InputError
-        If the unit has one stage, the responses are said to be of different units or specimens,
-        or one is there twice.
+        If the responses are said to be of different units or specimens, or one is there twice.
     """
     responses: tuple[FrequencyResponse, ...] = (response, *further)
     check_together(responses)
     responses, doubts = thin_responses(tuple(map(settled, responses)))
-    if unit.stages == 1:
-        raise InputError(
-            f"unit {unit.name} has one gear stage, and a diagnosis needs two; estimate tells its "
-            "backlash, extract its ARF and RF"
-        )
     observed = observe(*responses)
     _refuse_few(observed)
     started = time.perf_counter()
@@ -213,8 +208,8 @@ def _diagnose(
         unit=unit.name,
         verdict=verdict,
         causes=_causes(verdict, best, candidates) if named else (),
-        ratio_baseline=_ratio(base if named else best),
-        ratio_extended=_ratio(best),
+        ratio_baseline=ratio_of(unit, base if named else best),
+        ratio_extended=ratio_of(unit, best),
         departures=departures,
         left=left,
         shape=describe_residuals(departures, observation),
@@ -227,10 +222,6 @@ def _diagnose(
         lent_by=posterior.lent_by,
         stages=tuple(record.stages),
     )
-
-
-def _ratio(found: ParameterPosterior) -> tuple[float, float]:
-    return float(found.mean[0]), float(np.sqrt(found.covariance[0, 0]))
 
 
 def _causes(
@@ -302,10 +293,11 @@ def _warnings(diagnosis: Diagnosis) -> tuple[str, ...]:
     if trusts_much(diagnosis.believed) and (diagnosis.verdict.word == "unexplained" or any(near)):
         found.append(HINT)
     if diagnosis.lent_by:
+        one_stage = diagnosis.verdict.baseline.candidate.hypothesis.unit.stages == 1
+        way_on = "" if one_stage else "; train its own: lashbench prepare --unit FILE"
         found.append(
             f"no posterior was trained for unit {diagnosis.unit}: that of {diagnosis.lent_by} "
-            "chose what was simulated, and may have missed the cause; train its own: lashbench "
-            "prepare --unit FILE"
+            f"chose what was simulated, and may have missed the cause{way_on}"
         )
     if len(observation.levels) == 1:
         halves = len(observation.blocks) == 1

@@ -28,7 +28,8 @@ LEAST_SHARE = 0.1
 class Machine:
     """One machine of an ensemble.
 
-    `deviations` are relative departures of datasheet values, by symbol.
+    `deviations` are relative departures of datasheet values, by symbol. The ratio of a unit with
+    one stage is 1, whatever is said here.
     """
 
     ratio: float
@@ -48,7 +49,8 @@ class Machine:
             changes["b_t_deg"] = self.b_t_deg
         if changes:
             unit = unit.with_parameters(**changes)
-        return Servo.of(unit, self.ratio, self.effects, self.seed, self.start_spread)
+        ratio = 1.0 if unit.stages == 1 else self.ratio
+        return Servo.of(unit, ratio, self.effects, self.seed, self.start_spread)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,7 +16,14 @@ from analysis.emulation.parameter_posterior import ParameterPosterior
 from analysis.ensemble.model import Hypothesis
 from sim.unit import Unit
 
-__all__ = ["Backlash", "Uncertain", "backlash_of_places", "backlash_of_sizes", "summarise"]
+__all__ = [
+    "Backlash",
+    "Uncertain",
+    "backlash_of_places",
+    "backlash_of_sizes",
+    "ratio_of",
+    "summarise",
+]
 
 _REACH, _STEPS = 7.0, 211
 """Standard deviations on either side over which a normal distribution is laid out, and points."""
@@ -108,6 +115,8 @@ def backlash_of_sizes(hypothesis: Hypothesis, found: ParameterPosterior) -> Back
     interval is cut where a ratio cannot be, at 0 and at 1.
     """
     unit = hypothesis.unit
+    if unit.stages == 1:
+        found = _with_known_ratio(found)
     steps = np.linspace(-_REACH, _REACH, _STEPS)
     density = np.exp(-0.5 * steps**2)
     std = float(np.sqrt(found.covariance[0, 0]))
@@ -138,6 +147,21 @@ def backlash_of_sizes(hypothesis: Hypothesis, found: ParameterPosterior) -> Back
             )
         )
     )
+
+
+def ratio_of(unit: Unit, found: ParameterPosterior) -> tuple[float, float]:
+    """Contribution ratio and its standard deviation; that of a unit with one stage is 1."""
+    if unit.stages == 1:
+        return 1.0, 0.0
+    return float(found.mean[0]), float(np.sqrt(found.covariance[0, 0]))
+
+
+def _with_known_ratio(found: ParameterPosterior) -> ParameterPosterior:
+    """The same of a unit with one stage, whose runs have no ratio to tell."""
+    mean, covariance = found.mean.copy(), found.covariance.copy()
+    mean[0] = 1.0
+    covariance[0, :] = covariance[:, 0] = 0.0
+    return replace(found, mean=mean, covariance=covariance)
 
 
 def summarise(values: NDArray[np.float64], weight: NDArray[np.float64]) -> Uncertain:

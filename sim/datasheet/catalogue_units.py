@@ -152,7 +152,7 @@ _QUANTITIES: Mapping[str, tuple[CatalogueUnit, ...]] = {
     "k_t": _TORQUE_CONSTANT,
     "k_ts": _TACHOMETER,
     **dict.fromkeys(("J_m", "J_g1", "J_s1", "J_p2", "J_L", "J_cm", "J_cL"), _INERTIA),
-    **dict.fromkeys(("B_m", "c_cm", "c_cL"), _VISCOUS),
+    **dict.fromkeys(("B_m", "B_L", "c_s1", "c_g1", "c_2", "c_cm", "c_cL"), _VISCOUS),
     **dict.fromkeys(("T_f_m", "T_f_L"), _TORQUE),
     **dict.fromkeys(("k_g1", "k_s1", "k_2", "k_cm", "k_cL"), _STIFFNESS),
     "b_t_deg": _PLAY,

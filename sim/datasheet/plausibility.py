@@ -29,6 +29,7 @@ _SECTIONS = {
     "load": ("J_L", "T_f_L"),
     "backlash": ("b_t_deg",),
     "limits": ("source_vpk", "source_offset_v", "start_hz", "stop_hz"),
+    "damping": ("B_L", "c_s1", "c_g1", "c_2"),
     "amplifier": ("bandwidth_hz", "current_limit_a"),
     "sampling": ("rate_hz",),
     "sensor": ("counts", "delay_s"),
@@ -116,6 +117,10 @@ _SINGLES = (
     _single("delay_s", (0.0, 0.02), (0.0, 0.1)),
     *(_single(symbol, *_STIFFNESS) for symbol in ("k_cm", "k_cL")),
     *(_single(symbol, *_INERTIA) for symbol in ("J_cm", "J_cL")),
+    *(
+        _single(symbol, (0.0, 1e5), (0.0, 1e9))
+        for symbol in ("B_L", "c_s1", "c_g1", "c_2", "c_cm", "c_cL")
+    ),
 )
 
 

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 __all__ = [
     "OPTIONAL_SECTIONS",
     "CurrentAmplifier",
+    "Damping",
     "LoadCoupling",
     "MotorCoupling",
     "Sampling",
@@ -23,12 +24,32 @@ __all__ = [
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
-OPTIONAL_SECTIONS = ("amplifier", "sampling", "sensor", "motor_coupling", "load_coupling")
+OPTIONAL_SECTIONS = (
+    "damping",
+    "amplifier",
+    "sampling",
+    "sensor",
+    "motor_coupling",
+    "load_coupling",
+)
 """Sections of a unit that are not there where a drive is like the paper's."""
 
 
 class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class Damping(_Section):
+    """Damping that the datasheet knows of; the paper's units have none between motor and load."""
+
+    B_L: Positive | None = None
+    """Viscous friction of the load, N.m.s/rad."""
+    c_s1: Positive | None = None
+    """Damping of shaft 1, N.m.s/rad; a damper 2 c_s1 is beside each half."""
+    c_g1: Positive | None = None
+    """Damping of mesh 1 while its teeth touch, N.m.s/rad."""
+    c_2: Positive | None = None
+    """Damping of mesh 2 while its teeth touch, N.m.s/rad."""
 
 
 class CurrentAmplifier(_Section):
@@ -132,6 +153,8 @@ def find_contradiction(unit: Any) -> str:
             f"motor.{given[0]} has no influence beside [amplifier], which controls the current; "
             f"leave out {', '.join(given)}"
         )
+    if unit.damping is not None and unit.damping.c_2 is not None and unit.stage2 is None:
+        return "damping.c_2 is that of stage 2, and there is none; leave it out"
     filtered = (electronics.filter_numerator, electronics.filter_denominator)
     encoder = sensor is not None and sensor.kind == "encoder"
     if None in filtered and not (encoder and filtered == (None, None)):

@@ -4,7 +4,6 @@ import pytest
 
 from analysis.advice import advise
 from analysis.answer import accept_model
-from analysis.diagnosis import diagnose_response
 from analysis.estimate import estimate_features, estimate_response
 from daq.configs import config_path
 from daq.errors import InputError
@@ -36,8 +35,6 @@ def test_the_play_is_found_though_the_file_says_another(measured):
     assert "no limit set" in stage.line
 
 
-def test_what_needs_two_stages_says_so(measured):
+def test_what_needs_two_stages_says_so():
     with pytest.raises(InputError, match="one gear stage"):
         estimate_features(62.0, 101.0, ONE)
-    with pytest.raises(InputError, match="one gear stage"):
-        diagnose_response(measured, ONE)

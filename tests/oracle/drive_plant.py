@@ -47,6 +47,9 @@ class Plant(NamedTuple):
     J_L: float
     T_f_L: float
     B_L: float
+    c_s1: float
+    c_g1: float
+    c_2: float
     delta_1: float
     delta_2: float
     k_ts: float
@@ -104,7 +107,7 @@ def plant_of(document: dict[str, Any], ratio: float, **changed: float) -> tuple[
         "J_cL": lc.get("J_cL", 1.0),
         "J_L": load["J_L"],
         "T_f_L": load["T_f_L"],
-        "B_L": 0.0,
+        **{k: d.get("damping", {}).get(k, 0.0) for k in ("B_L", "c_s1", "c_g1", "c_2")},
         "delta_1": math.radians(b1) / 2.0,
         "delta_2": math.radians(b2) / 2.0,
         "k_ts": e["k_ts"],
@@ -134,11 +137,11 @@ _N = 17
 
 
 @njit(cache=True)
-def _dead(k, x, d):
+def _dead(k, c, x, rate, d):
     if x > d:
-        return k * (x - d)
+        return k * (x - d) + c * rate
     if x < -d:
-        return k * (x + d)
+        return k * (x + d) + c * rate
     return 0.0
 
 
@@ -156,7 +159,7 @@ def _slopes(m, u, fed, y, dy):
     dy[0] = (command - m.R_m * y[0] - m.k_b * y[2]) / m.L_a
     # The motor, and pinion 1 on it or behind a coupling.
     pin, wpin = (y[3], y[4]) if m.k_cm > 0.0 else (y[1], y[2])
-    T1 = _dead(m.k_g1, pin / m.N_1 - y[5], m.delta_1)
+    T1 = _dead(m.k_g1, m.c_g1, pin / m.N_1 - y[5], wpin / m.N_1 - y[6], m.delta_1)
     drive = m.k_t * y[0] - m.B_m * y[2] - m.T_f_m * _sgn(y[2])
     dy[1], dy[3], dy[4] = y[2], 0.0, 0.0
     if m.k_cm > 0.0:
@@ -166,16 +169,16 @@ def _slopes(m, u, fed, y, dy):
     else:
         dy[2] = (drive - T1 / m.N_1) / m.J_m
     # Gear 1 and the first half of the shaft.
-    Ta = 2.0 * m.k_s1 * (y[5] - y[7])
+    Ta = 2.0 * (m.k_s1 * (y[5] - y[7]) + m.c_s1 * (y[6] - y[8]))
     dy[5], dy[6] = y[6], (T1 - Ta) / m.J_g1
     last, wlast = (y[11], y[12]) if m.k_cL > 0.0 else (y[13], y[14])
     if m.two:
-        Tb = 2.0 * m.k_s1 * (y[7] - y[9])
-        T2 = _dead(m.k_2, y[9] / m.N - last, m.delta_2)
+        Tb = 2.0 * (m.k_s1 * (y[7] - y[9]) + m.c_s1 * (y[8] - y[10]))
+        T2 = _dead(m.k_2, m.c_2, y[9] / m.N - last, y[10] / m.N - wlast, m.delta_2)
         dy[9], dy[10] = y[10], (Tb - T2 / m.N) / m.J_p2
         arrives = T2
     else:
-        Tb = 2.0 * m.k_s1 * (y[7] - last)
+        Tb = 2.0 * (m.k_s1 * (y[7] - last) + m.c_s1 * (y[8] - wlast))
         dy[9], dy[10] = 0.0, 0.0
         arrives = Tb
     dy[7], dy[8] = y[8], (Ta - Tb) / m.J_s1

@@ -34,6 +34,7 @@ DRIVES = {
     },
     "current": {"amplifier": CURRENT, "electronics": {"k_a": 1.0}, "sampling": SAMPLED},
     "couplings": COUPLINGS,
+    "damped": {"damping": {"B_L": 0.02, "c_s1": 3e-3, "c_g1": 0.02, "c_2": 0.3}},
 }
 """Sections to add by what they are; ``filter`` None takes the filter away."""
 

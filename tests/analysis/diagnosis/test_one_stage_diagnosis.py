@@ -1,0 +1,31 @@
+"""A diagnosis of a drive with one gear stage: its causes, where no ratio is to be told."""
+
+import pytest
+
+from analysis.diagnosis import diagnose_response
+from daq.configs import config_path
+from daq.plan import SweepPlan, spaced_frequencies
+from sim.effects import EffectSetting
+from sim.response import simulate
+from sim.unit import load_unit
+
+
+@pytest.mark.slow
+def test_a_heavier_load_is_named_and_sized_on_one_stage(tmp_path):
+    unit = load_unit(str(config_path("templates", "one-stage")))
+    plan = SweepPlan(
+        spaced_frequencies(30.0, 150.0, 14, "log"), (1.5, 4.0), settle_cycles=4, integrate_cycles=6
+    )
+    hidden = EffectSetting("load-inertia", {"J_L": 1.4 * unit.load.J_L})
+    response = simulate(unit, 1.0, plan, effects=[hidden], seed=77)
+    found = diagnose_response(response, unit, cache=tmp_path).to_json()
+    assert [cause["effect"] for cause in found["causes"]] == ["load-inertia"]
+    size = found["causes"][0]["parameters"]["J_L"]
+    assert abs(size["value"] / (1.4 * unit.load.J_L) - 1.0) < 0.2
+    assert found["contribution_ratio"]["extended"] | {"interval95": None} == {
+        "value": 1.0,
+        "std": 0.0,
+        "interval95": None,
+    }
+    assert not any("mesh2" in name for rival in found["rivals"] for name in rival["causes"])
+    assert not any("prepare" in text for text in found["warnings"])
