@@ -161,15 +161,15 @@ class Unit(_Section):
     """The same, as told on a command line in place of the file."""
 
     @model_validator(mode="after")
-    def _has_known_tolerances(self) -> Self:
-        fault = find_fault(self.parameters, self.tolerance or {})
+    def _has_no_contradiction(self) -> Self:
+        fault = find_contradiction(self)
         if fault:
             raise ValueError(fault)
         return self
 
     @model_validator(mode="after")
-    def _has_no_contradiction(self) -> Self:
-        fault = find_contradiction(self)
+    def _has_known_tolerances(self) -> Self:
+        fault = find_fault(self.parameters, self.tolerance or {})
         if fault:
             raise ValueError(fault)
         return self
