@@ -18,6 +18,8 @@ from daq.transports.messages import MessageReader
 
 __all__ = ["VisaTransport", "load_backend", "open_visa"]
 
+_GRACE_S = 1.0
+"""How much longer than the bound the Python back end waits for what a gateway says."""
 _LEAST_MS = 1
 """VISA takes 0 for "do not wait at all"."""
 
@@ -181,9 +183,14 @@ class VisaTransport(MessageReader):
         self._resource.timeout = max(_LEAST_MS, int(deadline.remaining_s * 1000))
 
     def _fault(self, error: Exception, deadline: Deadline) -> Exception:
-        if isinstance(error, TimeoutError) or (
-            isinstance(error, self._visa_error) and error.error_code == self._timed_out
-        ):
+        if isinstance(error, TimeoutError):
+            # A gateway says itself when the instrument has no answer. The Python back end waits a
+            # second longer for that, and takes one that hung up in a poll or clear for silent.
+            return LinkError(
+                f"{self.address}: the connection was lost at {self._waiting!r} (the gateway says "
+                f"nothing within {deadline.span_s + _GRACE_S:g} s, nor that it has no answer)"
+            )
+        if isinstance(error, self._visa_error) and error.error_code == self._timed_out:
             return BenchTimeout(
                 f"{self.address}: {self._waiting!r} got no answer within {deadline.span_s:g} s; "
                 "is the instrument switched on and at this address?"

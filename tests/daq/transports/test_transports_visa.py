@@ -9,7 +9,16 @@ from contextlib import suppress
 import pytest
 from instruments.bench_server import simulated
 from instruments.fake_analyser import known_gain
-from instruments.vxi11 import CLEAR, READ_STB, WRITE, Gateway, RestartingGateway, Vxi11Instrument
+from instruments.vxi11 import (
+    CLEAR,
+    IO_TIMEOUT,
+    READ,
+    READ_STB,
+    WRITE,
+    Gateway,
+    RestartingGateway,
+    Vxi11Instrument,
+)
 from instruments.wire import ByteServer, lines_of
 
 from daq.analyser import PointSettings, SourceState
@@ -235,13 +244,42 @@ def test_a_gateway_that_starts_anew_ends_the_session_with_the_source_off(store, 
         header = MeasurementHeader("ADSS", "7", plan, url, "lashbench test")
         request = SessionRequest(header=header, limits=(Limits("bench"),))
         session = Session(open_analyser(url), store, request, reopen=lambda: open_analyser(url))
-        # The Python back end tells a connection that ends in a serial poll as a time-out.
-        with pytest.raises((LinkError, BenchTimeout)):
+        with pytest.raises(LinkError, match="connection was lost"):
             list(session.run())
         assert box.driven_v == 0.0
         assert session.finished.source_state is SourceState.CONFIRMED_OFF
     for stored in store.points(1):
         assert stored.point.gain == pytest.approx(known_gain(stored.requested_hz), rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("procedure", "act"),
+    [
+        (READ_STB, lambda transport: transport.serial_poll(Deadline.after(0.2))),
+        (CLEAR, lambda transport: transport.device_clear(Deadline.after(0.2))),
+        (WRITE, lambda transport: transport.write("A?", Deadline.after(0.2))),
+        (READ, lambda transport: ask(transport, "NONE?", Deadline.after(0.2))),
+    ],
+    ids=["poll", "clear", "write", "read"],
+)
+@pytest.mark.parametrize("fault", ["hangs up", "silent", "no answer"])
+def test_a_lost_gateway_is_told_from_an_instrument_that_does_not_answer(procedure, act, fault):
+    device = Vxi11Instrument(instrument)
+
+    def feed(data):
+        call = struct.unpack(">I", data[24:28])[0] if len(data) >= 28 else 0
+        if call != procedure or fault == "no answer":
+            return device.feed(data)
+        return None if fault == "hangs up" else b""
+
+    if fault == "no answer" and procedure != READ:
+        device.errors = {procedure: IO_TIMEOUT}
+    with ByteServer(feed) as server:
+        transport = open_transport(f"TCPIP::127.0.0.1,{server.port}::inst0::INSTR")
+        with pytest.raises(BenchTimeout if fault == "no answer" else LinkError):
+            act(transport)
+        with suppress(Exception):
+            transport.close()
 
 
 def test_an_instrument_that_another_client_locked_is_told(vxi11):
