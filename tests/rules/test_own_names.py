@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from rules.own_names import found_in, patches, private_names
 
-LEFT = {patches: 128, private_names: 56}
+LEFT = {patches: 118, private_names: 53}
 """Of 168 and 75 once. Lower the number with every one that goes; put none in its place."""
 
 

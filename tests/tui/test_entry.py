@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tui import cli, entry
+from tui import entry
 
 ROOT = Path(entry.__file__).parents[1]
 
@@ -35,11 +35,6 @@ sys.exit(main())
         [sys.executable, "-c", program, word], capture_output=True, text=True, check=False
     )
     assert (run.returncode, run.stderr, run.stdout) == (130, "error: interrupted\n", "")
-
-
-def test_it_hands_on_to_the_command_line(monkeypatch):
-    monkeypatch.setattr(cli, "main", lambda: 7)
-    assert entry.main() == 7
 
 
 @pytest.mark.parametrize(

@@ -75,12 +75,11 @@ def test_a_block_inside_of_another_leaves_the_outer_ones_level():
     assert (logger.level, logger.handlers) == before
 
 
-def test_a_long_log_is_turned_over(monkeypatch):
-    monkeypatch.setattr("tui.logs._BYTES", 2000)
+def test_a_log_of_a_megabyte_is_turned_over():
     with logging_to_file():
-        for number in range(100):
-            logging.getLogger("lashbench").info("line %d of many", number)
-    assert log_path().stat().st_size <= 2000
+        for number in range(120):
+            logging.getLogger("lashbench").info("line %d of many: %s", number, 10_000 * "x")
+    assert log_path().stat().st_size <= 1_000_000
     assert log_path().with_name("lashbench.log.1").exists()
 
 

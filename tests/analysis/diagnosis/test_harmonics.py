@@ -11,6 +11,7 @@ from analysis.ensemble.model import Hypothesis
 from analysis.observation.observation import observe
 from daq.plan import SweepPlan
 from sim.effects import parse_effect
+from sim.engine.effort import counting
 from sim.response import simulate
 from sim.unit import load_unit
 
@@ -71,13 +72,12 @@ def test_a_harmonic_that_drowns_in_the_readings_noise_is_not_told():
     assert compared(response, noise_v=1.0) == ()
 
 
-def test_a_response_without_harmonics_is_said_to_have_none_and_nothing_is_simulated(monkeypatch):
-    monkeypatch.setattr(
-        "analysis.diagnosis.harmonics.safe_cycles", lambda *_: pytest.fail("simulated")
-    )
+def test_a_response_without_harmonics_is_said_to_have_none_and_nothing_is_simulated():
     response = measured()
     nothing = np.full(len(response), np.nan + 0j)
-    assert compared(replace(response, harmonic2=nothing, harmonic3=nothing)) == ()
+    with counting() as effort:
+        assert compared(replace(response, harmonic2=nothing, harmonic3=nothing)) == ()
+    assert effort.simulated_s == 0.0
     assert describe_harmonics(()).startswith("the response holds none above its noise")
 
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.ensemble import run_cache as library
 from analysis.ensemble.machine import Draws, Machine, safe_cycles
 from analysis.ensemble.run_cache import run_families
 from analysis.execution.executor import LocalExecutor
@@ -156,12 +155,14 @@ def test_no_damaged_byte_of_a_kept_file_ends_the_work(tmp_path):
     assert anew > 32
 
 
-def test_a_disk_that_fills_up_is_left_no_fuller(tmp_path, monkeypatch):
-    def full(stream, _):
-        stream.write(b"half of it")
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(library, "write_runs", full)
-    draws = run_families(ADSS, FAMILIES[:1], SEEN, cache=tmp_path)
+def test_a_file_that_cannot_be_written_to_its_end_is_not_kept(tmp_path):
+    resource = pytest.importorskip("resource")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    # No file may grow beyond this: writing on is an error, as on a full disk.
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20, before[1]))
+    try:
+        draws = run_families(ADSS, FAMILIES[:1], SEEN, cache=tmp_path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert len(draws.machines) == len(FAMILIES[0])
     assert not list(tmp_path.iterdir())

@@ -73,8 +73,7 @@ def test_a_store_that_fails_at_the_very_end_is_told(store, monkeypatch):
     assert store.measurement(1).state == "interrupted"
 
 
-def test_another_program_that_holds_the_file_is_survived_or_told(store, monkeypatch):
-    monkeypatch.setattr("daq.store.file._BUSY_S", 0.2)
+def test_another_program_that_holds_the_file_is_survived_or_told(store):
     blocker = sqlite3.connect(store.path, isolation_level=None)
     analyser = FakeAnalyser({("point", 6): lambda: blocker.execute("BEGIN IMMEDIATE")})
     with Store(store.path) as quick, pytest.raises(MeasurementError, match="held by another"):

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,6 @@ from daq.errors import InputError, MeasurementError
 from daq.frf import PointFlag
 from daq.plan import SweepPlan
 from daq.store import Store
-from daq.store.file import WRITES
 from daq.store_records import MeasurementHeader, plan_from_text, plan_text
 
 PLAN = SweepPlan((100.1, 110.5, 125.0), (1.5, 2.5), direction="down", settle_cycles=5)
@@ -288,16 +288,16 @@ def test_a_full_disk_is_told_and_loses_no_committed_point(tmp_path):
         assert store.points(measurement) == told
 
 
-def test_a_held_file_is_told_within_its_bound(tmp_path, monkeypatch):
-    monkeypatch.setattr("daq.store.file._BUSY_S", 0.1)
+def test_a_held_file_is_told_within_its_bound(tmp_path):
     path = tmp_path / "bench.db"
-    with Store(path, create=True) as store, Store(path) as other:
+    with Store(path, create=True) as store:
         measurement = store.begin(header())
-        with (
-            other._engine.execution_options(**{WRITES: True}).begin(),
-            pytest.raises(MeasurementError, match="held by another program"),
-        ):
-            store.note(measurement, "x", "y")
+        with closing(sqlite3.connect(path, isolation_level=None)) as other:
+            other.execute("BEGIN IMMEDIATE")
+            began = time.monotonic()
+            with pytest.raises(MeasurementError, match="held by another program for more than 5 s"):
+                store.note(measurement, "x", "y")
+            assert 4.9 < time.monotonic() - began < 30.0
         store.note(measurement, "x", "y")
 
 
