@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from daq.control import SessionControl
 
-__all__ = ["ending_on_signals", "listening"]
+__all__ = ["ending_on_signals", "listening", "waiting"]
 
 
 @contextmanager
@@ -49,6 +49,29 @@ def listening(control: SessionControl, told: Callable[[str], None]) -> Iterator[
         number = getattr(signal, name, None)
         if number is not None:
             before[number] = signal.signal(number, act)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def waiting(told: Callable[[str], None]) -> Iterator[None]:
+    """Between the sessions of one program, let a pause or a stop end nothing but be told.
+
+    Their usual effect is to end the program. Nothing outside the main thread.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before: dict[int, Any] = {}
+    for name in ("SIGUSR1", "SIGUSR2"):
+        if hasattr(signal, name):
+            number = getattr(signal, name)
+            before[number] = signal.signal(
+                number, lambda _number, _frame: told("nothing is measured now: nothing to pause")
+            )
     try:
         yield
     finally:

@@ -18,6 +18,7 @@ from tui.judging import limits_to_judge_by
 from tui.options import JudgeBy
 from tui.places import history_path
 from tui.session_words import confirm_driving
+from tui.text.layout import wrapped
 from tui.text.output import Console, Injected, readers_may_leave
 
 if TYPE_CHECKING:
@@ -100,6 +101,7 @@ def line(
     from tui.line.results import Results
     from tui.line.scanner import Scanner
     from tui.line.unit import Line
+    from tui.signals import waiting
     from tui.unit_under_test import read_unit
 
     place, way, limits = load_bench(bench), load_recipe(recipe), limits_to_judge_by(judge)
@@ -117,7 +119,8 @@ def line(
     _warn_of_calibration(place, console)
     dialogue = _Dialogue(belt, results, hook, Scanner(sys.stdin), duplicates, console)
     try:
-        return dialogue.run()
+        with waiting(console.note):
+            return dialogue.run()
     finally:
         dialogue.tally()
 
@@ -216,10 +219,11 @@ class _Dialogue:
             )
             return True
         if self._is_terminal:
-            self._console.note(
+            for text in wrapped(
                 f"{serial} is not finished ({begun}). If it is on the bench, press Enter or scan "
                 "it; another serial number leaves it"
-            )
+            ):
+                self._console.note(text)
             found = self._scanned("serial", may_be_empty=True)
             if found is None:
                 self._is_ended = True
@@ -290,14 +294,19 @@ class _Dialogue:
         """What was scanned in place of an answer is the next unit."""
         from tui.line.scanner import clean_serial
 
-        if answer.lower() in ("", "n", "no", _END):
+        if answer == _END:
             return True
+        if answer.lower() in ("", "n", "no"):
+            answer = serial
         try:
             found = clean_serial(answer)
         except InputError as error:
             self._console.error(str(error))
             return True
-        return True if found in ("", serial) else self._unit(found)
+        if found not in ("", serial):
+            return self._unit(found)
+        self._console.note(f"{serial}: not measured again")
+        return True
 
     def _measured(self, serial: str, attempt: int, resume: int | None = None) -> bool:
         self._console.note(f"{serial}: measuring" if resume is None else f"{serial}: going on")

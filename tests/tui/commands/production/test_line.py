@@ -167,6 +167,17 @@ def test_the_signs_for_counts_and_end_hold_at_every_question(here, tmp_path):
     assert err.count("serial> ") == 2
 
 
+def test_a_pause_that_comes_between_units_ends_no_line(here, tmp_path):
+    bench, run = here
+    out = tmp_path / "results.jsonl"
+    hook = ["--on-result", "sh -c 'kill -USR1 $PPID; kill -USR2 $PPID'"]
+    code, _, err = run(["A", "A", "A", "B", "."], "--out", out, *hook, terminal=True)
+    assert (code, serials(out)) == (0, ["A", "B"])
+    assert err.count("nothing is measured now") == 4
+    # A code that is scanned twice while its unit is swept is asked about, and it is said.
+    assert err.count("A: not measured again") == 1
+
+
 def test_a_line_goes_on_with_its_own_unit(here, tmp_path):
     first = tmp_path / "first.jsonl"
     bench, run = here
