@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from daq.errors import AnalysisError
+from daq.formats import read_response, write_response
 from tui.cli import main
 
 PRACTICE = Path(__file__).parents[1] / "data" / "practice"
@@ -142,10 +143,12 @@ def test_estimate_hands_two_frequencies_on(calls, capsys):
 
 
 @pytest.mark.usefixtures("calls")
-def test_estimate_warns_where_the_response_is_of_another_unit(capsys):
-    result = document(["estimate", SWEEP, "--unit", "edss"], capsys)
+def test_estimate_warns_where_the_response_is_of_another_unit(capsys, tmp_path):
+    few = str(tmp_path / "few.csv")
+    write_response(read_response(Path(SWEEP)).take(np.arange(0, 183, 30)), few)
+    result = document(["estimate", few, "--unit", "edss"], capsys)
     assert result["warnings"] == ["the response is of unit ADSS, not of EDSS", "a warning"]
-    assert "of unit ADSS" in text(["estimate", SWEEP, "--unit", "edss"], capsys)
+    assert "of unit ADSS" in text(["estimate", few, "--unit", "edss"], capsys)
 
 
 @pytest.fixture
