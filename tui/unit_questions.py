@@ -25,6 +25,7 @@ Further answers: - takes the example, < goes back one question.
 _VALUE = re.compile(r"^(?P<symbol>\w+) = (?P<value>[\d.eE+-]+)(?P<gap> +)# (?P<comment>.*)$")
 _FILTER = ("filter_numerator", "filter_denominator")
 _SKIPPED = ("schema", *_FILTER, "default")
+_MAY_BE_ZERO = ("B_m", "T_f_m", "T_f_L", "b_t_deg", "source_offset_v", "c_cm", "c_cL", "delay_s")
 _CORNER, _DAMPING = "corner_hz", "damping"
 
 
@@ -101,7 +102,7 @@ def ask_for_values(template: str, say: Say, read: Read) -> str:
 
 def _faults(symbol: str, value: float, before: dict[str, float]) -> list[str]:
     """What is wrong with an answer, alone or beside those before."""
-    zero_is_allowed = symbol in ("B_m", "T_f_m", "T_f_L", "b_t_deg", "source_offset_v")
+    zero_is_allowed = symbol in _MAY_BE_ZERO
     if value < 0.0 or (value == 0.0 and not zero_is_allowed):
         return [f"{symbol} must be {'0 or more' if zero_is_allowed else 'above 0'}"]
     faults = list(impossible_among({**before, symbol: value}))

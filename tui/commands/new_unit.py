@@ -18,6 +18,7 @@ from tui.unit_under_test import unit_title
 __all__ = ["new_unit"]
 
 _TEMPLATES = {1: "one-stage", 2: "two-stage"}
+_PARTS = "parts"
 
 
 def new_unit(
@@ -55,15 +56,25 @@ def new_unit(
 
     title = unit_title(out, name)
     new_target(out)
-    text = _asked(stages, console) if ask else _template(2 if stages is None else stages)
+    text = _asked(stages, console) if ask else _blank(2 if stages is None else stages)
     write_text(out, _named(text, title, out))
     _tell_of(out, ask, console)
 
 
 def _template(stages: int) -> str:
+    return _read_template(_TEMPLATES[stages])
+
+
+def _blank(stages: int) -> str:
+    from tui.units import commented
+
+    return commented(_template(stages), _read_template(_PARTS))
+
+
+def _read_template(name: str) -> str:
     from daq.configs import config_path
 
-    return config_path("templates", _TEMPLATES[stages]).read_text(encoding="utf-8")
+    return config_path("templates", name).read_text(encoding="utf-8")
 
 
 def _named(text: str, title: str, out: Path) -> str:
@@ -79,12 +90,15 @@ def _named(text: str, title: str, out: Path) -> str:
 
 def _asked(stages: int | None, console: Console) -> str:
     from tui.unit_questions import HELP, ask_for_values, ask_stages
+    from tui.units import ask_parts, with_parts
 
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
         raise InputError("--ask needs a terminal; leave it out and edit the file that is written")
     console.prompt(HELP)
     count = ask_stages(console.prompt, _read_line) if stages is None else stages
-    text = ask_for_values(_template(count), console.prompt, _read_line)
+    names = ask_parts(console.prompt, _read_line)
+    template = with_parts(_template(count), _read_template(_PARTS), names)
+    text = ask_for_values(template, console.prompt, _read_line)
     return text.replace("EVERY NUMBER BELOW IS AN EXAMPLE. Put in", "EVERY NUMBER BELOW IS AN "
                         "EXAMPLE where it was not given. Put in", 1)  # fmt: skip
 

@@ -100,7 +100,9 @@ def test_at_a_terminal(tmp_path):
     ours, theirs = pty.openpty()
     out, text = tmp_path / "my drive.toml", ""
     command = [sys.executable, "-m", "tui.cli", "new-unit", "--ask", "--out", str(out)]
-    answers = iter([b"3", b"1", b"0.85 mH", b"\xb5", b"4.1"])  # a micro sign that is no UTF-8
+    answers = iter(
+        [b"3", b"1", b"perhaps", b"no", b"0.85 mH", b"\xb5", b"4.1"]
+    )  # a micro sign that is no UTF-8
     with subprocess.Popen(command, stdin=theirs, stdout=theirs, stderr=theirs) as program:
         os.close(theirs)
         until_s = time.monotonic() + 120.0
@@ -120,6 +122,7 @@ def test_at_a_terminal(tmp_path):
     unit = load_unit(str(out))
     assert (unit.name, unit.stages, unit.motor.L_a, unit.motor.R_m) == ("MY DRIVE", 1, 8.5e-4, 4.1)
     assert "neither 1 nor 2" in text
+    assert "'perhaps' is neither yes nor no" in text
     assert "new-unit --check" in text
 
 

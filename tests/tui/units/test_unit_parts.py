@@ -1,0 +1,87 @@
+"""new-unit: sections that a drive may have besides, asked for or written as comments."""
+
+import itertools
+import re
+import tomllib
+
+import pytest
+
+from daq.configs import config_path
+from daq.errors import InputError
+from sim.datasheet import find_impossible
+from sim.drivetrain import paper_drivetrain
+from sim.unit import unit_from_mapping
+from tui import cli
+from tui.unit_questions import ask_for_values
+from tui.units import ask_parts, with_parts
+
+NAMES = ("amplifier", "sensor", "sampling", "motor_coupling", "load_coupling", "damping")
+
+
+def template(name):
+    return config_path("templates", name).read_text(encoding="utf-8")
+
+
+def asked(answers):
+    said, lines = [], iter(answers)
+    return ask_parts(said.append, lambda: f"{next(lines, 'no')}\n"), "".join(said)
+
+
+def test_a_drive_like_the_papers_is_asked_one_question():
+    names, said = asked(["no"])
+    assert names == ()
+    assert said.count("[yes / no]") == 1
+
+
+def test_each_part_is_asked_for_and_nonsense_again():
+    names, said = asked(["y", "no", "maybe", "yes", "Y", "n", "yes", "-"])
+    assert names == ("sensor", "sampling", "load_coupling")
+    assert "'maybe' is neither yes nor no" in said
+    with pytest.raises(InputError, match="nothing was written"):
+        ask_parts(lambda text: None, lambda: "")
+
+
+@pytest.mark.parametrize("stages", ["one-stage", "two-stage"])
+def test_every_choice_of_parts_makes_a_unit(stages):
+    for count in range(len(NAMES) + 1):
+        for names in itertools.combinations(NAMES, count):
+            text = with_parts(template(stages), template("parts"), names)
+            unit = unit_from_mapping(tomllib.loads(text), "parts")
+            assert not find_impossible(unit), names
+            paper_drivetrain(unit, 1.0).system()
+            has = {name for name in NAMES if getattr(unit, name) is not None}
+            assert has == {*names, *(["sampling"] if "sensor" in names else [])}
+            if "sensor" in names:
+                assert unit.sampling.holds_command == ("sampling" in names)
+
+
+def test_values_of_parts_are_asked_in_catalogue_units():
+    text = with_parts(template("two-stage"), template("parts"), ("amplifier", "sensor"))
+    said = []
+    answers = {"bandwidth_hz": "1.2 kHz", "delay_s": "0.25 ms", "counts": "16384", "k_a": "0.5"}
+
+    def read():
+        last = said[-1].split(":", 1)[0].strip()
+        return answers.get(last, "-") + "\n"
+
+    unit = unit_from_mapping(tomllib.loads(ask_for_values(text, said.append, read)), "asked")
+    assert unit.amplifier.bandwidth_hz == 1200.0
+    assert unit.sensor.delay_s == pytest.approx(2.5e-4)
+    assert unit.sensor.counts == 16384.0
+    assert unit.electronics.k_a == 0.5
+    assert not any(one.startswith(("R_m", "corner_hz")) for one in said)
+
+
+@pytest.mark.parametrize("stages", ["1", "2"])
+def test_parts_are_in_a_new_file_as_comments_that_work(stages, tmp_path, capsys):
+    path = tmp_path / "own.toml"
+    assert cli.main(["new-unit", "--out", str(path), "--stages", stages]) == 0
+    capsys.readouterr()
+    head, parts = path.read_text(encoding="utf-8").split("[tolerance]", 1)
+    uncommented = re.sub(r"(?m)^# (\[|\w+ = )", r"\1", parts.split("besides", 1)[1])
+    mended = re.sub(r"(?m)^(L_a|R_m|k_b) = .*\n", "", head) + uncommented.split(":", 1)[1]
+    path.write_text(mended, encoding="utf-8")
+    assert cli.main(["new-unit", "--check", str(path)]) == 0
+    told = capsys.readouterr().out
+    assert "controls the current" in told
+    assert "encoder at the motor" in told

@@ -1,0 +1,94 @@
+"""What a drive has besides voltage amplifier and tachometer: asked for, put into a template.
+
+Owns the questions for the sections of ``parts.toml`` and how these go into the text of a unit
+file. Values are asked for by `tui.unit_questions`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection
+
+from daq.errors import InputError
+
+__all__ = ["ask_parts", "commented", "with_parts"]
+
+Say = Callable[[str], None]
+Read = Callable[[], str]
+
+_PARTS = (
+    ("amplifier", "the amplifier controls the current, not the voltage"),
+    ("sensor", "an encoder is read, not a tachometer"),
+    ("sampling", "a digital controller holds the command from sample to sample"),
+    ("motor_coupling", "an elastic coupling behind the motor"),
+    ("load_coupling", "an elastic coupling before the load"),
+    ("damping", "known damping of shaft or load"),
+)
+_FIRST = "an encoder, a digital controller, a torque drive, couplings or known damping"
+_OF_VOLTAGE = ("L_a", "R_m", "k_b")
+_OF_FILTER = ("filter_numerator", "filter_denominator")
+
+
+def ask_parts(say: Say, read: Read) -> tuple[str, ...]:
+    """Names of the sections that a drive needs; one question where it needs none.
+
+    Raises
+    ------
+    InputError
+        If the input ends before the last answer.
+    """
+    if not _yes(say, read, _FIRST):
+        return ()
+    found = [name for name, words in _PARTS if _yes(say, read, words)]
+    return tuple(found)
+
+
+def with_parts(template: str, parts: str, names: Collection[str]) -> str:
+    """A template with sections of `parts` before its limits, without what they make useless."""
+    wanted = set(names)
+    sections = dict(_sections(parts))
+    if "sensor" in wanted and "sampling" not in wanted:
+        # An encoder has a clock all the same.
+        sections["sampling"] = sections["sampling"].replace(
+            "holds_command = true ", "holds_command = false"
+        )
+        wanted.add("sampling")
+    useless: tuple[str, ...] = ()
+    if "amplifier" in wanted:
+        useless += _OF_VOLTAGE
+        template = template.replace(
+            "V at the motor per V at the amplifier's input", "A per V at the amplifier's input"
+        )
+    if "sensor" in wanted:
+        useless += _OF_FILTER
+        template = template.replace("tachometer gain;", "of the record, 1 where it is in rad/s;")
+    lines = [line for line in template.splitlines() if line.split(" ", 1)[0] not in useless]
+    text = "\n".join(lines) + "\n"
+    chosen = "".join(sections[name] for name in sections if name in wanted)
+    return text.replace("[limits]", f"{chosen}[limits]", 1)
+
+
+def commented(template: str, parts: str) -> str:
+    """A template with all the sections at its end, as comments."""
+    lines = "\n".join(f"# {line}".rstrip() for line in parts.strip().splitlines())
+    head = "# What a drive may have besides; take the signs # away from a section that yours has:"
+    return f"{template.rstrip()}\n\n{head}\n\n{lines}\n"
+
+
+def _sections(parts: str) -> list[tuple[str, str]]:
+    """Names and texts of sections, each with a blank line at its end."""
+    texts = re.split(r"(?m)^(?=\[)", parts.strip() + "\n")
+    return [(text[1 : text.index("]")], text.rstrip() + "\n\n") for text in texts if text]
+
+
+def _yes(say: Say, read: Read, words: str) -> bool:
+    while True:
+        say(f"{words} [yes / no]: ")
+        line = read()
+        if not line:
+            say("\n")
+            raise InputError("the input ended before the last answer; nothing was written")
+        answer = line.strip().lower()
+        if answer in ("yes", "y", "no", "n", "-"):
+            return answer.startswith("y")
+        say(f"{line.strip()!r} is neither yes nor no\n")
