@@ -56,9 +56,9 @@ class EffectParameter:
     def nominal(self, unit: Unit) -> float | None:
         """What a unit without the effect has: its datasheet's value, or 1 of a factor on some.
 
-        None where the effect adds what the datasheet does not know.
+        None where the effect adds what the datasheet does not know, or has as 0.
         """
-        return 1.0 if self.name == "scale" else unit.parameters.get(self.name)
+        return 1.0 if self.name == "scale" else unit.parameters.get(self.name) or None
 
     def spread(self, unit: Unit) -> float:
         """One standard deviation of it that is believed of the datasheet, as a share; 0 if none."""
@@ -102,13 +102,31 @@ def table_1(symbol: str) -> Callable[[Unit, Mapping[str, float]], Unit]:
 
 
 def around(symbol: str, low: float, high: float) -> Callable[[Unit], tuple[float, float]]:
-    """A range as multiples of the datasheet's value, wider where that is hardly known."""
+    """A range as multiples of the datasheet's value, wider where that is hardly known.
+
+    Of a value that the datasheet has as 0, a range from there to what a drive may have.
+    """
 
     def ends(unit: Unit) -> tuple[float, float]:
+        if unit.parameters[symbol] == 0.0:
+            return 0.0, _much(unit, symbol)
         known, wide = unit.parameters[symbol], math.exp(_BEYOND * unit.tolerances.get(symbol, 0.0))
         return min(low, 1.0 / wide) * known, max(high, wide) * known
 
     return ends
+
+
+def _much(unit: Unit, symbol: str) -> float:
+    """A friction or a play that would be much for a drive whose datasheet has none."""
+    motor = unit.motor
+    volts = unit.electronics.k_a * unit.limits.source_vpk
+    torque = 0.3 * motor.k_t * volts / (motor.R_m or 1.0)
+    return {
+        "T_f_m": torque,
+        "T_f_L": torque * unit.stage1.N_1 * unit.output_ratio,
+        "B_m": motor.J_m * 2.0 * math.pi * unit.limits.start_hz,
+        "b_t_deg": 0.2,
+    }[symbol]
 
 
 def span(low: float, high: float) -> Callable[[Unit], tuple[float, float]]:

@@ -1,13 +1,17 @@
 """Unit files of drives that are not the paper's: what is refused, and what stays as it was."""
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from worlds import drives
 
+from analysis.ensemble.model import every_single_cause
+from daq.configs import config_names
 from daq.errors import ConfigurationError
 from sim.catalogue import CATALOGUE, not_of_unit
 from sim.datasheet import describe_chain, find_impossible, natural_frequencies
+from sim.drawn_effects import draw_effect
 from sim.drivetrain import paper_drivetrain
 from sim.effects import EffectSetting, drivetrain_with
 from sim.unit import load_unit, unit_from_mapping
@@ -102,6 +106,21 @@ def test_every_other_effect_can_be_had_by_every_drive(name):
         if effect.id not in foreign:
             ends = {p.name: sum(p.range(unit)) / 2.0 for p in effect.parameters}
             drivetrain_with(unit, 0.5, [EffectSetting(effect.id, ends)]).system()
+
+
+@pytest.mark.parametrize("name", [*config_names("units"), "free"])
+def test_every_effect_has_a_range_with_two_ends(name):
+    """Also about a friction or a play that the datasheet has as 0."""
+    unit = drives.unit({}, free=True) if name == "free" else load_unit(name)
+    foreign = not_of_unit(unit)
+    for hypothesis in every_single_cause(unit):
+        assert np.all(np.isfinite(hypothesis.logs)), hypothesis.effects
+        assert np.all(np.diff(hypothesis.logs, axis=1) > 0.1), hypothesis.effects
+        hypothesis.within_tolerance(np.full(hypothesis.d, 0.5))
+        hypothesis.machine(np.full(hypothesis.d, 0.5), 0).servo(unit)
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        assert draw_effect(unit, (20.0, 60.0), rng).id not in foreign
 
 
 def test_a_paper_unit_is_stored_as_before():
