@@ -8,7 +8,7 @@ from daq.formats import read_response
 
 
 def test_a_name_finds_the_file_that_comes_with_it_in_any_case():
-    assert config_names("units") == ["adss", "edss"]
+    assert {"adss", "edss"} < set(config_names("units"))
     assert config_path("units", "ADSS") == config_path("units", "adss")
     assert config_path("units", "adss").read_text().startswith("# ADSS")
 
