@@ -7,12 +7,14 @@ from instruments.measuring import measuring
 from outputs.screen import operated
 from outputs.screen import run as run_screen
 
-from daq.configs import config_path
+from daq.configs import config_path, sample_path
 from daq.errors import ConfigurationError, InputError
+from daq.formats import read_response
 from daq.plan import SweepPlan
 from daq.store import Store
-from sim.unit import load_unit
-from tui.app.state.desk import Desk
+from sim.unit import load_unit, unit_from_mapping
+from tui.app.screens.result_screen import answer_lines
+from tui.app.state.desk import Desk, Results
 
 SHIPPED = load_unit("adss")
 
@@ -192,3 +194,20 @@ def test_a_unit_from_the_history_is_measured_anew_on_the_screen(measured, db):
     with Store(db, read_only=True) as store:
         header = store.measurement(2).header
     assert (header.unit, header.configurations["unit"]) == ("gär", text)
+
+
+def test_no_stage_passes_by_a_response_that_is_in_doubt():
+    whole = read_response(sample_path("adss-sweep"))
+    cut = replace(whole, provenance={**whole.provenance, "state": "interrupted"})
+    content = load_unit("adss").model_dump(by_alias=True)
+    content["limits"]["b1_deg"] = 9.0
+    unit = unit_from_mapping(content, "test")
+    estimate = {"contribution_ratio": {"value": 0.3, "std": 0.01}, "refuted": False}
+    estimate |= {"b1_deg": {"value": 0.2, "std": 0.01}, "b2_deg": {"value": 0.05, "std": 0.01}}
+    for results, said in [
+        (Results(response=whole), "Stage 1: PASS"),
+        (Results(response=cut), "Stage 1: UNDECIDED"),
+        (Results(response=whole, as_is=True), "Stage 1: UNDECIDED"),
+    ]:
+        lines = answer_lines(estimate, None, unit, results.doubt)
+        assert any(line.startswith(said) for line in lines), lines
