@@ -1,0 +1,44 @@
+"""Responses of drives that are not the paper's: none looks like a mistake; a mistake still does."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from worlds import drives
+
+from analysis.observation.input_check import check_input
+from daq.configs import config_names
+from daq.plan import SweepPlan
+from sim.datasheet import natural_frequencies
+from sim.response import simulate
+from sim.unit import load_unit
+
+UNITS = {name: drives.unit(sections) for name, sections in drives.DRIVES.items()} | {
+    name: load_unit(name) for name in config_names("units")
+}
+
+
+def swept(unit):
+    modes = natural_frequencies(unit)
+    low, high = 0.6 * modes.anti_resonances_hz[0], 1.4 * modes.resonances_hz[0]
+    plan = SweepPlan(
+        tuple(np.geomspace(low, high, 16).tolist()),
+        (0.4 * unit.limits.source_vpk, 0.8 * unit.limits.source_vpk),
+        settle_cycles=5,
+        integrate_cycles=4,
+    )
+    return simulate(unit, 1.0 if unit.stages == 1 else 0.4, plan, seed=3)
+
+
+@pytest.mark.parametrize("name", UNITS)
+def test_a_true_response_is_taken(name):
+    found = check_input(swept(UNITS[name]), UNITS[name])
+    assert found.mistake is None, found.words
+    assert not found.foreign
+
+
+@pytest.mark.parametrize("name", ["encoder, speed", "current"])
+def test_a_mistake_is_still_seen(name):
+    response = swept(UNITS[name])
+    turned = replace(response, gain=np.conj(response.gain))
+    assert check_input(turned, UNITS[name]).mistake == "conjugate"
