@@ -59,9 +59,10 @@ def advise(
     """What to do about the stages, by every model that may be true.
 
     Limits of b1 and b2 decide where there are any: those of the judgement, or those of the unit
-    if none was made. Without them the stage that holds more of the backlash is named, where the
-    whole 95 % interval of the contribution ratio lies on its side of one half. Nothing is decided
-    that the models left do not agree on, and nothing at all where no model is accepted.
+    for a stage of which it has none. Without them the stage that holds more of the backlash is
+    named, where the whole 95 % interval of the contribution ratio lies on its side of one half.
+    Nothing is decided that the models left do not agree on, and nothing at all where no model is
+    accepted.
 
     Parameters
     ----------
@@ -73,13 +74,9 @@ def advise(
         Why the response is not to be trusted; no limit of the unit is passed or failed then.
     """
     one_stage = _has_one_stage(answer, unit)
-    if judgement is None and unit is not None:
-        judgement = judge_stages(unit, answer, doubt)
-    items = () if judgement is None else judgement.items
+    own = None if unit is None else judge_stages(unit, answer, doubt)
     stages = tuple(
-        _told_with_limits(
-            answer, number, [item for item in items if item.quantity == f"b{number}_deg"], unit
-        )
+        _told_with_limits(answer, number, _items(judgement, number) or _items(own, number), unit)
         for number in (1, 2)[: 1 if one_stage else 2]
     )
     limited = [stage for stage in stages if stage.verdict is not None]
@@ -109,6 +106,11 @@ def _has_one_stage(answer: Answer, unit: Unit | None) -> bool:
         return unit.stages == 1
     ratio = answer.contribution_ratio
     return ratio is not None and ratio["value"] == 1.0 and not ratio["std"]
+
+
+def _items(judgement: Judgement | None, stage: int) -> list[Item]:
+    items = () if judgement is None else judgement.items
+    return [item for item in items if item.quantity == f"b{stage}_deg"]
 
 
 def _told_with_limits(

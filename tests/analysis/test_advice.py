@@ -4,9 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.acceptance import judge, limits_of_unit
+from analysis.acceptance import LimitSet, judge, limits_of_unit
 from analysis.advice import advise
 from analysis.answer import accept_model
+from sim.acceptance import Acceptance
 from sim.unit import load_unit, unit_from_mapping
 
 ADSS = load_unit("adss")
@@ -170,6 +171,14 @@ def test_advice_and_judgement_decide_one_limit_alike(spans, limit, k, doubt):
     ):
         assert {f"b{s.stage}_deg": s.verdict for s in advice.stages} == decided
     assert not doubt or set(decided.values()) == {"UNDECIDED"}
+
+
+def test_a_stage_without_a_limit_in_the_judgement_is_held_to_that_of_the_unit():
+    unit, estimate = with_limits(b1_deg=0.03), estimated(0.1, 0.2)
+    other = LimitSet("other", Acceptance.model_validate({"b2_deg": {"upper": 1.0}}))
+    judgement = judge(other, estimate=estimate)
+    advice = advise(accept_model(estimate), unit, judgement=judgement)
+    assert [stage.verdict for stage in advice.stages] == ["FAIL", "PASS"]
 
 
 def test_a_wider_guard_band_leaves_a_stage_undecided():
