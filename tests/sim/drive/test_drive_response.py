@@ -45,9 +45,10 @@ def test_a_drive_with_play_is_what_an_independent_plant_shows(name):
     sections, seeds = drives.DRIVES[name], range(4)
     unit, document = drives.unit(sections), drives.document(sections)
     hertz = PLAYED_HZ[:2] if name == "encoder at the load" else PLAYED_HZ
-    ours = np.array([simulate(unit, 0.3, plan(hertz), seed=seed).gain for seed in seeds])
+    swept = plan(hertz, settle_cycles=12, integrate_cycles=14)
+    ours = np.array([simulate(unit, 0.3, swept, seed=seed).gain for seed in seeds])
     theirs = np.array(
-        [drive_plant.sweep(document, 0.3, hertz, 2.5, seed=s).mean(axis=1) for s in seeds]
+        [drive_plant.sweep(document, 0.3, hertz, 2.5, 12, 14, seed=s).mean(axis=1) for s in seeds]
     )
     off = ours.mean(axis=0) / theirs.mean(axis=0) - 1.0
     scatter = np.hypot(ours.std(axis=0), theirs.std(axis=0)) / np.abs(ours.mean(axis=0)) / 2.0

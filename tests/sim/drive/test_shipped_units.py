@@ -47,11 +47,11 @@ def test_it_moves_as_an_independent_plant_does(name):
     arf, rf = modes.anti_resonances_hz[0], modes.resonances_hz[0]
     hertz = (0.7 * arf, 1.4 * rf)
     volts, seeds = 0.6 * unit.limits.source_vpk, range(2)
-    plan = SweepPlan(hertz, (volts,), settle_cycles=12, integrate_cycles=12)
+    plan = SweepPlan(hertz, (volts,), settle_cycles=8, integrate_cycles=8)
     ours = np.array([simulate(unit, 1.0, plan, seed=seed).gain for seed in seeds])
     theirs = np.array(
         [
-            drive_plant.sweep(document, 1.0, hertz, volts, 12, 12, step_s=4e-6, seed=s).mean(axis=1)
+            drive_plant.sweep(document, 1.0, hertz, volts, 8, 8, step_s=4e-6, seed=s).mean(axis=1)
             for s in seeds
         ]
     )
