@@ -307,14 +307,18 @@ def unit_from_mapping(document: dict[str, Any], source: str) -> Unit:
     try:
         return Unit.model_validate(_lists_as_tuples(document))
     except ValidationError as error:
-        faults = "; ".join(
-            f"{'.'.join(str(part) for part in fault['loc'])}: {fault['msg']}"
-            + ("" if fault["type"] == "missing" else f" (got {fault['input']!r})")
-            if fault["loc"]
-            else str(fault["msg"]).removeprefix("Value error, ")
-            for fault in error.errors()
-        )
+        faults = "; ".join(map(_told, error.errors()))
         raise ConfigurationError(f"{source}: {faults}") from error
+
+
+def _told(fault: Any) -> str:
+    """One thing that is wrong: key, what it is, and the value where that says more."""
+    key = ".".join(str(part) for part in fault["loc"])
+    if fault["type"] == "value_error":
+        words = str(fault["msg"]).removeprefix("Value error, ")
+        return words if not key or words.startswith(key) else f"{key}: {words}"
+    got = "" if fault["type"] == "missing" else f" (got {fault['input']!r})"
+    return f"{key}: {fault['msg']}{got}"
 
 
 def load_unit(name_or_path: str) -> Unit:

@@ -40,6 +40,7 @@ def test_a_wrong_section_is_refused_by_name(sections, named):
         drives.unit(sections)
     assert named in str(error.value)
     assert "\n" not in str(error.value)
+    assert "Value error" not in str(error.value)
 
 
 def test_values_without_influence_beside_a_current_amplifier_are_refused():
