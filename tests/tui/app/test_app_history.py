@@ -165,7 +165,7 @@ def test_another_unit_takes_results_of_the_first_off_the_desk(db):
             await op.sees("[5 Result]", "r = 0.310")
             await op.press("1")
             op.app.screen.query_one("#units").focus()
-            await op.press("end")
+            await op.press("home", "down")
             await op.sees("EDSS: SI units")
             await op.press("5")
             await op.sees("no measurement yet")
