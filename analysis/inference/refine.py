@@ -38,7 +38,7 @@ _FREQUENCIES = 20
 _FIRST_GROUPS = 4
 """Groups of five runs that a set gets at first, and again where it is kept."""
 
-_ROUNDS = ((8, 8.0, 4), (6, 6.0, 4), (3, 4.0, 6))
+_ROUNDS = ((8, 6.0, 4), (6, 4.6, 4), (3, 3.0, 6))
 """Rounds on all frequencies: sets that take part at most, how far behind the first in log odds they
 may lie, and groups that each gets. Parts of the first take part, too: they have fewer sizes to fit
 with, and may be all that there is."""

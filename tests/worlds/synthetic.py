@@ -130,6 +130,6 @@ def candidate(
     width = np.array([0.4] + [0.4] * (hypothesis.d - 1))
     motions = Regimes.unknown(*difference.shape[::2])
     surface = Emulator(seen, places, difference, width, slopes, SIGMAS, motions, SPREAD.gain, 9.0)
-    nothing = np.zeros(runs[:, 0].shape)
-    population = Population(places, deviations, nothing + 1.0 + 0j, nothing)
+    mean, variance = np.exp(runs[:, 0] + 1j * runs[:, 1]), np.exp(2.0 * runs[:, 2])
+    population = Population(places, deviations, mean, variance)
     return FittedModel(hypothesis, population, surface, surface.climb(places.mean(axis=0)))
