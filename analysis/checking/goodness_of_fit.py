@@ -20,7 +20,7 @@ from analysis.checking.replicates import FEWEST_RUNS, MOST_RUNS, Replicate, repl
 from analysis.emulation.fitted_model import FittedModel
 from analysis.execution.executor import side_by_side
 
-__all__ = ["Adequacy", "judge_adequacy", "judge_chance", "judge_gain", "misses_alike"]
+__all__ = ["Adequacy", "judge_adequacy", "judge_chance", "misses_alike"]
 
 _TRIES = 2
 
@@ -78,20 +78,6 @@ def judge_chance(simpler: FittedModel, alleged: FittedModel, rng: np.random.Gene
     expectation is blurred over all branches, and does so for its own runs, too
     (D. R. Cox, "Tests of separate families of hypotheses", 1961).
     """
-    share, _ = judge_gain(simpler, alleged, rng)
-    return share
-
-
-def judge_gain(
-    simpler: FittedModel, alleged: FittedModel, rng: np.random.Generator
-) -> tuple[float, float]:
-    """That share, and by how many of their standard deviations the gain exceeds own runs' mean one.
-
-    Where few own runs are on the branch that was observed, their share says little, and gains that
-    differ by hundreds from run to run say that such a gain is none. Nor does it say more than a
-    standard deviation that own runs lose: what the other adds can be none, and its own runs, made
-    for the observation, may not reach them. Infinite where no runs can be compared.
-    """
     seen = alleged.best.log_likelihood - simpler.best.log_likelihood
 
     def gain(run: Replicate) -> float:
@@ -100,10 +86,8 @@ def judge_gain(
 
     gains = side_by_side(gain, replicates_of(simpler, rng))
     if len(gains) < FEWEST_RUNS:
-        return 0.0, float("inf")
-    scatter = max(float(np.std(gains)), 1e-9)
-    beyond = (seen - max(float(np.mean(gains)), -scatter)) / scatter
-    return float(np.mean(np.array(gains) >= seen)), beyond
+        return 0.0
+    return float(np.mean(np.array(gains) >= seen))
 
 
 def misses_alike(

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.checking.rejection import FEW
-from analysis.selection.verdict import NO_GAIN, Judged, Verdict
+from analysis.selection.verdict import Judged, Verdict
 
 __all__ = ["require_credible_set"]
 
@@ -43,13 +43,10 @@ def _best_part(verdict: Verdict) -> tuple[Judged, ...]:
 
 def _who_shares(verdict: Verdict) -> tuple[Judged, ...]:
     """Others that hold what is lacking to be sure, the likeliest first."""
-    # What explains no more than by chance is none, and shows what is believed of the best.
     others = [
         one
         for one in verdict.judged
-        if one is not verdict.best
-        and one.objection != NO_GAIN
-        and not (verdict.holds(one) or verdict.is_equivalent(one))
+        if one is not verdict.best and not (verdict.holds(one) or verdict.is_equivalent(one))
     ]
     others.sort(key=lambda one: -one.probability)
     held = verdict.probability + np.cumsum([0.0, *(one.probability for one in others)])

@@ -15,7 +15,7 @@ import numpy as np
 
 from analysis.checking.cross_validation import HeldOut, hold_out
 from analysis.checking.equivalence import is_equivalent_at_load
-from analysis.checking.goodness_of_fit import judge_adequacy, judge_chance, judge_gain
+from analysis.checking.goodness_of_fit import judge_adequacy, judge_chance
 from analysis.checking.rejection import FEW, OUT_OF_SIGHT, UNLIKE, find_rejection
 from analysis.emulation.fitted_model import Effects, FittedModel
 from analysis.emulation.likelihood import TEMPERATURE
@@ -23,7 +23,6 @@ from analysis.observation.observation import Observation
 
 __all__ = [
     "FALSE_ALARM",
-    "NO_GAIN",
     "WITHIN_TOLERANCE",
     "Judged",
     "Verdict",
@@ -42,11 +41,6 @@ says which of two that do alike is named first. The less common one stays a riva
 FALSE_ALARM = 20.0
 """By so much must a cause beat the baseline."""
 
-_FURTHER = 5.0
-"""By so much must a further cause beat a part that has it not: what it brings in the part's own
-runs asks for the rest. Friction behind a filter's corner was 3.5 standard deviations
-beyond chance, and led by 34 where some 38 were asked with 10."""
-
 _SURE = 3.0 * TEMPERATURE
 """While it leads by less than this, that nothing is hidden has a twentieth of its probability or
 more, and is a rival: causes that nobody thought of are blamed on others by leads like these.
@@ -54,14 +48,7 @@ Sets further behind are not held against runs of their own, which takes seconds 
 nothing; the baseline always is, and so are parts of the leader."""
 
 _BY_CHANCE = 0.04
-"""In at most this share of replicates of the simpler model may the larger one gain as much."""
-
-_BEYOND = 2.0
-"""So many standard deviations must a further cause bring beyond what it brings in runs of a part
-that has it not, where the part alone may be the explanation. Of true ones behind a cause that
-nobody doubts the least brought 2.1, of false ones the most 1.6. Damped teeth were told to have
-friction beside them, which led by 304: at the lowest level a few of their own runs move as little
-as what was measured, and friction makes all do so. It brought 1.7."""
+"""In at most this share of replicates of the plain model may causes gain as much."""
 
 _TIE = 20.0
 """The scores of two sets that say the same about everything differ by about as much, as each has
@@ -79,7 +66,6 @@ _JUDGED = 6
 
 WITHIN_TOLERANCE = "within the tolerance of the datasheet"
 _NOT_ASKED = "too improbable to be checked"
-NO_GAIN = "a model with fewer causes fits as well"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -159,12 +145,9 @@ class Verdict:
         )
 
     def holds(self, one: Judged) -> bool:
-        """Whether a set has all the causes of the best set, and more, and does no better.
-
-        One that does better by chance only does no better, whatever its score.
-        """
+        """Whether a set has all the causes of the best set, and more, and does no better."""
         more = bool(self.best.effects) and set(one.effects) > set(self.best.effects)
-        return more and (one.score <= self.best.score or one.objection == NO_GAIN)
+        return more and one.score <= self.best.score
 
     def remark(self, one: Judged) -> str:
         """What speaks against a set, or makes it no rival; empty where nothing does."""
@@ -178,7 +161,7 @@ class Verdict:
         """Whether a set says with more sizes what the best does."""
         # What swings out of sight is felt as a load or a brake and as nothing else: what is
         # believed of it is believed of that.
-        may = one.adequate or one.objection in (OUT_OF_SIGHT, NO_GAIN)
+        may = one.adequate or one.objection == OUT_OF_SIGHT
         return may and is_equivalent_at_load(one.candidate, self.best.candidate)
 
     def _is_led_by(self, one: Judged) -> bool:
@@ -196,8 +179,6 @@ class Verdict:
 
     def _is_rival(self, one: Judged, believed: float) -> bool:
         behind, best = believed - one.score, set(self.best.effects)
-        if one.objection == NO_GAIN:
-            return False
         if not one.effects and best:
             lead = self.best.score - one.score
             # Refused it is no explanation, and what leads it by little has hardly earned its name.
@@ -238,13 +219,8 @@ def judge_candidates(
     }
     chosen = _worth_judging(candidates, scores)
     judged = _ranked([_unasked(c, observation, scores[c.hypothesis.effects]) for c in chosen])
-    while True:
-        judged = _ask(judged, rng)
-        best = _leader(judged)
-        part = _part_that_will_do(judged, best, rng)
-        if part is None:
-            break
-        judged = rank_behind(judged, best, part, NO_GAIN)
+    judged = _ask(judged, rng)
+    best = _leader(judged)
     (baseline,) = (one for one in judged if not one.effects)
     if (
         not best.effects
@@ -276,12 +252,6 @@ def _may_be_chance(
     return misfit <= UNLIKE and judge_chance(simpler, best, rng) > _BY_CHANCE
 
 
-def _exceeds_chance_gain(whole: FittedModel, part: FittedModel, rng: np.random.Generator) -> bool:
-    """Whether what a set explains beyond a part of it is more than it would explain by chance."""
-    share, beyond = judge_gain(part, whole, rng)
-    return share <= _BY_CHANCE and beyond >= _BEYOND
-
-
 def _worth_judging(
     candidates: Sequence[FittedModel], scores: Mapping[Effects, float]
 ) -> list[FittedModel]:
@@ -301,7 +271,7 @@ def _worth_judging(
 
 def _ask(judged: Sequence[Judged], rng: np.random.Generator) -> tuple[Judged, ...]:
     """Ask what speaks against the leading ones and the parts of the first; the baseline is one."""
-    first = next(one for one in judged if one.objection != NO_GAIN)
+    first = judged[0]
     asked = []
     for one in judged:
         part = set(one.effects) < set(first.effects) or not one.effects
@@ -318,34 +288,17 @@ def _ask(judged: Sequence[Judged], rng: np.random.Generator) -> tuple[Judged, ..
 
 
 def _leader(judged: Sequence[Judged]) -> Judged:
-    """The best set of those that have not been shown to owe their lead to chance.
+    """The best set.
 
     If something speaks against the first and nothing against another within `_TIE`, that one leads.
     So does one that says the same with fewer sizes.
     """
-    left = [one for one in judged if one.objection != NO_GAIN]
-    tied = [one for one in left if one.score > left[0].score - _TIE and one.adequate]
-    best = tied[0] if tied else left[0]
+    tied = [one for one in judged if one.score > judged[0].score - _TIE and one.adequate]
+    best = tied[0] if tied else judged[0]
     for one in tied:
         if is_equivalent_at_load(best.candidate, one.candidate):
             best = one
     return best
-
-
-def _part_that_will_do(
-    judged: Sequence[Judged], best: Judged, rng: np.random.Generator
-) -> Judged | None:
-    """The part of a set that does nearly as well, if any: a further cause must earn its name.
-
-    The set must lead it by more than it does in runs of the part alone.
-    """
-    for one in judged:
-        part = one.effects and set(one.effects) < set(best.effects)
-        if not part or not one.adequate:
-            continue
-        if not _exceeds_chance_gain(best.candidate, one.candidate, rng):
-            return one
-    return None
 
 
 def rank_behind(

@@ -76,25 +76,14 @@ def test_where_every_run_did_alone_what_it_did_nothing_speaks_against_the_observ
     one = SimpleNamespace(best=SimpleNamespace(log_likelihood=10.0, place=None), surface=surface)
     assert adequacy.judge_adequacy(one, None) == adequacy.Adequacy(0.0, 0.0)
     assert adequacy.judge_chance(one, one, None) == 0.0
-    assert adequacy.judge_gain(one, one, None) == (0.0, np.inf)
 
 
 @pytest.mark.parametrize(
-    ("ahead", "mean", "share", "beyond"),
-    # By chance two less to two more than a mean in this world, a standard deviation of sqrt(2).
-    [
-        (0.0, -1.0, 0.4, 1.0 / np.sqrt(2.0)),
-        (1.0, -1.0, 0.2, np.sqrt(2.0)),
-        (6.0, -1.0, 0.0, 7.0 / np.sqrt(2.0)),
-        (6.0, 4.0, 0.2, np.sqrt(2.0)),
-        # Losing by more says no more.
-        (6.0, -1.5, 0.0, 6.0 / np.sqrt(2.0) + 1.0),
-        (6.0, -99.0, 0.0, 6.0 / np.sqrt(2.0) + 1.0),
-    ],
+    ("ahead", "mean", "share"),
+    # By chance two less to two more than a mean in this world.
+    [(0.0, -1.0, 0.4), (1.0, -1.0, 0.2), (6.0, -1.0, 0.0), (6.0, 4.0, 0.2), (6.0, -99.0, 0.0)],
 )
-def test_a_gain_is_held_against_what_own_runs_bring_by_chance(
-    monkeypatch, ahead, mean, share, beyond
-):
+def test_a_gain_is_held_against_what_own_runs_bring_by_chance(monkeypatch, ahead, mean, share):
     def standing(likelihood):
         best = SimpleNamespace(log_likelihood=likelihood, place=None)
         climbs = SimpleNamespace(climb=lambda place, tries: best)
@@ -108,5 +97,4 @@ def test_a_gain_is_held_against_what_own_runs_bring_by_chance(
 
     runs = [run(gain) for gain in mean + np.arange(-2.0, 3.0)]
     monkeypatch.setattr(adequacy, "replicates_of", lambda *_: iter(runs))
-    assert adequacy.judge_gain(simpler, alleged, None) == pytest.approx((share, beyond))
     assert adequacy.judge_chance(simpler, alleged, None) == pytest.approx(share)

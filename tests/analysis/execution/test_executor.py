@@ -9,7 +9,7 @@ import pytest
 from worlds.synthetic import candidate, observation, read
 
 from analysis.checking.cross_validation import hold_out
-from analysis.checking.goodness_of_fit import judge_adequacy, judge_gain
+from analysis.checking.goodness_of_fit import judge_adequacy, judge_chance
 from analysis.execution.executor import side_by_side
 
 
@@ -97,7 +97,7 @@ def test_what_is_judged_does_not_depend_on_the_cores(cores, seed):
             (
                 one.best.log_likelihood,
                 judge_adequacy(one, np.random.default_rng(seed)),
-                judge_gain(plain, one, np.random.default_rng(seed)),
+                judge_chance(plain, one, np.random.default_rng(seed)),
                 held_out.score,
                 held_out.residual.tolist(),
             )

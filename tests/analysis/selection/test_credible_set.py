@@ -7,7 +7,7 @@ from worlds.synthetic import ADSS
 
 from analysis.ensemble.model import Hypothesis
 from analysis.selection.credible_set import require_credible_set
-from analysis.selection.verdict import NO_GAIN, Judged, Verdict
+from analysis.selection.verdict import Judged, Verdict
 
 BRAKE, SHAFT, LOAD = "load-viscous-damping", "shaft-stiffness", "load-inertia"
 
@@ -66,12 +66,7 @@ def test_a_further_cause_that_does_no_better_is_no_rival():
     assert held.probability == pytest.approx(1.0)
 
 
-def test_what_is_believed_of_a_set_that_gains_by_chance_counts_for_its_part():
-    """It has the causes that are named, and a higher score that its part would give it, too."""
-    verdict = told(standing((LOAD,), 0.1), standing((LOAD, SHAFT), 0.9, NO_GAIN))
-    assert verdict.probability == pytest.approx(1.0)
-    other = told(standing((LOAD,), 0.1), standing((BRAKE, SHAFT), 0.9, NO_GAIN))
-    assert other.probability == pytest.approx(0.1)
+def test_a_further_cause_that_does_better_is_a_rival():
     better = told(standing((LOAD,), 0.1), standing((LOAD, SHAFT), 0.9))
     assert better.probability == pytest.approx(0.1)
     assert require_credible_set(better).word == "ambiguous"
@@ -89,11 +84,6 @@ def test_no_more_are_rivals_than_hold_nearly_all_that_is_believed():
     least = standing(("cable-stiffness",), 0.04)
     verdict = told(standing((LOAD,), 0.6), *others, least)
     assert rivals(require_credible_set(verdict)) == [(SHAFT,), (BRAKE,)]
-
-
-def test_what_has_not_earned_its_name_takes_nothing_away():
-    verdict = told(standing((LOAD,), 0.79), standing((BRAKE, LOAD), 0.21, NO_GAIN))
-    assert require_credible_set(verdict) is verdict
 
 
 def test_what_says_the_same_counts_for_the_best(alike):
