@@ -22,7 +22,13 @@ from oracle import drive_plant
 from analysis.diagnosis import diagnose_response
 from analysis.estimate import estimate_response
 from daq.configs import config_path
-from daq.frf import DB_PER_NEPER, FrequencyResponse
+from daq.frf import (
+    DB_PER_NEPER,
+    GAIN_STD_COMPONENTS,
+    GAIN_STD_IS,
+    FrequencyResponse,
+    error_words,
+)
 from sim.datasheet import natural_frequencies
 from sim.unit import load_unit
 
@@ -58,6 +64,8 @@ def measured(name, ratio, points, seed, changed):
         gain_std_db=DB_PER_NEPER * (std / np.abs(mean)).ravel(),
         settle_cycles=CYCLES[0],
         integrate_cycles=CYCLES[1],
+        # Scatter along the gain alone: taken for that of both components it tells another ratio.
+        provenance={GAIN_STD_COMPONENTS: 1, GAIN_STD_IS: error_words(CYCLES[1])},
     )
 
 
