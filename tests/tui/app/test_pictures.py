@@ -72,7 +72,7 @@ def test_the_sweep_is_pictured_with_todays_words(tmp_path):
     async def look():
         async with operated(tmp_path / "bench.db", SIZE) as op:
             await op.types("#serial", "SN 7")
-            await sweeping(op, "sim:?ratio=0.3&seed=1", **PLAN)
+            await sweeping(op, "sim:?ratio=0.3&seed=1&speed=realtime", **PLAN)
             op.app.keeper.pause()
             await op.sees("Paused")
             await op.press("left")
