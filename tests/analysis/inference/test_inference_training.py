@@ -1,3 +1,6 @@
+from pathlib import Path
+from shutil import copytree
+
 import numpy as np
 import pytest
 
@@ -16,6 +19,31 @@ SMALL = {"widths": (8, 8), "blocks": 1, "hidden": 32, "queries": 2}
 @pytest.fixture(scope="module")
 def scales():
     return Scales(Prior(load_unit("adss")), Landmarks(116.0, 150.0), 5.0)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled_once(tmp_path_factory):
+    """Every trainer compiles its step; equal ones are compiled once."""
+    import jax
+
+    jax.config.update("jax_compilation_cache_dir", str(tmp_path_factory.mktemp("compiled")))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+
+
+@pytest.fixture(scope="module")
+def simulated(tmp_path_factory):
+    """A folder with the first batches of machines, which all of these tests train on."""
+    from analysis.inference.campaign import Recipe, simulate_runs
+
+    folder = tmp_path_factory.mktemp("runs")
+    simulate_runs(Scales.of(load_unit("adss")), folder, 150, Recipe())
+    return folder
+
+
+@pytest.fixture
+def runs(simulated, tmp_path):
+    """The same in a folder of the test's own."""
+    return Path(copytree(simulated, tmp_path / "runs"))
 
 
 def test_numpy_computes_what_jax_trains(scales):
@@ -37,13 +65,13 @@ def test_numpy_computes_what_jax_trains(scales):
 
 
 @pytest.mark.study
-def test_training_learns_what_a_batch_shows(scales):
+def test_training_learns_what_a_batch_shows(scales, simulated):
     """On one batch of runs the loss falls far below that of the prior."""
-    from analysis.inference.runs import simulate_batch
+    from analysis.inference.runs import load_batch
     from analysis.inference.training import Schedule, Trainer
 
     shape = scales.architecture(**SMALL)
-    batch = simulate_batch(scales.prior, scales.marks, 1, 0)
+    batch = load_batch(simulated / "000000.npz")
     weights = first_weights(shape, np.random.default_rng(0))
     trainer = Trainer(scales, shape, Schedule(300, 32, 5e-3, dropout=0.0))
     weights, _ = trainer.train(weights, [(scales, batch)], 0, 150)
@@ -53,8 +81,8 @@ def test_training_learns_what_a_batch_shows(scales):
 
 
 @pytest.mark.study
-def test_training_that_was_interrupted_goes_on(tmp_path):
-    """Runs that are there are not simulated again, and steps that were made are kept."""
+def test_training_that_was_interrupted_goes_on(runs, tmp_path):
+    """Runs that are there are not simulated again, one that is missing is; steps are kept."""
     from analysis.inference.campaign import Recipe, train_unit
 
     unit, file = load_unit("adss"), tmp_path / "posterior.npz"
@@ -66,29 +94,33 @@ def test_training_that_was_interrupted_goes_on(tmp_path):
         if text.startswith("step"):
             raise KeyboardInterrupt
 
+    whole = {one: one.stat().st_mtime_ns for one in runs.glob("0*.npz")}
+    missing = max(whole)
+    missing.unlink()
     with pytest.raises(KeyboardInterrupt):
-        train_unit(unit, file, tmp_path, 150, recipe, told=stop)
-    kept = {one: one.stat().st_mtime_ns for one in tmp_path.glob("0*.npz")}
+        train_unit(unit, file, runs, 150, recipe, told=stop)
+    kept = {one: one.stat().st_mtime_ns for one in runs.glob("0*.npz")}
+    assert {one for one in whole if kept[one] != whole[one]} == {missing}
     assert not file.exists(), "what is not trained to its end answers nothing"
-    state = read_checkpoint(tmp_path / "training.npz")
+    state = read_checkpoint(runs / "training.npz")
     assert state.steps > 0
     assert state.machines >= 90
-    done = train_unit(unit, file, tmp_path, 150, recipe)
-    assert {one: one.stat().st_mtime_ns for one in tmp_path.glob("0*.npz")} == kept
+    done = train_unit(unit, file, runs, 150, recipe)
+    assert {one: one.stat().st_mtime_ns for one in runs.glob("0*.npz")} == kept
     assert done.steps == state.steps
     assert read_checkpoint(file).steps == done.steps
 
 
 @pytest.mark.study
-def test_training_that_makes_it_worse_changes_nothing(tmp_path):
+def test_training_that_makes_it_worse_changes_nothing(runs, tmp_path):
     """A learning rate that destroys the weights: those that were there are kept, and it is said."""
     from analysis.inference.campaign import Recipe, train_unit
 
     unit, file, told = load_unit("adss"), tmp_path / "posterior.npz", []
-    first = train_unit(unit, file, tmp_path, 150, Recipe(epochs=2.0, examples=32, shape=SMALL))
-    (tmp_path / "training.npz").unlink()
+    first = train_unit(unit, file, runs, 150, Recipe(epochs=2.0, examples=32, shape=SMALL))
+    (runs / "training.npz").unlink()
     again = train_unit(
-        unit, file, tmp_path, 150, Recipe(epochs=2.0, examples=32, rate=10.0), told=told.append
+        unit, file, runs, 150, Recipe(epochs=2.0, examples=32, rate=10.0), told=told.append
     )
     assert "which is kept" in told[-1]
     for name, values in first.weights.items():
