@@ -93,8 +93,12 @@ def test_a_stop_with_the_last_point_leaves_a_complete_measurement(store):
 def test_an_endless_point_is_ended_at_once(store, cut):
     control = SessionControl()
     analyser = FakeAnalyser()
-    analyser.faults[("point", 4)] = lambda: analyser.wait(60.0, bound_s=60.0)
-    threading.Timer(0.3, getattr(control, cut)).start()
+
+    def wait():
+        threading.Timer(0.3, getattr(control, cut)).start()
+        analyser.wait(60.0, bound_s=60.0)
+
+    analyser.faults[("point", 4)] = wait
     began = time.monotonic()
     finished = list(Session(analyser, store, request(), control).run())[-1]
     assert time.monotonic() - began < 2.0

@@ -70,8 +70,12 @@ def test_an_answer_without_proof_is_no_reason_to_connect_again(store):
 def test_a_pause_survives_a_lost_connection(store):
     control = SessionControl()
     dead, fresh = FakeAnalyser(safe=(OFF, UNKNOWN)), FakeAnalyser()
-    dead.faults[("point", 4)] = control.pause
-    threading.Timer(0.3, control.go_on).start()
+
+    def hold():
+        control.pause()
+        threading.Timer(0.3, control.go_on).start()
+
+    dead.faults[("point", 4)] = hold
     finished = list(Session(dead, store, request(), control, reopen=lambda: fresh).run())[-1]
     assert finished.state == "complete"
     assert fresh.closed
