@@ -40,13 +40,6 @@ class SummaryRuns:
     places: NDArray[np.float64]
     summaries: NDArray[np.float64]
 
-    def joined(self, other: SummaryRuns) -> SummaryRuns:
-        """Both sets of runs."""
-        return SummaryRuns(
-            np.concatenate([self.places, other.places]),
-            np.concatenate([self.summaries, other.summaries]),
-        )
-
 
 def summarise_runs(
     posterior: Posterior,

@@ -81,20 +81,25 @@ class Planned:
     still_vpk: tuple[float, ...]
     limits: tuple[str, ...]
 
-    def to_json(self) -> dict[str, Any]:
-        """The document of ``plan --json``."""
+    @property
+    def _sweep(self) -> dict[str, Any]:
+        """The sweep, as the document and the recipe name it."""
         f = self.plan.frequencies_hz
         return {
+            "levels_vpk": list(self.plan.levels_vpk),
+            "start_hz": f[0],
+            "stop_hz": f[-1],
+            "points": len(f),
+            "spacing": "log",
+            "settle_cycles": self.plan.settle_cycles,
+            "integrate_cycles": self.plan.integrate_cycles,
+        }
+
+    def to_json(self) -> dict[str, Any]:
+        """The document of ``plan --json``."""
+        return {
             "unit": self.unit,
-            "plan": {
-                "levels_vpk": list(self.plan.levels_vpk),
-                "start_hz": f[0],
-                "stop_hz": f[-1],
-                "points": len(f),
-                "spacing": "log",
-                "settle_cycles": self.plan.settle_cycles,
-                "integrate_cycles": self.plan.integrate_cycles,
-            },
+            "plan": self._sweep,
             "minutes": self.minutes,
             "arf_hz": _quantiles(self.arf_hz),
             "rf_hz": _quantiles(self.rf_hz),
@@ -127,7 +132,6 @@ class Planned:
 
     def recipe(self) -> str:
         """The text of a recipe file (TOML) of this plan."""
-        f = self.plan.frequencies_hz
         document = tomlkit.document()
         document.add(
             tomlkit.comment(
@@ -137,15 +141,7 @@ class Planned:
         document.add("schema", tomlkit.item(1))
         document.add("name", tomlkit.item(self.unit))
         sweep = tomlkit.table()
-        sweep.update({
-            "levels_vpk": list(self.plan.levels_vpk),
-            "start_hz": f[0],
-            "stop_hz": f[-1],
-            "points": len(f),
-            "spacing": "log",
-            "settle_cycles": self.plan.settle_cycles,
-            "integrate_cycles": self.plan.integrate_cycles,
-        })  # fmt: skip
+        sweep.update(self._sweep)
         document.add("sweep", sweep)
         text = tomlkit.dumps(document)
         Recipe.model_validate(parse_toml(text))

@@ -38,10 +38,9 @@ def smooth_parts(system: PiecewiseLinearSystem) -> tuple[Real, Real, Real]:
 def chain_factor(system: PiecewiseLinearSystem, s: NDArray[Any]) -> Complex:
     """What holding, differencing and delays do to a response at s, but for images."""
     factor = np.ones_like(s)
-    if system.sampled:
-        for law in system.sampled:
-            turn = s / law.parameters[0]
-            factor = factor * held(turn) * (held(turn) if law.law is Law.COUNT_RATE else 1.0)
+    for law in system.sampled:
+        turn = s / law.parameters[0]
+        factor = factor * held(turn) * (held(turn) if law.law is Law.COUNT_RATE else 1.0)
     return np.asarray(factor * system.reading.factor(s))
 
 
