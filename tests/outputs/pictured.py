@@ -10,6 +10,7 @@ from contextlib import closing
 from pathlib import Path
 
 from analysis.edition import EDITION
+from daq.store import Store
 
 PICTURED = Path(__file__).parents[1] / "data" / "pictured.sql"
 
@@ -40,6 +41,7 @@ def words_of(rows: list[str]) -> list[str]:
 
 def make_history(path: Path) -> None:
     """Make the history that the pictures show, its answers as of today's edition."""
+    Store(path, create=True).close()
     with closing(sqlite3.connect(path)) as history:
         history.executescript(PICTURED.read_text(encoding="utf-8"))
         for table in ("estimates", "diagnoses"):
@@ -48,10 +50,9 @@ def make_history(path: Path) -> None:
 
 
 def keep_history(path: Path) -> None:
-    """Keep a history as the one that the pictures show."""
+    """Keep what a history holds as that which the pictures show; its layout is the store's."""
     with closing(sqlite3.connect(path)) as history:
-        marks = [
-            f"PRAGMA {name} = {history.execute(f'PRAGMA {name}').fetchone()[0]};"
-            for name in ("application_id", "user_version")
-        ]
-        PICTURED.write_text("\n".join([*marks, *history.iterdump(), ""]), encoding="utf-8")
+        rows = [line for line in history.iterdump() if line.startswith("INSERT")]
+    rows = [row for row in rows if '"sqlite_sequence"' not in row]
+    text = "\n".join(["PRAGMA foreign_keys = OFF;", "BEGIN;", *rows, "COMMIT;", ""])
+    PICTURED.write_text(text, encoding="utf-8")
