@@ -13,8 +13,6 @@ from daq.errors import InputError
 if TYPE_CHECKING:
     import pandas as pd
 
-    from daq.frf import FrequencyResponse
-
 __all__ = ["COLUMNS", "frame_of"]
 
 COLUMNS = (
@@ -32,11 +30,17 @@ COLUMNS = (
 )
 """Columns of a table, each an attribute of the response."""
 
-_FACTS = ("unit", "direction", "settle_cycles", "integrate_cycles", "from_rest")
+_FACTS = ("unit", "direction", "settle_cycles", "integrate_cycles", "from_rest", "provenance")
 
 
-def frame_of(response: FrequencyResponse) -> pd.DataFrame:
-    """One row per row of a response; see `daq.frf.FrequencyResponse.to_frame`."""
+def frame_of(response: object) -> pd.DataFrame:
+    """One row per row of a response; see `daq.frf.FrequencyResponse.to_frame`.
+
+    Parameters
+    ----------
+    response
+        Has the `COLUMNS` as arrays, and what holds for all rows as other attributes.
+    """
     try:
         import pandas as pd
     except ImportError as error:
@@ -45,8 +49,7 @@ def frame_of(response: FrequencyResponse) -> pd.DataFrame:
         ) from error
     # Copies: a table may be written to, a response may not.
     frame = pd.DataFrame({name: getattr(response, name).copy() for name in COLUMNS})
-    frame.attrs = {name: getattr(response, name) for name in _FACTS}
-    frame.attrs["provenance"] = _plain(response.provenance)
+    frame.attrs = {name: _plain(getattr(response, name)) for name in _FACTS}
     return frame
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 from sim.drive.sections import Damping
 from sim.drive.sensors import Encoder, SampledTachometer
+from sim.drive.unit import Unit
 from sim.elements import (
     Amplifier,
     Damper,
@@ -26,7 +27,6 @@ from sim.elements import (
     Tachometer,
 )
 from sim.engine.system import Assembly, PiecewiseLinearSystem
-from sim.unit import Unit
 
 __all__ = [
     "Drivetrain",

@@ -16,8 +16,9 @@ from tomlkit.items import Table
 from analysis.commissioning.commission import Commissioned
 from analysis.commissioning.coordinates import RATIO
 from daq.untrusted.bounded_text import parse_toml
+from sim.drive.unit import NO_PHYSICS
 from sim.tolerance import DEFAULT, MOST
-from sim.unit import NO_PHYSICS, unit_from_mapping
+from sim.unit import unit_from_mapping
 
 __all__ = ["commissioned_unit_text"]
 

@@ -5,6 +5,7 @@ Owns the paper's numbers and what is computed of them again. It judges no measur
 
 from __future__ import annotations
 
-from analysis.paper.reproduction import ReproducedRow, Reproduction, reproduce
+from analysis.paper.reproduction import Reproduction, reproduce
+from analysis.paper.table2 import ReproducedRow
 
 __all__ = ["Reproduction", "ReproducedRow", "reproduce"]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
@@ -17,11 +17,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from analysis.paper.published import UnitName
+from analysis.paper.result import ReproductionNumbers
+from analysis.paper.table2 import Compared, ReproducedRow
 from daq.formats.atomic import replacing
-
-if TYPE_CHECKING:
-    from analysis.paper.reproduction import ReproducedRow, Reproduction
-    from analysis.paper.table2 import Compared
 
 __all__ = ["draw"]
 
@@ -52,9 +50,9 @@ _RUNS = "lines: median of single runs, bands: 16 to 84 % of them"
 _RATIO = "contribution ratio of stage 1 (%)"
 
 
-def draw(result: Reproduction, directory: Path) -> list[Path]:
+def draw(result: ReproductionNumbers, directory: Path) -> list[Path]:
     """Write every figure as PNG into a directory, made if missing, and return the paths."""
-    figures: dict[str, Callable[[Reproduction], Figure]] = {
+    figures: dict[str, Callable[[ReproductionNumbers], Figure]] = {
         "fig2-simulated-responses": _figure_2,
         "fig3-features-against-ratio": _figure_3,
         "fig4e-measured-and-simulated": _figure_4e,
@@ -68,11 +66,11 @@ def draw(result: Reproduction, directory: Path) -> list[Path]:
     return paths
 
 
-def _units(result: Reproduction) -> list[UnitName]:
+def _units(result: ReproductionNumbers) -> list[UnitName]:
     return [curve.unit for curve in result.index]
 
 
-def _figure_2(result: Reproduction) -> Figure:
+def _figure_2(result: ReproductionNumbers) -> Figure:
     """Simulated responses at every ratio, by the paper's scheme and by the exact engine."""
     units = _units(result)
     figure = Figure(figsize=(7.2, 5.6), layout="constrained")
@@ -122,7 +120,7 @@ def _published_points(axes: Axes, row: ReproducedRow, colour: str) -> None:
         )
 
 
-def _figure_3(result: Reproduction) -> Figure:
+def _figure_3(result: ReproductionNumbers) -> Figure:
     """ARF, RF, their difference and the error index against the ratio."""
     units = _units(result)
     figure = Figure(figsize=(7.2, 8.0), layout="constrained")
@@ -220,7 +218,7 @@ def _difference_panel(axes: Axes, rows: tuple[ReproducedRow, ...], measured_hz: 
     axes.axhline(measured_hz, color=_MEASURED, linewidth=0.8, linestyle="-.")
 
 
-def _index_panel(axes: Axes, result: Reproduction, column: int) -> None:
+def _index_panel(axes: Axes, result: ReproductionNumbers, column: int) -> None:
     curve = result.index[column]
     indices = (curve.published, curve.value, curve.exact)
     _series(
@@ -231,7 +229,7 @@ def _index_panel(axes: Axes, result: Reproduction, column: int) -> None:
     )
 
 
-def _figure_4e(result: Reproduction) -> Figure:
+def _figure_4e(result: ReproductionNumbers) -> Figure:
     """The simulated response at the ratio of the least index, and the measured features."""
     units = _units(result)
     figure = Figure(figsize=(7.2, 3.5), layout="constrained")
@@ -256,7 +254,7 @@ def _figure_4e(result: Reproduction) -> Figure:
     return figure
 
 
-def _measured_points(axes: Axes, result: Reproduction, unit: UnitName) -> None:
+def _measured_points(axes: Axes, result: ReproductionNumbers, unit: UnitName) -> None:
     measured = result.paper.measured_row(unit)
     axes.plot(
         [measured.arf_hz, measured.rf_hz],

@@ -8,16 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.estimate.error_index import error_index
 from analysis.paper.published import PaperNumbers, UnitName
-
-if TYPE_CHECKING:
-    from analysis.paper.reproduction import ReproducedRow
+from analysis.paper.table2 import ReproducedRow
 
 __all__ = ["IndexCurve", "Index", "index_curves"]
 

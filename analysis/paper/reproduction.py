@@ -10,120 +10,37 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.execution.blas import on_one_core
 from analysis.execution.progress import Progress
-from analysis.paper.index_curves import IndexCurve, index_curves
-from analysis.paper.published import PaperNumbers, PublishedRow, UnitName, load_paper
+from analysis.paper.index_curves import index_curves
+from analysis.paper.published import PublishedRow, UnitName, load_paper
+from analysis.paper.result import ReproductionNumbers
 from analysis.paper.runs import exact_runs_db, grid_hz, paper_runs_db
-from analysis.paper.section5 import Section5, section_5
-from analysis.paper.table2 import Compared, compare, read_grid
+from analysis.paper.section5 import section_5
+from analysis.paper.table2 import ReproducedRow, compare, read_grid
+from analysis.paper.text import summarise
 from daq.errors import InputError
 
 __all__ = ["Reproduction", "ReproducedRow", "reproduce"]
 
 
-PLATEAU_SPREAD = 0.024
-"""Single runs that scatter by more than this share of RF find no peak but a plateau.
-
-Over 64 runs a row the paper's scheme scatters by 1.5 to 1.8 % where there is a
-peak, by 3.6 % and more on the plateaus of EDSS.
-"""
-
-
-@dataclass(frozen=True, slots=True)
-class ReproducedRow:
-    """One row of Table 2, computed.
-
-    Parameters
-    ----------
-    published
-        The row as printed.
-    frequency_hz
-        The grid, shape (points,), Hz.
-    gain_db, exact_db
-        Every run, shape (runs, points), dB: by the paper's scheme and by the exact engine.
-    arf, rf
-        Both features, printed and computed.
-    """
-
-    published: PublishedRow
-    frequency_hz: NDArray[np.float64]
-    gain_db: NDArray[np.float64]
-    exact_db: NDArray[np.float64]
-    arf: Compared
-    rf: Compared
-
-    @property
-    def plateau(self) -> bool:
-        """Whether RF is the accidental maximum of a plateau."""
-        return self.rf.std_hz > PLATEAU_SPREAD * self.rf.value_hz
-
-    @property
-    def flags(self) -> list[str]:
-        """What is to be known about the row."""
-        flags = ["rf-plateau"] if self.plateau else []
-        if self.published.rf_db is None:
-            flags.append("rf-gain-illegible")
-        for name, feature in (("arf", self.arf), ("rf", self.rf)):
-            if feature.differs_hz:
-                flags.append(f"{name}-differs")
-            if feature.differs_db:
-                flags.append(f"{name}-gain-differs")
-        return flags
-
-
-@dataclass(frozen=True, slots=True)
-class Reproduction:
+class Reproduction(ReproductionNumbers):
     """Everything that was recomputed, beside everything that was printed."""
 
-    paper: PaperNumbers
-    rows: tuple[ReproducedRow, ...]
-    index: tuple[IndexCurve, ...]
-    section_5: tuple[Section5, ...]
-    paper_runs: int
-    exact_runs: int
-    elapsed_s: float
-
-    def of_unit(self, unit: UnitName) -> tuple[ReproducedRow, ...]:
-        """The rows of one unit, in the order of Table 2."""
-        return tuple(row for row in self.rows if row.published.unit == unit)
-
-    def to_json(self) -> dict[str, Any]:
-        """The document of ``reproduce --json``."""
-        return {
-            "table2": [
-                {
-                    "unit": row.published.unit,
-                    "ratio_percent": row.published.ratio_percent,
-                    "arf": row.arf.to_json(),
-                    "rf": row.rf.to_json(),
-                    "flags": row.flags,
-                }
-                for row in self.rows
-            ],
-            "error_index": {curve.unit: curve.to_json() for curve in self.index},
-            "damping": {part.unit: part.to_json() for part in self.section_5},
-            "paper_runs": self.paper_runs,
-            "exact_runs": self.exact_runs,
-            "elapsed_s": self.elapsed_s,
-        }
+    __slots__ = ()
 
     def summary(self) -> list[str]:
         """The result in lines of text for people."""
-        from analysis.paper.text import summarise
-
         return summarise(self)
 
     def plot(self, directory: Path | str) -> list[Path]:
         """Write Fig. 2, 3 and 4(e) as PNG files and return their paths."""
-        from analysis.paper.figures import draw
+        from analysis.paper.figures import draw  # loads matplotlib
 
         return draw(self, Path(directory))
 

@@ -6,14 +6,11 @@ Owns wording and columns. It computes nothing and prints nothing.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from analysis.paper.index_curves import IndexCurve
 from analysis.paper.published import PublishedRow
-from analysis.paper.table2 import Compared
-
-if TYPE_CHECKING:
-    from analysis.paper.reproduction import ReproducedRow, Reproduction
+from analysis.paper.result import ReproductionNumbers
+from analysis.paper.table2 import Compared, ReproducedRow
 
 __all__ = ["summarise"]
 
@@ -27,7 +24,7 @@ _UNITS = (
 )
 
 
-def summarise(result: Reproduction) -> list[str]:
+def summarise(result: ReproductionNumbers) -> list[str]:
     """All lines: Table 2, error index, section 5, findings."""
     lines = [
         f"Table 2 by the paper's scheme (RK4, fixed 10 us, {result.paper_runs} runs a row) "
@@ -56,7 +53,7 @@ def _line(row: PublishedRow, feature: Compared) -> str:
     )
 
 
-def _error_index(result: Reproduction) -> list[str]:
+def _error_index(result: ReproductionNumbers) -> list[str]:
     lines = ["Error index (21), Hz (1 std), against the measured features"]
     for curve in result.index:
         ratios = "".join(f"{ratio:>12}" for ratio in curve.ratio_percent)
@@ -80,7 +77,7 @@ def _index_line(title: str, curve: IndexCurve, name: str) -> str:
     return title.ljust(24) + cells + f"   {height:.1f} Hz at {ratio} %"
 
 
-def _section_5(result: Reproduction) -> list[str]:
+def _section_5(result: ReproductionNumbers) -> list[str]:
     lines = ["Section 5, printed / computed"]
     for part in result.section_5:
         printed = part.printed
@@ -97,7 +94,7 @@ def _section_5(result: Reproduction) -> list[str]:
     return lines
 
 
-def _disagreements(result: Reproduction) -> list[str]:
+def _disagreements(result: ReproductionNumbers) -> list[str]:
     lines = [line for row in result.rows for line in _row_disagreements(row)]
     for part in result.section_5:
         # Printed to three digits from features known to a hertz: 1.5 % is what rounding allows.

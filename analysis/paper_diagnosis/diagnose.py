@@ -9,8 +9,8 @@ both without and with what the microscope knew of the gears.
 from __future__ import annotations
 
 import time
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,12 +22,15 @@ from analysis.ensemble.model import Hypothesis
 from analysis.execution.blas import on_one_core
 from analysis.execution.progress import Progress
 from analysis.paper.published import UnitName, load_paper
+from analysis.paper_diagnosis.document import document
 from analysis.paper_diagnosis.evidence import Agreement, RatioPrior, agree
 from analysis.paper_diagnosis.experiment_design import propose_sweep
 from analysis.paper_diagnosis.features import Reading, plan_about
 from analysis.paper_diagnosis.posterior import Belief, Knowledge, believe
+from analysis.paper_diagnosis.result import PaperFindings
 from analysis.paper_diagnosis.search import search_sets
 from analysis.paper_diagnosis.simulation import Effort, Explored, Explorer
+from analysis.paper_diagnosis.text import summarise
 from daq.errors import InputError
 from daq.plan import SweepPlan
 from sim.unit import Unit
@@ -67,66 +70,20 @@ def paper_reading(unit: UnitName) -> Reading:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class PaperDiagnosis:
-    """What the plain model gets wrong about five measured numbers, and what may explain it.
-
-    Parameters
-    ----------
-    free
-        What is believed with the contribution ratio unknown: the verdict.
-    known
-        The same with ratio and total backlash as measured; None where they were not.
-    procedures
-        The plain model under other ways of sweeping.
-    """
-
-    unit: str
-    reading: Reading
-    free: Belief
-    known: Belief | None
-    procedures: dict[str, Agreement]
-    next_measurement: NextMeasurement | None
-    elapsed_s: float
-    believed: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def verdict(self) -> str:
-        """The word for the ratio unknown."""
-        return self.free.word
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What is to be known about the answer."""
-        found = [
-            "four or five numbers of one run at one drive level: many sets tie, and what they "
-            "cannot tell apart is told by probability only"
-        ]
-        if not np.isfinite(self.reading.values[[1, 3]]).all():
-            found.append("a gain is not known: faults of the measuring chain hide there")
-        return tuple(found)
-
-    @property
-    def beliefs(self) -> dict[str, Belief]:
-        """Both states of knowledge by name."""
-        known = {} if self.known is None else {"ratio-as-measured": self.known}
-        return {"ratio-free": self.free, **known}
+class PaperDiagnosis(PaperFindings):
+    """What the plain model gets wrong about five measured numbers, and what may explain it."""
 
     def to_json(self) -> dict[str, Any]:
         """The document of ``diagnose --paper --json``."""
-        from analysis.paper_diagnosis.document import document
-
         return document(self)
 
     def summary(self) -> list[str]:
         """The answer in lines of text for people."""
-        from analysis.paper_diagnosis.text import summarise
-
         return summarise(self)
 
     def plot(self, directory: Path | str) -> list[Path]:
         """Write the figure as PNG and return its path."""
-        from analysis.paper_diagnosis.figure import draw
+        from analysis.paper_diagnosis.figure import draw  # loads matplotlib
 
         return draw(self, Path(directory))
 

@@ -6,7 +6,7 @@ applies to features, and the sections that only features have.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +15,9 @@ from analysis.estimate.backlash import backlash_of_places
 from analysis.paper_diagnosis.evidence import Agreement
 from analysis.paper_diagnosis.pairs import CHAIN, DISSIPATION, LOADS, VISCOUS
 from analysis.paper_diagnosis.posterior import Belief, Judged, index_of
+from analysis.paper_diagnosis.result import PaperFindings
 from sim.catalogue import CATALOGUE
 from sim.paper_scheme import PAPER_LEVEL_VPK
-
-if TYPE_CHECKING:
-    from analysis.paper_diagnosis.diagnose import PaperDiagnosis
 
 __all__ = ["document", "parameters", "residual"]
 
@@ -28,7 +26,7 @@ _UNITS = ("Hz", "dB", "Hz", "dB", "Hz")
 _GAINS = [1, 3]
 
 
-def document(diagnosis: PaperDiagnosis) -> dict[str, Any]:
+def document(diagnosis: PaperFindings) -> dict[str, Any]:
     """Everything by name; the top level holds with the ratio unknown."""
     free = _section(diagnosis.free)
     proposal = diagnosis.next_measurement

@@ -16,8 +16,8 @@ from matplotlib.patches import Ellipse
 
 from analysis.drawing.palette import BLUE, GREEN, VERMILION
 from analysis.drawing.picture import save_picture
-from analysis.paper_diagnosis.diagnose import PaperDiagnosis
 from analysis.paper_diagnosis.posterior import Belief, Judged
+from analysis.paper_diagnosis.result import PaperFindings
 from daq.formats.atomic import file_stem
 
 __all__ = ["draw", "paper_diagnosis_figure"]
@@ -28,7 +28,7 @@ _FEATURES = (("ARF", 0, "v"), ("RF", 2, "^"))
 _BARS = 8
 
 
-def draw(diagnosis: PaperDiagnosis, directory: Path) -> list[Path]:
+def draw(diagnosis: PaperFindings, directory: Path) -> list[Path]:
     """Write the figure of one unit as PNG into a directory, made if missing."""
     directory.mkdir(parents=True, exist_ok=True)
     path = directory / f"{file_stem(diagnosis.unit)}-paper-diagnosis.png"
@@ -36,7 +36,7 @@ def draw(diagnosis: PaperDiagnosis, directory: Path) -> list[Path]:
     return [path]
 
 
-def paper_diagnosis_figure(diagnoses: Sequence[PaperDiagnosis]) -> Figure:
+def paper_diagnosis_figure(diagnoses: Sequence[PaperFindings]) -> Figure:
     """Two rows a unit: features measured and simulated, and the sets by probability.
 
     Ellipses hold one standard deviation of single runs at the likeliest place.

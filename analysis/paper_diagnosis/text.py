@@ -5,19 +5,15 @@ Owns wording and columns only.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from analysis.ensemble.datasheet_belief import believed_lines
 from analysis.paper_diagnosis.document import parameters, residual
 from analysis.paper_diagnosis.pairs import CHAIN, DISSIPATION, LOADS, VISCOUS
 from analysis.paper_diagnosis.posterior import Belief, Judged, index_of
+from analysis.paper_diagnosis.result import PaperFindings
 from analysis.selection.wording import hidden_words
 from sim.catalogue import CATALOGUE
-
-if TYPE_CHECKING:
-    from analysis.paper_diagnosis.diagnose import PaperDiagnosis
 
 __all__ = ["summarise"]
 
@@ -27,7 +23,7 @@ _TITLES = {
 }
 
 
-def summarise(diagnosis: PaperDiagnosis) -> list[str]:
+def summarise(diagnosis: PaperFindings) -> list[str]:
     """All lines: measurement, verdict and what it rests on for each state of knowledge."""
     values = diagnosis.reading.values
     lines = [

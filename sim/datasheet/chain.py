@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.drive.unit import Unit
 from sim.drivetrain import paper_drivetrain
 from sim.elements import Inertia, Mesh, Spring
 from sim.engine.system import Assembly
-from sim.unit import Unit
 
 __all__ = ["NaturalFrequencies", "describe_chain", "inertias_at_motor", "natural_frequencies"]
 

@@ -15,7 +15,7 @@ from sim.datasheet.chain import natural_frequencies
 from sim.datasheet.ranges import COMBINED, KEYS, SINGLES, Range, Values
 
 if TYPE_CHECKING:
-    from sim.unit import Unit
+    from sim.drive.unit import Unit
 
 __all__ = ["find_impossible", "find_unusual", "impossible_among", "unusual_among"]
 

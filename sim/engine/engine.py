@@ -25,10 +25,11 @@ from numpy.typing import NDArray
 
 from daq.errors import AnalysisError
 from sim.engine.layout import STEPS_SEEN, Layout, Structure
+from sim.engine.nonlinearity import Reading, held
 from sim.engine.propagator import Modes, Propagator, build_propagator, find_modes
 from sim.engine.solving import kinds_of, law_coefficients, law_parameters, order_of
 from sim.engine.stepping import Asking, Steps, step_together
-from sim.engine.system import PiecewiseLinearSystem, Reading, held
+from sim.engine.system import PiecewiseLinearSystem
 
 __all__ = ["HARMONICS", "LONGEST_STEP_S", "Motion", "Stretch", "advance", "carry", "carry_each"]
 

@@ -10,13 +10,13 @@ step-invariant discretisation (K. J. Astroem and B. Wittenmark, Computer-Control
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm, matrix_balance
 
-from sim.engine.system import Law, Nonlinearity, PiecewiseLinearSystem, held
+from sim.engine.nonlinearity import Law, Nonlinearity, Reading, held
 
 __all__ = ["chain_factor", "sampled_response", "smooth_parts", "smooth_response"]
 
@@ -24,7 +24,31 @@ Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
 
-def smooth_parts(system: PiecewiseLinearSystem) -> tuple[Real, Real, Real]:
+class LinearParts(Protocol):
+    """What a linear response takes of a system (`sim.engine.system.PiecewiseLinearSystem`)."""
+
+    @property
+    def A(self) -> Real:  # noqa: N802
+        """Matrix, shape (n, n)."""
+
+    @property
+    def b(self) -> Real:
+        """Input, shape (n,)."""
+
+    @property
+    def o(self) -> Real:
+        """Output row, shape (n,)."""
+
+    @property
+    def sampled(self) -> tuple[Nonlinearity, ...]:
+        """The laws that a clock samples."""
+
+    @property
+    def reading(self) -> Reading:
+        """How the output is read."""
+
+
+def smooth_parts(system: LinearParts) -> tuple[Real, Real, Real]:
     """Matrix (n, n), input (n,) and output (n,) as if nothing were sampled or counted."""
     A, b, o = system.A, system.b, system.o
     for law in system.sampled:
@@ -35,7 +59,7 @@ def smooth_parts(system: PiecewiseLinearSystem) -> tuple[Real, Real, Real]:
     return A, b, o
 
 
-def chain_factor(system: PiecewiseLinearSystem, s: NDArray[Any]) -> Complex:
+def chain_factor(system: LinearParts, s: NDArray[Any]) -> Complex:
     """What holding, differencing and delays do to a response at s, but for images."""
     factor = np.ones_like(s)
     for law in system.sampled:
@@ -44,7 +68,7 @@ def chain_factor(system: PiecewiseLinearSystem, s: NDArray[Any]) -> Complex:
     return np.asarray(factor * system.reading.factor(s))
 
 
-def smooth_response(system: PiecewiseLinearSystem, s: NDArray[Any]) -> Complex:
+def smooth_response(system: LinearParts, s: NDArray[Any]) -> Complex:
     """Response at complex angular frequencies s, rad/s; images of a held command are left out."""
     A, b, o = smooth_parts(system)
     x = _solve(A, b, s)
@@ -54,7 +78,7 @@ def smooth_response(system: PiecewiseLinearSystem, s: NDArray[Any]) -> Complex:
     return np.asarray(response * chain_factor(system, s))
 
 
-def sampled_response(system: PiecewiseLinearSystem, s: NDArray[Any]) -> Complex:
+def sampled_response(system: LinearParts, s: NDArray[Any]) -> Complex:
     """The same with images of the command, as a sensor reads them that the same clock samples."""
     commands = [law for law in system.sampled if law.feedthrough != 0.0]
     sensors = [law for law in system.sampled if law.feedthrough == 0.0]
@@ -71,7 +95,7 @@ def sampled_response(system: PiecewiseLinearSystem, s: NDArray[Any]) -> Complex:
 
 
 def _sequence(
-    system: PiecewiseLinearSystem, command: Nonlinearity, sees: Real, z: Complex, period: float
+    system: LinearParts, command: Nonlinearity, sees: Real, z: Complex, period: float
 ) -> Complex:
     """Samples of what a sensor sees over those of the command, by the exact discretisation."""
     n = len(system.b)

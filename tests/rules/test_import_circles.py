@@ -5,13 +5,6 @@ import pytest
 
 PACKAGES = ("daq", "sim", "analysis", "tui", "lashbench")
 KNOWN = {
-    # A response as a table, a result as text and pictures: a method hands on to a module.
-    "daq.frf": {"daq.frames"},
-    "analysis.paper.reproduction": {"analysis.paper"},
-    "analysis.paper_diagnosis.diagnose": {"analysis.paper_diagnosis"},
-    "sim.engine.system": {"sim.engine.linear"},
-    # A unit is checked by what a drive train made of it does.
-    "sim.unit": {"sim.drivetrain", "sim.datasheet"},
     # Parts of one instrument, or of one application, that know the whole.
     "sim.sr785.instrument": {"sim.sr785"},
     "sim.analyser35670a.instrument": {"sim.analyser35670a"},
