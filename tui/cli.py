@@ -9,11 +9,9 @@ from __future__ import annotations
 
 if __name__ == "__main__":
     # Before anything is loaded that a file in the working directory could stand in for.
-    import sys
+    import runpy
 
-    from tui.entry import main as begin
-
-    sys.exit(begin())
+    runpy.run_module("tui", run_name="__main__")
 
 import errno
 import logging
@@ -26,7 +24,7 @@ from cyclopts import App, CycloptsError, MissingArgumentError, Parameter
 
 from daq.errors import InputError, LashbenchError
 from tui.commands.bench import is_terminal
-from tui.entry import INTERRUPTED
+from tui.exit_codes import INTERRUPTED
 from tui.logs import LEVELS, logging_to_file, silence, telling_what_is_passed_over
 from tui.text.output import Console, hush
 from tui.verbs import EPILOGUE, FRONT_PAGES, SUMMARY, VERBS, front_page

@@ -10,10 +10,10 @@ from __future__ import annotations
 import os
 import sys
 
-__all__ = ["INTERRUPTED", "main"]
+from tui.exit_codes import INTERRUPTED
 
-INTERRUPTED = 130
-"""Exit code of what was interrupted, as shells have it."""
+__all__ = ["main"]
+
 _REFUSED = 2
 _PACKAGES = ("daq", "sim", "analysis", "tui")
 _MARK = b'__distribution__ = "lashbench"'

@@ -51,11 +51,6 @@ class Analyser35670A:
         Wall clock, s; only faults look at it.
     """
 
-    # Declared here, since the tables of commands are typed before this class is.
-    choices: Choices
-    status: StatusModel
-    operations: Operations
-
     def __init__(
         self,
         plant: Plant,
@@ -85,7 +80,7 @@ class Analyser35670A:
         self.local_lockout = False
         self.damage = Damage(self.faults, clock)
         self.measurement = Measurement(self)
-        self.traces = TraceBoxes(self)
+        self.traces = TraceBoxes(self, lambda: self.measurement.shown)
         self.spectrum = Spectrum(self)
         self.calibration = Calibration(self)
         dispatcher = Dispatcher(self)

@@ -10,16 +10,22 @@ import json
 import zlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from enum import Enum, StrEnum
-from typing import TYPE_CHECKING, Any
+from enum import Enum
+from typing import Any
 
 from sim.analyser35670a.commands.tree import key_of
 from sim.analyser35670a.errors import ScpiError
 from sim.analyser35670a.kinds import Kind
+from sim.analyser35670a.modes import (
+    ALL_MODES,
+    MODE_CONFLICT,
+    OTHER_MODES,
+    SINE_ONLY,
+    Mode,
+    Scope,
+)
+from sim.analyser35670a.parts import InstrumentCore
 from sim.analyser35670a.units import Quantity
-
-if TYPE_CHECKING:
-    from sim.analyser35670a.instrument import Analyser35670A
 
 __all__ = [
     "ALL_MODES",
@@ -33,37 +39,12 @@ __all__ = [
 ]
 
 
-class Mode(StrEnum):
-    """Instrument modes, in the order of ``INST:NSEL``."""
-
-    FFT = "FFT"
-    OCTAVE = "OCT"
-    ORDER = "ORD"
-    SINE = "SINE"
-    HISTOGRAM = "HIST"
-    CORRELATION = "CORR"
-
-
-ALL_MODES = frozenset(Mode)
-SINE_ONLY = frozenset({Mode.SINE})
-OTHER_MODES = ALL_MODES - SINE_ONLY
-MODE_CONFLICT = (-221, "Measurement mode incompatible with command.")
-
-
-class Scope(Enum):
-    """How far a value reaches."""
-
-    MODE = "each instrument mode has its own"
-    SHARED = "one for all modes"
-    KEPT = "one for all modes, touched by no reset"
-
-
 class _Same(Enum):
     SAME = 0
 
 
 Numbers = tuple[int, ...]
-Check = Callable[["Analyser35670A", Numbers, Any], Any]
+Check = Callable[[InstrumentCore, Numbers, Any], Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,11 +92,11 @@ class Setting:
     option: str = ""
     measured: bool = False
     check: Check | None = None
-    changed: Callable[[Analyser35670A, Numbers], None] | None = None
+    changed: Callable[[InstrumentCore, Numbers], None] | None = None
     step_from: str = ""
-    bounds: Callable[[Analyser35670A], tuple[float, float]] | None = None
+    bounds: Callable[[InstrumentCore], tuple[float, float]] | None = None
     overlapped: bool = False
-    applies: Callable[[Analyser35670A, Numbers], bool] | None = None
+    applies: Callable[[InstrumentCore, Numbers], bool] | None = None
 
     def original(self, mode: Mode, numbers: Numbers, after_reset: bool) -> Any:
         """The value that a reset gives."""

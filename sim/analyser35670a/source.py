@@ -9,15 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sim.analyser35670a.commands.tokens import Argument
 from sim.analyser35670a.errors import ScpiError
 from sim.analyser35670a.kinds import Number, show_real
+from sim.analyser35670a.parts import InstrumentCore
 from sim.analyser35670a.units import Quantity, UnitTable, from_volts_peak, volts_peak
-
-if TYPE_CHECKING:
-    from sim.analyser35670a.instrument import Analyser35670A
 
 __all__ = [
     "HIGHEST_VPK",
@@ -51,14 +49,14 @@ def _offset_grid(volts: float) -> float:
 
 
 def check_level(
-    _instrument: Analyser35670A, _numbers: tuple[int, ...], asked: Quantity
+    _instrument: InstrumentCore, _numbers: tuple[int, ...], asked: Quantity
 ) -> Quantity:
     """Coerce a level to the source's steps; the unit sent is the unit kept."""
     return from_volts_peak(min(_level_grid(volts_peak(asked)), HIGHEST_VPK), asked.unit)
 
 
 def check_offset(
-    instrument: Analyser35670A, _numbers: tuple[int, ...], asked: Quantity
+    instrument: InstrumentCore, _numbers: tuple[int, ...], asked: Quantity
 ) -> Quantity:
     """Coerce an offset; moved without a word where the amplitude leaves too little room."""
     room = _HIGHEST_SUM_V - volts_peak(instrument.settings.get("SOUR:VOLT"))
@@ -69,7 +67,7 @@ def check_offset(
     return Quantity(wanted, "V")
 
 
-def fit_offset(instrument: Analyser35670A, numbers: tuple[int, ...] = ()) -> None:
+def fit_offset(instrument: InstrumentCore, numbers: tuple[int, ...] = ()) -> None:
     """Move the offset after the level has grown."""
     kept = instrument.settings.get("SOUR:VOLT:OFFS")
     moved = check_offset(instrument, numbers, kept)

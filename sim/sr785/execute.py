@@ -8,16 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sim.sr785.language import Command, CommandFault, ExecutionFault, parse_command, whole
+from sim.sr785.parts import InstrumentCore
 from sim.sr785.settings import GROUPS, SWEPT, TABLE
 from sim.sr785.status import ENABLES
-
-if TYPE_CHECKING:
-    from sim.sr785.instrument import SR785
+from sim.sr785.sweep import Sweep
+from sim.sr785.traces import Traces
 
 __all__ = ["Executor", "Outcome"]
 
@@ -51,8 +50,8 @@ _RESETS_SWEEP = ("SSTR", "SSTP", "SNPS", "SSTY")
 class Executor:
     """The command table of one instrument."""
 
-    def __init__(self, instrument: SR785) -> None:
-        self._instrument = instrument
+    def __init__(self, instrument: InstrumentCore, sweep: Sweep, traces: Traces) -> None:
+        self._instrument, self._sweep, self._traces = instrument, sweep, traces
         self._handlers: dict[str, Handler] = {
             "*IDN": self._identity, "*RST": self._reset, "*CLS": self._clear, "*STB": self._byte,
             "*SRE": self._request_enable, "*PSC": self._power_on_clear, "*TST": self._self_test,
@@ -104,7 +103,7 @@ class Executor:
 
     def _must_be_live(self, display: int, group: str | None) -> None:
         instrument = self._instrument
-        if group is not None and instrument.traces.group_name(display) != group:
+        if group is not None and self._traces.group_name(display) != group:
             raise ExecutionFault("the measurement group")
         if not instrument.settings.get("DISP", display):
             raise ExecutionFault("the display is off-line")
@@ -148,7 +147,7 @@ class Executor:
     def _changed(self, name: str, differs: bool) -> None:
         instrument = self._instrument
         if name in _RESETS_SWEEP and differs:
-            instrument.sweep.reset()
+            self._sweep.reset()
         elif name == "SSAL" and instrument.settings.get("SSAL"):
             instrument.settings.put("A1RG", 1)
             instrument.settings.put("A2RG", 1)
@@ -157,7 +156,7 @@ class Executor:
     # ------------------------------------------------------------ groups, measurements, views
 
     def _group(self, command: Command) -> Outcome | None:
-        traces, groups = self._instrument.traces, GROUPS[self._instrument.choices.model]
+        traces, groups = self._traces, GROUPS[self._instrument.choices.model]
         if command.asks:
             return Outcome(str(traces.group[self._display(command)]))
         self._count(command, 2)
@@ -169,12 +168,12 @@ class Executor:
             return None
         for place in places:
             traces.enter(place, group)
-        self._instrument.sweep.forget()
+        self._sweep.forget()
         self._instrument.refresh_source()
         return None
 
     def _measurement(self, command: Command) -> Outcome | None:
-        traces = self._instrument.traces
+        traces = self._traces
         if command.asks:
             return Outcome(str(traces.measurement[self._display(command)]))
         self._count(command, 2)
@@ -184,7 +183,7 @@ class Executor:
         return None
 
     def _view(self, command: Command) -> Outcome | None:
-        traces = self._instrument.traces
+        traces = self._traces
         if command.asks:
             return Outcome(str(traces.view[self._display(command)]))
         self._count(command, 2)
@@ -200,7 +199,7 @@ class Executor:
         self._count(command, 2)
         live = whole(command.arguments[1], 0, 1)
         for display in self._displays(command):
-            self._instrument.traces.freeze(display, not live)
+            self._traces.freeze(display, not live)
             self._instrument.settings.put("DISP", live, display)
         return None
 
@@ -208,22 +207,22 @@ class Executor:
 
     def _start(self, command: Command) -> None:
         self._count(command, 0)
-        self._instrument.sweep.start()
+        self._sweep.start()
 
     def _pause(self, command: Command) -> None:
         self._count(command, 0)
-        self._instrument.sweep.pause()
+        self._sweep.pause()
 
     def _go_on(self, command: Command) -> None:
         self._count(command, 0)
-        self._instrument.sweep.go_on()
+        self._sweep.go_on()
 
     def _nothing(self, command: Command) -> None:
         self._count(command, 0)
 
     def _progress(self, command: Command) -> Outcome:
         self._asks(command)
-        place, hz = self._instrument.sweep.present
+        place, hz = self._sweep.present
         shown = f"{hz:.7g}" if self._instrument.choices.progress_is_frequency else str(place)
         return Outcome(shown)
 
@@ -234,34 +233,34 @@ class Executor:
         self._asks(command)
         self._count(command, 1)
         self._display(command)
-        return Outcome(str(self._instrument.sweep.averaged))
+        return Outcome(str(self._sweep.averaged))
 
     def _length(self, command: Command) -> Outcome:
         self._asks(command)
-        return Outcome(str(self._instrument.traces.length(self._display(command))))
+        return Outcome(str(self._traces.length(self._display(command))))
 
     def _row(self, command: Command) -> tuple[int, int]:
         self._count(command, 2)
         display = self._display(command)
-        row = whole(command.arguments[1], 0, self._instrument.traces.length(display) - 1)
+        row = whole(command.arguments[1], 0, self._traces.length(display) - 1)
         return display, row
 
     def _bin(self, command: Command) -> Outcome:
         self._asks(command)
         display, row = self._row(command)
-        return Outcome(self._real(float(self._instrument.traces.axis(display)[row])))
+        return Outcome(self._real(float(self._traces.axis(display)[row])))
 
     def _text(self, command: Command) -> Outcome:
         self._asks(command)
         instrument = self._instrument
         if len(command.arguments) == 2:
             display, row = self._row(command)
-            found = np.atleast_1d(instrument.traces.values(display)[row])
+            found = np.atleast_1d(self._traces.values(display)[row])
             # The order of the marker position bar: X, then Y.
             return Outcome(",".join(self._real(float(value)) for value in found[::-1]))
         self._count(command, 1)
         instrument.begin_read_out()
-        found = instrument.traces.values(self._display(command))
+        found = self._traces.values(self._display(command))
         if found.ndim == 2:
             found = found[:, ::-1].ravel()
         return Outcome(text_transfer=",".join(self._real(float(value)) for value in found))
@@ -271,16 +270,16 @@ class Executor:
         instrument = self._instrument
         if len(command.arguments) == 2:
             display, row = self._row(command)
-            found = np.atleast_1d(instrument.traces.values(display)[row])
+            found = np.atleast_1d(self._traces.values(display)[row])
         else:
             self._count(command, 1)
             instrument.begin_read_out()
-            found = instrument.traces.values(self._display(command))
+            found = self._traces.values(self._display(command))
         return Outcome(binary=found.astype("<f4").tobytes())
 
     def _unit(self, command: Command) -> Outcome:
         self._asks(command)
-        return Outcome(self._instrument.traces.unit(self._display(command)))
+        return Outcome(self._traces.unit(self._display(command)))
 
     def _real(self, value: float) -> str:
         return f"{np.float32(value):.{self._instrument.choices.digits - 1}e}"

@@ -68,9 +68,9 @@ class SR785:
         self.status = Status()
         self.settings = Settings(self.choices)
         self.source = Source()
-        self.traces = Traces(self)
         self.sweep = Sweep(self)
-        self._executor = Executor(self)
+        self.traces = Traces(self, self.sweep)
+        self._executor = Executor(self, self.sweep, self.traces)
         self._ports = (Port(b"\n", b"\n"), Port(b"\r\n", b"\r"))
         self._order: deque[int] = deque()
         """Interfaces in the order in which their commands came."""

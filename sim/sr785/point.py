@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +15,7 @@ from numpy.typing import NDArray
 from daq.driving.variance import normalised_variance
 from sim.instrument.plant import Dwell
 from sim.sr785.choices import NOISE_REFERENCE_CYCLES
-
-if TYPE_CHECKING:
-    from sim.sr785.instrument import SR785
+from sim.sr785.parts import InstrumentCore
 
 __all__ = ["Point", "dwell_cycles", "take_point"]
 
@@ -49,7 +46,7 @@ class Point:
     ranging_s: float
 
 
-def dwell_cycles(instrument: SR785, frequency_hz: float) -> tuple[int, int]:
+def dwell_cycles(instrument: InstrumentCore, frequency_hz: float) -> tuple[int, int]:
     """Cycles that a point settles and integrates: time or cycles, whichever is longer.
 
     The integration is rounded up to whole cycles.
@@ -63,7 +60,7 @@ def dwell_cycles(instrument: SR785, frequency_hz: float) -> tuple[int, int]:
     )
 
 
-def take_point(instrument: SR785, frequency_hz: float, key: tuple[int, int]) -> Point:
+def take_point(instrument: InstrumentCore, frequency_hz: float, key: tuple[int, int]) -> Point:
     """Measure at one frequency.
 
     Parameters
@@ -105,7 +102,9 @@ def take_point(instrument: SR785, frequency_hz: float, key: tuple[int, int]) -> 
     )
 
 
-def _levelled(instrument: SR785, frequency_hz: float, settle: int, integrate: int) -> Dwell:
+def _levelled(
+    instrument: InstrumentCore, frequency_hz: float, settle: int, integrate: int
+) -> Dwell:
     """Drive the device, with the level that auto level finds if that is on."""
     get = instrument.settings.get
 
@@ -128,7 +127,7 @@ def _levelled(instrument: SR785, frequency_hz: float, settle: int, integrate: in
 
 
 def _at_inputs(
-    instrument: SR785, dwell: Dwell, frequency_hz: float
+    instrument: InstrumentCore, dwell: Dwell, frequency_hz: float
 ) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
     """Cycles (2, n) and peaks (2,) behind coupling and weighting of each input."""
     cycles = np.array([dwell.source_cycles, dwell.output_cycles[:, 1]], dtype=complex)
@@ -144,7 +143,7 @@ def _at_inputs(
     return cycles, peaks
 
 
-def _range(instrument: SR785, channel: int, peak_v: float) -> tuple[int, int, bool]:
+def _range(instrument: InstrumentCore, channel: int, peak_v: float) -> tuple[int, int, bool]:
     """Range before and after, in dBVpk, and whether the input was forced to the highest."""
     settings, n = instrument.settings, channel + 1
     before = after = int(settings.get(f"I{n}RG"))
@@ -161,7 +160,7 @@ def _range(instrument: SR785, channel: int, peak_v: float) -> tuple[int, int, bo
 
 
 def _noise(
-    instrument: SR785, shape: tuple[int, ...], key: tuple[int, int]
+    instrument: InstrumentCore, shape: tuple[int, ...], key: tuple[int, int]
 ) -> NDArray[np.complex128]:
     choices = instrument.choices
     parts = np.random.default_rng((choices.seed, *key)).standard_normal((2, *shape))

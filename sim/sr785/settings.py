@@ -9,6 +9,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from sim.sr785.choices import Choices
 from sim.sr785.language import ExecutionFault, number, whole
 
@@ -233,6 +236,12 @@ class Settings:
         """A value as a number; of a level V peak."""
         value = self._values[name, display]
         return value[0] if isinstance(value, tuple) else value  # type: ignore[return-value]
+
+    def axis_hz(self) -> NDArray[np.float64]:
+        """Frequency of each bin of a sweep, ascending, shape (SNPS,)."""
+        low, high = sorted((self.get("SSTR"), self.get("SSTP")))
+        spaced = np.geomspace if self.get("SSTY") else np.linspace
+        return spaced(low, high, int(self.get("SNPS")))
 
     def shown(self, name: str, display: int = 0) -> str:
         """A value as it is answered."""

@@ -8,21 +8,18 @@ from __future__ import annotations
 
 import math
 from enum import Enum
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from daq.errors import AnalysisError
 from sim.instrument.agenda import HOLD, Process, Steps
+from sim.sr785.parts import InstrumentCore
 from sim.sr785.point import Point, take_point
 from sim.sr785.settings import SWEPT
 from sim.sr785.status import Display, Error, Input, Instrument
 
-if TYPE_CHECKING:
-    from sim.sr785.instrument import SR785
-
-__all__ = ["State", "Sweep", "axis_of"]
+__all__ = ["State", "Sweep"]
 
 _RECORD_S = 0.1
 """[S] One record in a group that does not sweep."""
@@ -37,18 +34,10 @@ class State(Enum):
     DONE = "finished"
 
 
-def axis_of(instrument: SR785) -> NDArray[np.float64]:
-    """Frequency of each bin, ascending, shape (SNPS,)."""
-    get = instrument.settings.get
-    low, high = sorted((get("SSTR"), get("SSTP")))
-    spaced = np.geomspace if get("SSTY") else np.linspace
-    return spaced(low, high, int(get("SNPS")))
-
-
 class Sweep:
     """The measurement of one instrument, in whatever group."""
 
-    def __init__(self, instrument: SR785) -> None:
+    def __init__(self, instrument: InstrumentCore) -> None:
         self._instrument = instrument
         self._process: Process | None = None
         self.state = State.IDLE
@@ -84,7 +73,7 @@ class Sweep:
             return
         if instrument.choices.start_clears or len(self.axis_hz) != instrument.settings.get("SNPS"):
             self.forget_data()
-        self.axis_hz = axis_of(instrument)
+        self.axis_hz = instrument.settings.axis_hz()
         instrument.refresh_source()
         self._process = instrument.agenda.start(self._points(), self._finished)
 

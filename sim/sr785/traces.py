@@ -7,17 +7,15 @@ nothing.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.sr785.language import ExecutionFault
+from sim.sr785.parts import InstrumentCore
 from sim.sr785.point import Point
 from sim.sr785.settings import FFT, GROUPS, MEASUREMENTS, SWEPT
-
-if TYPE_CHECKING:
-    from sim.sr785.instrument import SR785
+from sim.sr785.sweep import Sweep
 
 __all__ = ["NICHOLS", "NYQUIST", "Traces"]
 
@@ -31,8 +29,8 @@ _DOUBLE_BYTE = {"root": "\xfb", "square": "\xfd"}
 class Traces:
     """Both displays."""
 
-    def __init__(self, instrument: SR785) -> None:
-        self._instrument = instrument
+    def __init__(self, instrument: InstrumentCore, sweep: Sweep) -> None:
+        self._instrument, self._sweep = instrument, sweep
         self.group = [0, 0]
         self.measurement = [0, 0]
         self.view = [LOG, LOG]
@@ -77,7 +75,7 @@ class Traces:
         if choices.change_resets_view:
             self.view[display] = LOG
         if not choices.data_survive_change:
-            self._lost_until[display] = self._instrument.sweep.points_begun
+            self._lost_until[display] = self._sweep.points_begun
 
     def freeze(self, display: int, off_line: bool) -> None:
         """``DISP``: an off-line display keeps what it shows."""
@@ -96,9 +94,7 @@ class Traces:
         """X of every bin, Hz, shape (length,)."""
         get = self._instrument.settings.get
         if self.group_name(display) == SWEPT:
-            from sim.sr785.sweep import axis_of
-
-            found = axis_of(self._instrument)
+            found = self._instrument.settings.axis_hz()
             return np.append(found, found[-1])
         start_hz = get("FSTR", display)
         return np.linspace(start_hz, start_hz + get("FSPN", display), self.length(display))
@@ -118,7 +114,7 @@ class Traces:
         if display == 1 and not self._same_sweep():
             return shown
         name = self._numbers[SWEPT][self.measurement[display]]
-        sweep = self._instrument.sweep
+        sweep = self._sweep
         rows = sorted({*sweep.bins, *sweep.interpolated})
         points = [(row, *self._point(row)) for row in rows]
         kept = [
@@ -136,7 +132,7 @@ class Traces:
         return all(shown(name, 0) == shown(name, 1) for name in ("SSTR", "SSTP", "SNPS", "SSTY"))
 
     def _point(self, row: int) -> tuple[int, Point]:
-        sweep = self._instrument.sweep
+        sweep = self._sweep
         found = sweep.bins.get(row)
         if found is not None:
             return found
@@ -189,9 +185,9 @@ class Traces:
     def _spectrum(self, display: int) -> NDArray[np.float64]:
         """[S] In other groups: noise, and the fixed sine where it stands."""
         instrument, count = self._instrument, self.length(display)
-        if instrument.sweep.started == 0:
+        if self._sweep.started == 0:
             return np.full(count, instrument.choices.unmeasured)
-        generator = np.random.default_rng((instrument.choices.seed, instrument.sweep.started))
+        generator = np.random.default_rng((instrument.choices.seed, self._sweep.started))
         values = np.abs(generator.standard_normal(count)) * instrument.choices.noise_v
         if instrument.driven_v and self.group_name(display) == FFT:
             axis = self.axis(display)

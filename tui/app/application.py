@@ -41,7 +41,7 @@ from tui.app.step_screen import STEPS, StepScreen
 from tui.app.style import STYLE
 from tui.app.system_commands import system_commands
 from tui.app.terminal_app import TerminalApp
-from tui.entry import INTERRUPTED
+from tui.exit_codes import INTERRUPTED
 
 if TYPE_CHECKING:
     from daq.store_records import Measurement

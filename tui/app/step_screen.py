@@ -25,7 +25,7 @@ from tui.app.dialogs.dialogs import CommandDialog
 from tui.app.widgets.plain import Caption, Field, Words
 
 if TYPE_CHECKING:
-    from tui.app.application import BenchApp
+    from tui.app.app_state import AppState
     from tui.app.state.desk import Desk
 
 __all__ = ["STEPS", "StepScreen"]
@@ -72,11 +72,9 @@ class StepScreen(Screen[None]):
     ]
 
     @property
-    def bench(self) -> BenchApp:
-        """The application."""
-        from tui.app.application import BenchApp
-
-        return cast(BenchApp, self.app)
+    def bench(self) -> AppState:
+        """The application, as far as a step may ask it."""
+        return cast("AppState", self.app)
 
     @property
     def desk(self) -> Desk:

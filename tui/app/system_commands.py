@@ -15,12 +15,12 @@ from textual.screen import Screen
 from tui.app.step_screen import STEPS
 
 if TYPE_CHECKING:
-    from tui.app.application import BenchApp
+    from tui.app.app_state import AppState
 
 __all__ = ["system_commands"]
 
 
-def system_commands(app: BenchApp, screen: Screen) -> Iterable[SystemCommand]:
+def system_commands(app: AppState, screen: Screen) -> Iterable[SystemCommand]:
     """Entries of our own, for the screen on top."""
     yield SystemCommand("Source: stop", "End whatever drives", app.action_stop_source)
     yield SystemCommand("Copy: what is shown", "To the clipboard", app.action_copy)

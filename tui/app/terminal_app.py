@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from textual.app import App
 
 from daq.untrusted.visible_text import visible, visible_line
-from tui.entry import INTERRUPTED
+from tui.exit_codes import INTERRUPTED
 from tui.signals import ending_on_signals
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from daq.errors import InputError
-from tui.entry import INTERRUPTED
+from tui.exit_codes import INTERRUPTED
 from tui.options import Json, Tolerance, Whole, prepare_directory, tolerance_shares
 from tui.places import cache_folder
 from tui.text.output import Console, Injected

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from daq.errors import InputError, LimitError, MeasurementError
-from tui.entry import INTERRUPTED
+from tui.exit_codes import INTERRUPTED
 from tui.options import Json, Real, UnitName
 from tui.text.output import Console, Injected, readers_may_leave
 from tui.unit_under_test import read_unit

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from daq.errors import InputError, LashbenchError, MeasurementError
-from tui.entry import INTERRUPTED
+from tui.exit_codes import INTERRUPTED
 from tui.judging import limits_to_judge_by
 from tui.options import JudgeBy
 from tui.places import history_path

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +26,9 @@ from sim.analyser35670a.measuring.coordinates import (
     unit_of,
 )
 from sim.analyser35670a.measuring.traces import check_feed, initial_feed, initial_sine_feed
+from sim.analyser35670a.parts import InstrumentCore
 from sim.analyser35670a.settings import Mode, Scope, Setting
 from sim.analyser35670a.units import FREQUENCY, PERCENT, Quantity
-
-if TYPE_CHECKING:
-    from sim.analyser35670a.instrument import Analyser35670A
 
 __all__ = ["COMMANDS", "SETTINGS"]
 
@@ -42,7 +40,7 @@ _PAIRED = ("NYQ", "POL")
 _VOLTS = Quoted(("V", "V2", "V/RTHZ", "V2/HZ", "V2S/HZ"))
 
 
-def _number_format(instrument: Analyser35670A) -> tuple[str, int]:
+def _number_format(instrument: InstrumentCore) -> tuple[str, int]:
     kind, size = str(instrument.settings.get("FORM")).split(",")
     return kind, int(size)
 
@@ -77,12 +75,12 @@ class TransferFormat:
 # Traces
 
 
-def _form(instrument: Analyser35670A, trace: int) -> tuple[str, bool]:
+def _form(instrument: InstrumentCore, trace: int) -> tuple[str, bool]:
     form = instrument.traces.effective(trace, "CALC#:FORM")
     return form, instrument.traces.effective(trace, "CALC#:UNIT:ANGL") == "RAD"
 
 
-def _shown(instrument: Analyser35670A, trace: int) -> NDArray[np.float64]:
+def _shown(instrument: InstrumentCore, trace: int) -> NDArray[np.float64]:
     picture = instrument.traces.picture(trace)
     if (volts := _volts(instrument, trace)) and instrument.settings.mode is not Mode.SINE:
         spectrum = instrument.spectrum
@@ -105,7 +103,7 @@ def _shown(instrument: Analyser35670A, trace: int) -> NDArray[np.float64]:
     return values if form in ("PHAS", "UPH", "GDEL") else values * factor
 
 
-def _head(instrument: Analyser35670A, numbers: Numbers) -> str:
+def _head(instrument: InstrumentCore, numbers: Numbers) -> str:
     feed = str(instrument.settings.get("CALC#:FEED", numbers[0]))
     if re.fullmatch(r"D\d", feed):
         register = instrument.traces.registers.get(int(feed[1]))
@@ -113,7 +111,7 @@ def _head(instrument: Analyser35670A, numbers: Numbers) -> str:
     return feed.partition(" ")[0]
 
 
-def _volts(instrument: Analyser35670A, trace: int) -> str:
+def _volts(instrument: InstrumentCore, trace: int) -> str:
     """The unit of a spectrum in a trace; empty for other data."""
     head = _head(instrument, (trace,))
     if head not in VOLT_FEEDS:
@@ -121,7 +119,7 @@ def _volts(instrument: Analyser35670A, trace: int) -> str:
     return instrument.traces.effective(trace, "CALC#:UNIT:VOLT") or VOLT_FEEDS[head]
 
 
-def _keep_volts(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _keep_volts(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     if not _volts(instrument, numbers[0]):
         raise ScpiError(-221, "Measurement data has no such unit.")
     chosen = _VOLTS.read(arguments, "")
@@ -133,42 +131,42 @@ def _keep_volts(instrument: Analyser35670A, numbers: Numbers, arguments: Argumen
     return None
 
 
-def _show_volts(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _show_volts(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     no_arguments(arguments)
     head = _head(instrument, numbers)
     kept = str(instrument.settings.get("CALC#:UNIT:VOLT", *numbers))
     return f'"{kept or VOLT_FEEDS[head]}"' if head in VOLT_FEEDS else '""'
 
 
-def _has_amplitude(instrument: Analyser35670A, numbers: Numbers) -> bool:
+def _has_amplitude(instrument: InstrumentCore, numbers: Numbers) -> bool:
     head = _head(instrument, numbers)
     none = ("XFR:POW:COH", "XFR:POW:RAT", "XTIM:VOLT:CDF", "XTIM:VOLT:HIST", "XTIM:VOLT:PDF")
     return head not in (*none, "XFR:POW:VAR", "XRPM:PROF")
 
 
-def _data(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _data(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     no_arguments(arguments)
     instrument.begin_read_out()
     return encode(_shown(instrument, numbers[0]), _number_format(instrument))
 
 
-def _points(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _points(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     no_arguments(arguments)
     return show_integer(len(instrument.traces.picture(numbers[0]).x))
 
 
-def _x_data(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _x_data(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     no_arguments(arguments)
     instrument.begin_read_out()
     picture = instrument.traces.picture(numbers[0])
     return encode(_axis(instrument, picture), _number_format(instrument))
 
 
-def _axis(instrument: Analyser35670A, picture: Picture) -> NDArray[np.float64]:
+def _axis(instrument: InstrumentCore, picture: Picture) -> NDArray[np.float64]:
     return instrument.spectrum.shown_axis(picture.x) if picture.x_unit == "HZ" else picture.x
 
 
-def _bottom(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _bottom(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     """``DISP:TRAC:Y:BOTT?``, mostly asked for its unit."""
     trace = numbers[0]
     if arguments and arguments[0].text.upper() == "UNIT":
@@ -180,7 +178,7 @@ def _bottom(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) 
     return show_real(float(_shown(instrument, trace).min()))
 
 
-def _keep_bottom(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _keep_bottom(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     Number(-9.9e37, 9.9e37).read_free(arguments, Quantity(0.0))
     return None
 
@@ -198,7 +196,7 @@ def _name(argument: Argument) -> tuple[str, int]:
     return ("TRAC" if kind == "TRACE" else kind), number
 
 
-def _copy(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _copy(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     """``TRAC D1,TRAC1``, ``TRAC D1,D2`` or ``TRAC D1,<numbers or block>``."""
     if len(arguments) < 2:
         raise ScpiError(-109)
@@ -222,7 +220,7 @@ def _copy(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) ->
     return None
 
 
-def _numbers_sent(instrument: Analyser35670A, arguments: Arguments) -> NDArray[np.float64]:
+def _numbers_sent(instrument: InstrumentCore, arguments: Arguments) -> NDArray[np.float64]:
     if arguments[0].kind == "block":
         kind, size = _number_format(instrument)
         width = size // 8
@@ -237,7 +235,7 @@ def _numbers_sent(instrument: Analyser35670A, arguments: Arguments) -> NDArray[n
     return np.array([argument.number for argument in arguments])
 
 
-def _read_register(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _read_register(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     kind, number = _only_name(arguments)
     if kind == "W":
         raise ScpiError(-230)
@@ -255,17 +253,17 @@ def _only_name(arguments: Arguments) -> tuple[str, int]:
     return _name(arguments[0])
 
 
-def _register_x(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _register_x(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     picture = _picture_named(instrument, arguments)
     instrument.begin_read_out()
     return encode(_axis(instrument, picture), _number_format(instrument))
 
 
-def _register_x_unit(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _register_x_unit(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     return Text().show(_picture_named(instrument, arguments).x_unit)
 
 
-def _picture_named(instrument: Analyser35670A, arguments: Arguments) -> Any:
+def _picture_named(instrument: InstrumentCore, arguments: Arguments) -> Any:
     kind, number = _only_name(arguments)
     if kind == "TRAC":
         return instrument.traces.picture(number)
@@ -277,12 +275,12 @@ def _picture_named(instrument: Analyser35670A, arguments: Arguments) -> Any:
 # Markers
 
 
-def _marker_index(instrument: Analyser35670A, trace: int) -> int:
+def _marker_index(instrument: InstrumentCore, trace: int) -> int:
     x = instrument.traces.picture(trace).x
     return int(np.abs(x - instrument.settings.get("CALC#:MARK:X", trace).value).argmin())
 
 
-def _marker_y(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _marker_y(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     no_arguments(arguments)
     values = _shown(instrument, numbers[0])
     index = _marker_index(instrument, numbers[0])
@@ -292,7 +290,7 @@ def _marker_y(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments
 
 
 def _marker_to(pick: Callable[[NDArray[np.float64], int], int]) -> Any:
-    def act(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+    def act(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
         no_arguments(arguments)
         picture = instrument.traces.picture(numbers[0])
         values = _shown(instrument, numbers[0])
@@ -323,11 +321,11 @@ def _peaks(values: NDArray[np.float64]) -> NDArray[np.intp]:
     return np.flatnonzero(inner) + 1
 
 
-def _marker_point(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _marker_point(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     return show_integer(_marker_index(instrument, numbers[0]))
 
 
-def _result(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _result(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     """[S] No function is calculated, which 9.91E37 says; and no weighting was applied."""
     if arguments and arguments[0].text.upper() == "UNIT":
         return instrument.shown_unit("")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sim.analyser35670a.commands import calculate as commands_calculate
 from sim.analyser35670a.commands import kept as commands_kept
@@ -23,11 +23,9 @@ from sim.analyser35670a.commands.tokens import read_arguments, split_header
 from sim.analyser35670a.commands.tree import CommandTree, Path, key_of
 from sim.analyser35670a.errors import ScpiError
 from sim.analyser35670a.kinds import Number
+from sim.analyser35670a.parts import InstrumentCore
 from sim.analyser35670a.settings import Setting
 from sim.analyser35670a.units import Quantity
-
-if TYPE_CHECKING:
-    from sim.analyser35670a.instrument import Analyser35670A
 
 __all__ = ["Dispatcher", "all_settings", "is_query"]
 
@@ -36,7 +34,7 @@ Leaf = Command | Setting
 _OPTION_TEXTS = {
     "1D3": (-200, "OPTION 1D3 Curve Fit/Synthesis not installed."),
     "1D4": (-200, "OPTION 1D4 Arbitrary Source not installed."),
-    "1C2": (-200, "Instrument BASIC not installed."),
+    "1C2": (-200, "InstrumentCore BASIC not installed."),
 }
 _FOUR_CHANNELS = (-241, "OPTION AY6 Add 2 Input Channels not installed.")
 _CHANNEL_HEADS = ("INPut#", "[SENSe]:VOLTage#", "[SENSe]:WINDow#")
@@ -88,7 +86,7 @@ def is_query(unit: bytes) -> bool:
 class Dispatcher:
     """Executes units for one instrument."""
 
-    def __init__(self, instrument: Analyser35670A) -> None:
+    def __init__(self, instrument: InstrumentCore) -> None:
         self._instrument = instrument
         self._tree, self._common = _commands()
         self._path: Path[Leaf] = self._tree.root

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sim.analyser35670a.commands.registry import (
     Act,
@@ -34,16 +34,14 @@ from sim.analyser35670a.kinds import (
     show_integer,
     show_real,
 )
+from sim.analyser35670a.parts import InstrumentCore
 from sim.analyser35670a.settings import ALL_MODES, OTHER_MODES, Scope, Setting
 from sim.analyser35670a.units import NONE, Quantity
-
-if TYPE_CHECKING:
-    from sim.analyser35670a.instrument import Analyser35670A
 
 __all__ = ["COMMANDS", "SETTINGS"]
 
 _NO_CAPTURE = (-200, "Capture cannot be used with Inst Mode SWEPT SINE.")
-_NO_WATERFALL = (-221, "No WATERFALL display with SWEPT SINE Instrument Mode.")
+_NO_WATERFALL = (-221, "No WATERFALL display with SWEPT SINE InstrumentCore Mode.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,13 +70,13 @@ class Series:
 
 
 def _refuse(number: int, detail: str) -> Act:
-    def act(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+    def act(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
         raise ScpiError(number, detail)
 
     return act
 
 
-def _accept(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _accept(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     """Something that leaves no trace here."""
 
 
@@ -89,7 +87,7 @@ _NO_DATA = _refuse(-230, "")
 _NO_TRACE = _refuse(-200, "Limits are undefined.")
 
 
-def _free(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _free(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     no_arguments(arguments)
     return f"{show_integer(1_000_000)},{show_integer(0)}"
 

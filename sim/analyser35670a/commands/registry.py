@@ -9,14 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from sim.analyser35670a.commands.tokens import Argument
 from sim.analyser35670a.errors import ScpiError
+from sim.analyser35670a.parts import InstrumentCore
 from sim.analyser35670a.settings import ALL_MODES, MODE_CONFLICT, Mode
-
-if TYPE_CHECKING:
-    from sim.analyser35670a.instrument import Analyser35670A
 
 __all__ = [
     "Act",
@@ -49,8 +46,8 @@ class Hold:
 
 
 Answer = str | bytes | Later | Hold | None
-Act = Callable[["Analyser35670A", Numbers, Arguments], Answer]
-Ask = Callable[["Analyser35670A", Numbers, Arguments], Answer]
+Act = Callable[[InstrumentCore, Numbers, Arguments], Answer]
+Ask = Callable[[InstrumentCore, Numbers, Arguments], Answer]
 
 
 @dataclass(frozen=True, slots=True)

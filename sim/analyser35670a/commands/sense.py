@@ -6,7 +6,7 @@ A table; what the commands do stands in `frequency`, `inputs` and `sweep`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sim.analyser35670a.commands.registry import Answer, Arguments, Command, Numbers
 from sim.analyser35670a.errors import ScpiError
@@ -25,6 +25,7 @@ from sim.analyser35670a.measuring.frequency import (
     set_span,
 )
 from sim.analyser35670a.measuring.sweep import measured_points
+from sim.analyser35670a.parts import InstrumentCore
 from sim.analyser35670a.settings import OTHER_MODES, SINE_ONLY, Mode, Scope, Setting
 from sim.analyser35670a.units import (
     CYCLES_OR_SECONDS,
@@ -38,28 +39,25 @@ from sim.analyser35670a.units import (
     UnitTable,
 )
 
-if TYPE_CHECKING:
-    from sim.analyser35670a.instrument import Analyser35670A
-
 __all__ = ["COMMANDS", "SETTINGS"]
 
 _LINES = (100.0, 200.0, 400.0, 800.0, 1600.0)
 """Of FFT mode; the guide ends at 800, the data sheet and clients know 1600."""
 _OUT_OF_RANGE = "Out of range: value not changed."
-_NO_WINDOW = (-221, "No WINDOW With SWEPT SINE Instrument Mode.")
+_NO_WINDOW = (-221, "No WINDOW With SWEPT SINE InstrumentCore Mode.")
 _UP_ONLY = (-200, "UP ONLY auto range not available in Swept Sine instrument mode.")
 _FREQUENCY = Number(0.0, 115000.0, FREQUENCY)
 _SPANNING = OTHER_MODES - {Mode.OCTAVE, Mode.CORRELATION} | SINE_ONLY
 _FFT = frozenset({Mode.FFT})
 
 
-def _check_input(instrument: Analyser35670A, numbers: Numbers, on: bool) -> bool:
+def _check_input(instrument: InstrumentCore, numbers: Numbers, on: bool) -> bool:
     if numbers[0] == 1 and not on:
         raise ScpiError(-200, "Channel 1 input cannot be disabled.")
     return on
 
 
-def _inputs_changed(instrument: Analyser35670A, numbers: Numbers) -> None:
+def _inputs_changed(instrument: InstrumentCore, numbers: Numbers) -> None:
     """Fewer channels reach higher, more reach less high: the band must still fit."""
     start, stop = band(instrument)
     highest = highest_hz(instrument)
@@ -69,7 +67,7 @@ def _inputs_changed(instrument: Analyser35670A, numbers: Numbers) -> None:
             instrument.settings.put("FREQ:STAR", Quantity(GRID_HZ, "HZ"))
 
 
-def _check_resolution(instrument: Analyser35670A, numbers: Numbers, asked: Quantity) -> Quantity:
+def _check_resolution(instrument: InstrumentCore, numbers: Numbers, asked: Quantity) -> Quantity:
     if instrument.settings.mode is Mode.SINE:
         logarithmic = instrument.settings.get("SWE:SPAC") == "LOG"
         measured_points(asked, *band(instrument), logarithmic)
@@ -81,7 +79,7 @@ def _check_resolution(instrument: Analyser35670A, numbers: Numbers, asked: Quant
     return Quantity(min(lines for lines in _LINES if lines >= asked.value))
 
 
-def _check_dwell(instrument: Analyser35670A, numbers: Numbers, asked: Quantity) -> Quantity:
+def _check_dwell(instrument: InstrumentCore, numbers: Numbers, asked: Quantity) -> Quantity:
     """Whole cycles, at least one; less counts as one. [S] Rounded to the nearest."""
     if asked.unit == "S":
         if not 250e-6 <= asked.value <= 32768.0:
@@ -92,7 +90,7 @@ def _check_dwell(instrument: Analyser35670A, numbers: Numbers, asked: Quantity) 
     return Quantity(float(max(1, round(asked.value))), asked.unit)
 
 
-def _spacing_changed(instrument: Analyser35670A, numbers: Numbers) -> None:
+def _spacing_changed(instrument: InstrumentCore, numbers: Numbers) -> None:
     """Units that the new spacing lacks give way to points per sweep."""
     for key in ("FREQ:RES", "FREQ:RES:AUTO:MIN"):
         lost = ("HZ",) if instrument.settings.get("SWE:SPAC") == "LOG" else ("PNT/DEC", "PNT/OCT")
@@ -100,47 +98,47 @@ def _spacing_changed(instrument: Analyser35670A, numbers: Numbers) -> None:
             instrument.settings.put(key, Quantity(101.0, "PNT/SWP"))
 
 
-def _range_changed(instrument: Analyser35670A, numbers: Numbers) -> None:
+def _range_changed(instrument: InstrumentCore, numbers: Numbers) -> None:
     instrument.settings.put("VOLT#:RANG:AUTO", False, *numbers)
 
 
-def _manual_changed(instrument: Analyser35670A, numbers: Numbers) -> None:
+def _manual_changed(instrument: InstrumentCore, numbers: Numbers) -> None:
     """In a running continuous manual measurement the new point is measured at once."""
     if instrument.settings.get("SWE:MODE") == "MAN" and instrument.settings.get("INIT:CONT"):
         instrument.measurement.start()
 
 
-def _count_changed(instrument: Analyser35670A, numbers: Numbers) -> None:
+def _count_changed(instrument: InstrumentCore, numbers: Numbers) -> None:
     """More averages than were taken can be added to them; fewer cannot be taken back."""
     if instrument.settings.get("AVER:COUN") < instrument.spectrum.averaged:
         instrument.measurement.spoilt = True
 
 
-def _start_bounds(instrument: Analyser35670A) -> tuple[float, float]:
+def _start_bounds(instrument: InstrumentCore) -> tuple[float, float]:
     lowest = GRID_HZ if instrument.settings.mode is Mode.SINE else 0.0
     return lowest, highest_hz(instrument) - GRID_HZ
 
 
-def _stop_bounds(instrument: Analyser35670A) -> tuple[float, float]:
+def _stop_bounds(instrument: InstrumentCore) -> tuple[float, float]:
     return _start_bounds(instrument)[0] + GRID_HZ, highest_hz(instrument)
 
 
 def _frequency_command(
     pattern: str,
     units: UnitTable,
-    get: Callable[[Analyser35670A], float],
-    put: Callable[[Analyser35670A, Quantity], None],
+    get: Callable[[InstrumentCore], float],
+    put: Callable[[InstrumentCore, Quantity], None],
 ) -> Command:
     """Command and query of a frequency that is derived from start and stop."""
 
-    def act(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+    def act(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
         low, high = _stop_bounds(instrument)
         step = instrument.settings.get("FREQ:STEP").value
         kind = Number(low, high, units, step)
         put(instrument, kind.read_free(arguments, Quantity(get(instrument), "HZ")))
         return None
 
-    def ask(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+    def ask(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
         if arguments and arguments[0].text == "UNIT":
             return "HZ"
         return show_real(get(instrument))
@@ -148,7 +146,7 @@ def _frequency_command(
     return Command(pattern, act, ask, modes=_SPANNING, measured=True)
 
 
-def _full_span(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _full_span(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     instrument.settings.put("FREQ:STAR", Quantity(0.0, "HZ"))
     instrument.settings.put("FREQ:STOP", Quantity(highest_hz(instrument), "HZ"))
     return None

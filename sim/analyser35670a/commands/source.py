@@ -5,11 +5,12 @@ A table; what the source does stands in `source`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sim.analyser35670a.commands.registry import Answer, Arguments, Command, Numbers, no_arguments
 from sim.analyser35670a.errors import ScpiError
 from sim.analyser35670a.kinds import Number, Pick, Switch, Whole
+from sim.analyser35670a.parts import InstrumentCore
 from sim.analyser35670a.settings import OTHER_MODES, SINE_ONLY, Mode, Scope, Setting
 from sim.analyser35670a.source import (
     HIGHEST_VPK,
@@ -31,15 +32,12 @@ from sim.analyser35670a.units import (
     UnitTable,
 )
 
-if TYPE_CHECKING:
-    from sim.analyser35670a.instrument import Analyser35670A
-
 __all__ = ["COMMANDS", "OUTPUT", "SETTINGS"]
 
 OUTPUT = "OUTPut:[STATe]"
 """The one command whose existence in swept sine is a choice; see `Choices.output_in_sine`."""
 
-_NO_TRIGGER = (-221, "No TRIGGER With SWEPT SINE Instrument Mode.")
+_NO_TRIGGER = (-221, "No TRIGGER With SWEPT SINE InstrumentCore Mode.")
 _UNTRIGGERED: dict[str, Any] = {"modes": OTHER_MODES, "refusal": _NO_TRIGGER}
 _SWEPT: dict[str, Any] = {"modes": SINE_ONLY, "measured": True}
 _REFERENCE = Amplitude(LEVEL, 10.0 ** (-69.276 / 20.0), 31.66)
@@ -48,17 +46,17 @@ _TRIGGER_LEVEL = UnitTable(
 )
 
 
-def _level_changed(instrument: Analyser35670A, numbers: Numbers) -> None:
+def _level_changed(instrument: InstrumentCore, numbers: Numbers) -> None:
     fit_offset(instrument)
     _source_changed(instrument, numbers)
     instrument.measurement.check_level()
 
 
-def _source_changed(instrument: Analyser35670A, numbers: Numbers) -> None:
+def _source_changed(instrument: InstrumentCore, numbers: Numbers) -> None:
     instrument.refresh_source()
 
 
-def _trigger(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _trigger(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     """``*TRG``, ``TRIG:IMM`` and the group trigger: nothing here ever waits for one."""
     no_arguments(arguments)
     if instrument.settings.mode is Mode.SINE:
@@ -66,7 +64,7 @@ def _trigger(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments)
     raise ScpiError(-211, "Trigger received when not waiting for trigger.")
 
 
-def _arm(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _arm(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     no_arguments(arguments)
     raise ScpiError(-212, "Arm received when not waiting for arm.")
 

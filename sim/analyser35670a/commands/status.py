@@ -6,7 +6,6 @@ A table; what the bits mean stands in `status`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from sim.analyser35670a.commands.registry import (
     Act,
@@ -20,10 +19,8 @@ from sim.analyser35670a.commands.registry import (
     no_arguments,
 )
 from sim.analyser35670a.kinds import Switch, Text, Whole, show_integer
+from sim.analyser35670a.parts import InstrumentCore
 from sim.analyser35670a.status import ALL_BITS, Register, StatusModel
-
-if TYPE_CHECKING:
-    from sim.analyser35670a.instrument import Analyser35670A
 
 __all__ = ["COMMANDS"]
 
@@ -31,63 +28,63 @@ __all__ = ["COMMANDS"]
 def _value(attribute: str, high: int) -> tuple[Act, Ask]:
     """Command and query of a byte of the status model."""
 
-    def act(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+    def act(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
         kept = getattr(instrument.status, attribute)
         setattr(instrument.status, attribute, Whole(0, high).read(arguments, kept))
         return None
 
-    def ask(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+    def ask(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
         no_arguments(arguments)
         return show_integer(getattr(instrument.status, attribute))
 
     return act, ask
 
 
-def _query(read: Callable[[Analyser35670A], str]) -> Ask:
-    def ask(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _query(read: Callable[[InstrumentCore], str]) -> Ask:
+    def ask(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
         no_arguments(arguments)
         return read(instrument)
 
     return ask
 
 
-def _do(action: Callable[[Analyser35670A], Answer]) -> Act:
-    def act(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _do(action: Callable[[InstrumentCore], Answer]) -> Act:
+    def act(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
         no_arguments(arguments)
         return action(instrument)
 
     return act
 
 
-def _complete_later(instrument: Analyser35670A) -> Answer:
+def _complete_later(instrument: InstrumentCore) -> Answer:
     """``*OPC?``: answered when nothing is pending; the wait can be cancelled."""
     return Later(instrument.operations.query())
 
 
-def _wait(instrument: Analyser35670A) -> Answer:
+def _wait(instrument: InstrumentCore) -> Answer:
     return Hold(lambda: not instrument.operations.pending)
 
 
-def _calibrate(instrument: Analyser35670A) -> Answer:
+def _calibrate(instrument: InstrumentCore) -> Answer:
     return Later(instrument.calibration.run_and_report())
 
 
-def _self_test(instrument: Analyser35670A) -> Answer:
+def _self_test(instrument: InstrumentCore) -> Answer:
     return Later(instrument.after_a_while(instrument.choices.self_test_s, "+0"))
 
 
-def _power_on_clear(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _power_on_clear(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     instrument.status.power_on_clear = Switch().read(arguments, True)
     return None
 
 
-def _pass_control(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _pass_control(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     """``*PCB``: taken, and never used."""
     Whole(0, 30).read(arguments[:1], 0)
     return None
 
 
-def _options(instrument: Analyser35670A) -> str:
+def _options(instrument: InstrumentCore) -> str:
     return Text().show(instrument.options)
 
 
@@ -96,7 +93,7 @@ def _register(
 ) -> list[Command]:
     """The commands of one register set."""
 
-    def condition(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+    def condition(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
         no_arguments(arguments)
         register = get(instrument.status)
         value = register.condition
@@ -105,7 +102,7 @@ def _register(
         return show_integer(value)
 
     def field(attribute: str) -> tuple[Act, Ask]:
-        def act(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+        def act(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
             register = get(instrument.status)
             value = Whole(0, ALL_BITS).read(arguments, getattr(register, attribute))
             setattr(register, attribute, value)
@@ -127,12 +124,12 @@ def _register(
     return commands
 
 
-def _pulse_user(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _pulse_user(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     instrument.status.user.pulse(Whole(0, ALL_BITS).read(arguments, 0))
     return None
 
 
-def clear_status(instrument: Analyser35670A) -> None:
+def clear_status(instrument: InstrumentCore) -> None:
     """``*CLS``: event registers, error queue, and the wait of `*OPC`."""
     instrument.status.clear()
     instrument.errors.clear()

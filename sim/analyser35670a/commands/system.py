@@ -5,8 +5,6 @@ A table; what a measurement does stands in `measurement`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from sim.analyser35670a.commands.registry import (
     Answer,
     Arguments,
@@ -17,10 +15,8 @@ from sim.analyser35670a.commands.registry import (
 )
 from sim.analyser35670a.errors import ScpiError
 from sim.analyser35670a.kinds import Pick, Switch, Text, Whole, one_argument, show_integer
+from sim.analyser35670a.parts import InstrumentCore
 from sim.analyser35670a.settings import Mode, Scope, Setting
-
-if TYPE_CHECKING:
-    from sim.analyser35670a.instrument import Analyser35670A
 
 __all__ = ["COMMANDS", "SETTINGS"]
 
@@ -33,7 +29,7 @@ _NEEDS = {
 }
 
 
-def _enter(instrument: Analyser35670A, mode: Mode) -> None:
+def _enter(instrument: InstrumentCore, mode: Mode) -> None:
     option, text = _NEEDS.get(mode, ("", ""))
     if option and option not in instrument.installed:
         raise ScpiError(-200, text)
@@ -41,28 +37,28 @@ def _enter(instrument: Analyser35670A, mode: Mode) -> None:
         instrument.enter_mode(mode)
 
 
-def _select(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _select(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     _enter(instrument, Mode(_MODE_WORDS.read(arguments, None)))
     return None
 
 
-def _selected(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _selected(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     no_arguments(arguments)
     return instrument.settings.mode.value
 
 
-def _select_number(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _select_number(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     present = _MODES.index(instrument.settings.mode)
     _enter(instrument, _MODES[Whole(0, 5).read(arguments, present)])
     return None
 
 
-def _selected_number(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _selected_number(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     no_arguments(arguments)
     return show_integer(_MODES.index(instrument.settings.mode))
 
 
-def _initiate(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _initiate(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     """Start; ignored while continuous, and [S] while a measurement runs."""
     no_arguments(arguments)
     if not instrument.settings.get("INIT:CONT") and not instrument.measurement.running:
@@ -70,7 +66,7 @@ def _initiate(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments
     return None
 
 
-def _abort(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _abort(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     no_arguments(arguments)
     instrument.measurement.stop()
     if instrument.settings.get("INIT:CONT"):
@@ -78,7 +74,7 @@ def _abort(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -
     return None
 
 
-def _continuous(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _continuous(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     """OFF pauses; ON goes on, or is refused."""
     on = Switch().read(arguments, False)
     if on:
@@ -89,12 +85,12 @@ def _continuous(instrument: Analyser35670A, numbers: Numbers, arguments: Argumen
     return None
 
 
-def _is_continuous(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _is_continuous(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     no_arguments(arguments)
     return show_integer(int(instrument.settings.get("INIT:CONT")))
 
 
-def _calibration(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _calibration(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     word = one_argument(arguments)
     if word.kind == "word" and word.text == "ONCE":
         instrument.calibration.run()
@@ -104,17 +100,17 @@ def _calibration(instrument: Analyser35670A, numbers: Numbers, arguments: Argume
     return None
 
 
-def _calibrates(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _calibrates(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     no_arguments(arguments)
     return show_integer(int(instrument.settings.get("CAL:AUTO")))
 
 
-def _error(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _error(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     no_arguments(arguments)
     return instrument.errors.pop()
 
 
-def _preset(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _preset(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     no_arguments(arguments)
     instrument.errors.clear()
     instrument.status.clear()
@@ -122,7 +118,7 @@ def _preset(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) 
     return None
 
 
-def _restore(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _restore(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     block = one_argument(arguments)
     if block.kind != "block":
         raise ScpiError(-161)
@@ -130,31 +126,31 @@ def _restore(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments)
     return None
 
 
-def _state(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _state(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     no_arguments(arguments)
     data = instrument.settings.dump()
     length = str(len(data))
     return f"#{len(length)}{length}".encode("ascii") + data
 
 
-def _power(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _power(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     if not Switch().read(arguments, True):
         instrument.switch_off()
     return None
 
 
-def _show_message(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _show_message(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     instrument.message = Text().read(arguments, "")
     return None
 
 
-def _long_test(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _long_test(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     no_arguments(arguments)
     ready = instrument.after_a_while(instrument.choices.self_test_s, "+0")
     return Hold(lambda: ready() is not None)
 
 
-def _nothing(instrument: Analyser35670A, numbers: Numbers, arguments: Arguments) -> Answer:
+def _nothing(instrument: InstrumentCore, numbers: Numbers, arguments: Arguments) -> Answer:
     no_arguments(arguments)
     return None
 

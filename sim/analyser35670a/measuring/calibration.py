@@ -7,13 +7,10 @@ It changes no reading.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
+from sim.analyser35670a.parts import InstrumentCore
 from sim.analyser35670a.status import Device, Operation, Questionable
 from sim.instrument.agenda import Entry, Steps
-
-if TYPE_CHECKING:
-    from sim.analyser35670a.instrument import Analyser35670A
 
 __all__ = ["Calibration"]
 
@@ -21,7 +18,7 @@ __all__ = ["Calibration"]
 class Calibration:
     """The calibration of one instrument."""
 
-    def __init__(self, instrument: Analyser35670A) -> None:
+    def __init__(self, instrument: InstrumentCore) -> None:
         self._instrument = instrument
         self._ends_s = 0.0
         self._next: Entry | None = None

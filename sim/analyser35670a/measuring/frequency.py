@@ -7,14 +7,11 @@ span up) and what follows when one of the four is set. It plans no points.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from sim.analyser35670a.errors import ScpiError
+from sim.analyser35670a.parts import InstrumentCore
 from sim.analyser35670a.settings import Mode
 from sim.analyser35670a.units import Quantity
-
-if TYPE_CHECKING:
-    from sim.analyser35670a.instrument import Analyser35670A
 
 __all__ = [
     "GRID_HZ",
@@ -42,7 +39,7 @@ def _up(hz: float) -> float:
     return math.ceil(hz / GRID_HZ - _SLACK) * GRID_HZ
 
 
-def highest_hz(instrument: Analyser35670A) -> float:
+def highest_hz(instrument: InstrumentCore) -> float:
     """Upper end of the band: half with four channels, double with one in FFT mode."""
     if instrument.settings.get("INP#", 4):
         return 25600.0
@@ -50,17 +47,17 @@ def highest_hz(instrument: Analyser35670A) -> float:
     return 102400.0 if single else 51200.0
 
 
-def _lowest_hz(instrument: Analyser35670A) -> float:
+def _lowest_hz(instrument: InstrumentCore) -> float:
     return GRID_HZ if instrument.settings.mode is Mode.SINE else 0.0
 
 
-def band(instrument: Analyser35670A) -> tuple[float, float]:
+def band(instrument: InstrumentCore) -> tuple[float, float]:
     """Start and stop of the present mode, Hz."""
     settings = instrument.settings
     return settings.get("FREQ:STAR").value, settings.get("FREQ:STOP").value
 
 
-def _put(instrument: Analyser35670A, start_hz: float, stop_hz: float) -> None:
+def _put(instrument: InstrumentCore, start_hz: float, stop_hz: float) -> None:
     lowest, highest = _lowest_hz(instrument), highest_hz(instrument)
     if not (lowest <= start_hz and stop_hz <= highest and stop_hz - start_hz >= GRID_HZ / 2):
         raise ScpiError(-222, _OUT_OF_RANGE)
@@ -68,7 +65,7 @@ def _put(instrument: Analyser35670A, start_hz: float, stop_hz: float) -> None:
     instrument.settings.put("FREQ:STOP", Quantity(stop_hz, "HZ"))
 
 
-def check_start(instrument: Analyser35670A, _numbers: tuple[int, ...], asked: Quantity) -> Quantity:
+def check_start(instrument: InstrumentCore, _numbers: tuple[int, ...], asked: Quantity) -> Quantity:
     """Round down. [S] The stop stays where it can; otherwise the span goes along."""
     start, stop = band(instrument)
     new = _down(asked.value)
@@ -80,7 +77,7 @@ def check_start(instrument: Analyser35670A, _numbers: tuple[int, ...], asked: Qu
     return Quantity(new, "HZ")
 
 
-def check_stop(instrument: Analyser35670A, _numbers: tuple[int, ...], asked: Quantity) -> Quantity:
+def check_stop(instrument: InstrumentCore, _numbers: tuple[int, ...], asked: Quantity) -> Quantity:
     """Round up; the start is held and becomes the anchor."""
     start, stop = band(instrument)
     new = _up(asked.value)
@@ -92,19 +89,19 @@ def check_stop(instrument: Analyser35670A, _numbers: tuple[int, ...], asked: Qua
     return Quantity(new, "HZ")
 
 
-def get_span(instrument: Analyser35670A) -> float:
+def get_span(instrument: InstrumentCore) -> float:
     """Stop minus start, Hz."""
     start, stop = band(instrument)
     return stop - start
 
 
-def get_centre(instrument: Analyser35670A) -> float:
+def get_centre(instrument: InstrumentCore) -> float:
     """Middle of the band, on the grid, Hz."""
     start, stop = band(instrument)
     return _down((start + stop) / 2.0)
 
 
-def set_span(instrument: Analyser35670A, asked: Quantity) -> None:
+def set_span(instrument: InstrumentCore, asked: Quantity) -> None:
     """Round up; the anchor (start or centre) is held. Decades and octaves with log spacing only."""
     start, _stop = band(instrument)
     settings = instrument.settings
@@ -127,14 +124,14 @@ def set_span(instrument: Analyser35670A, asked: Quantity) -> None:
     _put(instrument, start, start + span)
 
 
-def _fft_span(instrument: Analyser35670A, span: float) -> float:
+def _fft_span(instrument: InstrumentCore, span: float) -> float:
     """The next wider of the spans that halve from the widest."""
     widest = highest_hz(instrument)
     halvings = max(0, min(19, math.floor(math.log2(widest / span) + _SLACK)))
     return float(widest / 2**halvings)
 
 
-def set_centre(instrument: Analyser35670A, asked: Quantity) -> None:
+def set_centre(instrument: InstrumentCore, asked: Quantity) -> None:
     """Round down; the span stays."""
     span = get_span(instrument)
     centre = _down(asked.value)
@@ -144,7 +141,7 @@ def set_centre(instrument: Analyser35670A, asked: Quantity) -> None:
 
 
 def check_manual(
-    instrument: Analyser35670A, _numbers: tuple[int, ...], asked: Quantity
+    instrument: InstrumentCore, _numbers: tuple[int, ...], asked: Quantity
 ) -> Quantity:
     """A manual point must lie within the band. [S] Rounded to the source's grid."""
     start, stop = band(instrument)

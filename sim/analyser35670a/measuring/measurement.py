@@ -8,19 +8,16 @@ measured is `sweep`'s.
 from __future__ import annotations
 
 from enum import Enum
-from typing import TYPE_CHECKING
 
 from daq.errors import AnalysisError
 from sim.analyser35670a.errors import ScpiError
 from sim.analyser35670a.measuring.point import Point, take_point
 from sim.analyser35670a.measuring.sweep import Sweep, plan_sweep
+from sim.analyser35670a.parts import InstrumentCore
 from sim.analyser35670a.settings import Mode
 from sim.analyser35670a.status import Device, Operation
 from sim.analyser35670a.units import volts_peak
 from sim.instrument.agenda import HOLD, Process, Steps
-
-if TYPE_CHECKING:
-    from sim.analyser35670a.instrument import Analyser35670A
 
 __all__ = ["Measurement", "State"]
 
@@ -44,7 +41,7 @@ class State(Enum):
 class Measurement:
     """The measurement of one instrument."""
 
-    def __init__(self, instrument: Analyser35670A) -> None:
+    def __init__(self, instrument: InstrumentCore) -> None:
         self._instrument = instrument
         self._process: Process | None = None
         self._operation: object | None = None

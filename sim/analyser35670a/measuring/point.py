@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +23,9 @@ from sim.analyser35670a.inputs import (
     nearest_range,
     range_vpk,
 )
+from sim.analyser35670a.parts import InstrumentCore
 from sim.analyser35670a.units import Quantity, from_volts_peak, volts_peak
 from sim.instrument.plant import Dwell
-
-if TYPE_CHECKING:
-    from sim.analyser35670a.instrument import Analyser35670A
 
 __all__ = ["CHANNELS", "Point", "Timing", "dwell_cycles", "take_point"]
 
@@ -70,7 +67,7 @@ class Point:
     timing: Timing
 
 
-def dwell_cycles(instrument: Analyser35670A, frequency_hz: float) -> tuple[int, int, float, float]:
+def dwell_cycles(instrument: InstrumentCore, frequency_hz: float) -> tuple[int, int, float, float]:
     """Settle cycles, integrate cycles, and both in seconds."""
     settle: Quantity = instrument.settings.get("SWE:STIM")
     dwell: Quantity = instrument.settings.get("SWE:DWEL")
@@ -82,7 +79,7 @@ def dwell_cycles(instrument: Analyser35670A, frequency_hz: float) -> tuple[int, 
     return settling, min(integrate, most), settle_s, integrate / frequency_hz
 
 
-def take_point(instrument: Analyser35670A, frequency_hz: float, key: tuple[int, int]) -> Point:
+def take_point(instrument: InstrumentCore, frequency_hz: float, key: tuple[int, int]) -> Point:
     """Measure at one frequency.
 
     Parameters
@@ -115,7 +112,7 @@ def take_point(instrument: Analyser35670A, frequency_hz: float, key: tuple[int, 
     )
 
 
-def _drive(instrument: Analyser35670A, frequency_hz: float, settle: int, integrate: int) -> Dwell:
+def _drive(instrument: InstrumentCore, frequency_hz: float, settle: int, integrate: int) -> Dwell:
     """Drive the device, with the level that auto level finds if that is on."""
     choices, settings = instrument.choices, instrument.settings
     divider = choices.device_ohm / (choices.device_ohm + choices.source_ohm)
@@ -136,7 +133,7 @@ def _drive(instrument: Analyser35670A, frequency_hz: float, settle: int, integra
     return dwell
 
 
-def _levelled(instrument: Analyser35670A, dwell: Dwell, level: float) -> float:
+def _levelled(instrument: InstrumentCore, dwell: Dwell, level: float) -> float:
     """The next level to try; `level` itself when the reference is within tolerance."""
     settings = instrument.settings
     held = int(settings.get("SOUR:VOLT:REF:CHAN")[-1])
@@ -156,7 +153,7 @@ def _levelled(instrument: Analyser35670A, dwell: Dwell, level: float) -> float:
 
 
 def _at_inputs(
-    instrument: Analyser35670A, dwell: Dwell, frequency_hz: float
+    instrument: InstrumentCore, dwell: Dwell, frequency_hz: float
 ) -> tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.float64]]:
     """Cycles (4, n), harmonics (4, 4) and peaks (4,) behind the coupling of each input."""
     count = len(dwell.source_cycles)
@@ -181,7 +178,7 @@ def _at_inputs(
 
 
 def _range_inputs(
-    instrument: Analyser35670A, peaks: NDArray[np.float64]
+    instrument: InstrumentCore, peaks: NDArray[np.float64]
 ) -> tuple[tuple[int, ...], int]:
     """Range of each input, and the 2 dB steps of the one that moved most."""
     settings = instrument.settings
@@ -200,7 +197,7 @@ def _range_inputs(
 
 
 def _noise(
-    instrument: Analyser35670A,
+    instrument: InstrumentCore,
     ranges: tuple[int, ...],
     shape: tuple[int, ...],
     key: tuple[int, int],

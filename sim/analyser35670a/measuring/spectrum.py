@@ -8,7 +8,6 @@ octave and order modes show zeros.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +15,8 @@ from numpy.typing import NDArray
 from sim.analyser35670a.choices import NOISE_REFERENCE_CYCLES
 from sim.analyser35670a.measuring.coordinates import Picture
 from sim.analyser35670a.measuring.frequency import band
+from sim.analyser35670a.parts import InstrumentCore
 from sim.analyser35670a.settings import Mode
-
-if TYPE_CHECKING:
-    from sim.analyser35670a.instrument import Analyser35670A
 
 __all__ = ["Spectrum"]
 
@@ -35,7 +32,7 @@ _WINDOW_LINES = {"FLAT": 3.8193, "HANN": 1.5, "UNIF": 1.0}
 class Spectrum:
     """Records of FFT mode."""
 
-    def __init__(self, instrument: Analyser35670A) -> None:
+    def __init__(self, instrument: InstrumentCore) -> None:
         self._instrument = instrument
         self._taken = 0
         self.averaged = 0

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +15,8 @@ from numpy.typing import NDArray
 from sim.analyser35670a.errors import ScpiError
 from sim.analyser35670a.measuring.frequency import GRID_HZ, band
 from sim.analyser35670a.measuring.point import Point
+from sim.analyser35670a.parts import InstrumentCore
 from sim.analyser35670a.units import Quantity
-
-if TYPE_CHECKING:
-    from sim.analyser35670a.instrument import Analyser35670A
 
 __all__ = ["FEW", "LEAST_POINTS", "MANY", "MOST_POINTS", "Sweep", "measured_points", "plan_sweep"]
 
@@ -158,7 +155,7 @@ def _response(point: Point) -> complex:
     return complex(point.amplitudes[1] / reference) if reference else 0j
 
 
-def plan_sweep(instrument: Analyser35670A) -> Sweep:
+def plan_sweep(instrument: InstrumentCore) -> Sweep:
     """The sweep that the present settings ask for."""
     settings = instrument.settings
     start, stop = band(instrument)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,8 @@ from sim.analyser35670a.errors import ScpiError
 from sim.analyser35670a.measuring.coordinates import Picture
 from sim.analyser35670a.measuring.point import Point
 from sim.analyser35670a.measuring.sweep import FEW, Sweep, plan_sweep
+from sim.analyser35670a.parts import InstrumentCore
 from sim.analyser35670a.settings import Mode
-
-if TYPE_CHECKING:
-    from sim.analyser35670a.instrument import Analyser35670A
 
 __all__ = ["TraceBoxes", "check_feed", "initial_feed", "initial_sine_feed"]
 
@@ -73,7 +71,7 @@ def initial_sine_feed(numbers: tuple[int, ...]) -> str:
     return ("XFR:POW:RAT 2,1", "XFR:POW:RAT 2,1", "XFR:POW:LIN 1", "XFR:POW:LIN 2")[numbers[0] - 1]
 
 
-def check_feed(instrument: Analyser35670A, _numbers: tuple[int, ...], asked: str) -> str:
+def check_feed(instrument: InstrumentCore, _numbers: tuple[int, ...], asked: str) -> str:
     """A feed in its standard spelling.
 
     Raises
@@ -99,7 +97,7 @@ def check_feed(instrument: Analyser35670A, _numbers: tuple[int, ...], asked: str
     return f"{head} {_channels(instrument, head, first, second)}".strip()
 
 
-def _channels(instrument: Analyser35670A, head: str, first: str | None, second: str | None) -> str:
+def _channels(instrument: InstrumentCore, head: str, first: str | None, second: str | None) -> str:
     last = head.rsplit(":", 1)[-1]
     if last == "PROF":
         return ""
@@ -166,10 +164,19 @@ def _waveform(sweep: Sweep, feed: str) -> Picture:
 
 
 class TraceBoxes:
-    """Traces A to D and the data registers."""
+    """Traces A to D and the data registers.
 
-    def __init__(self, instrument: Analyser35670A) -> None:
+    Parameters
+    ----------
+    instrument
+        Whose traces they are.
+    shown
+        The sweep that swept-sine traces show; None before the first one.
+    """
+
+    def __init__(self, instrument: InstrumentCore, shown: Callable[[], Sweep | None]) -> None:
         self._instrument = instrument
+        self._shown = shown
         self._old: dict[tuple[int, str], str] = {}
         self.registers: dict[int, Picture] = {}
 
@@ -205,7 +212,7 @@ class TraceBoxes:
             raise ScpiError(-230)
         if self._instrument.settings.mode is not Mode.SINE:
             return self._instrument.spectrum.picture(feed)
-        sweep = self._instrument.measurement.shown
+        sweep = self._shown()
         if sweep is None:
             sweep = plan_sweep(self._instrument)
         if feed.startswith("XTIM"):

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 from daq.errors import LashbenchError
 from tui.app.state.analyses import Analyses, Task, diagnose, read_result, write_report
 from tui.app.state.desk import Results
+from tui.app.state.host import Host
 
 if TYPE_CHECKING:
     from tui.app import messages
-    from tui.app.application import BenchApp
 
 __all__ = ["AnalysisKeeper"]
 
@@ -34,7 +34,7 @@ class AnalysisKeeper:
         What is called.
     """
 
-    def __init__(self, app: BenchApp, analyses: Analyses) -> None:
+    def __init__(self, app: Host, analyses: Analyses) -> None:
         self._app = app
         self._analyses = analyses
         self._given_up = threading.Event()

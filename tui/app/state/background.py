@@ -10,13 +10,11 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from daq.errors import LashbenchError
 from tui.app.messages import WorkDone
-
-if TYPE_CHECKING:
-    from tui.app.application import BenchApp
+from tui.app.state.host import Host
 
 __all__ = ["Beside"]
 
@@ -39,7 +37,7 @@ class Beside:
         Who is told; its event loop calls what is to follow.
     """
 
-    def __init__(self, app: BenchApp) -> None:
+    def __init__(self, app: Host) -> None:
         self._app = app
         self._wanted: dict[str, _Job] = {}
         self._running: dict[str, _Job] = {}

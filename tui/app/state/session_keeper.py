@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 
 from tui.app.run_view import RunView
 from tui.app.state import bench_owner
+from tui.app.state.host import Host
 
 if TYPE_CHECKING:
     from daq.session_events import Finished
-    from tui.app.application import BenchApp
 
 __all__ = ["SessionKeeper"]
 
@@ -31,7 +31,7 @@ class SessionKeeper:
         Whose workers run them and whose desk says what to do.
     """
 
-    def __init__(self, app: BenchApp) -> None:
+    def __init__(self, app: Host) -> None:
         from daq.control import SessionControl
 
         self._app = app
