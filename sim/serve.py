@@ -1,4 +1,4 @@
-"""A simulated analyser on a wire: raw TCP, a Prologix-style TCP bridge, pseudo-terminals.
+"""A simulated analyser on a wire: raw TCP, a Prologix-style bridge, LAN gateways, terminals.
 
 Owns the sockets and terminals and the loop that turns all of them, the
 adapters and the instrument in one thread. It listens on 127.0.0.1 only, prints
@@ -11,9 +11,12 @@ import os
 import selectors
 import socket
 import time
+from collections.abc import Callable
 from types import TracebackType
 
 from daq.errors import LinkError
+from sim.gateways.hislip import HislipGateway
+from sim.gateways.vxi11 import Vxi11Gateway
 from sim.instrument.bus import Instrument
 from sim.instrument.gpib_adapter import FakeAdapter
 from sim.instrument.gpib_dialects import (
@@ -25,7 +28,14 @@ from sim.instrument.gpib_dialects import (
 )
 from sim.instrument.pace import ByTheClock, Fast, Pace
 from sim.instrument.serial_line import SerialInstrument, SerialLine
-from sim.instrument.server_endpoints import AdapterClient, Cable, Listener, RawClient, Terminal
+from sim.instrument.server_endpoints import (
+    AdapterClient,
+    Cable,
+    Client,
+    Listener,
+    RawClient,
+    Terminal,
+)
 
 __all__ = ["HOST", "Server"]
 
@@ -46,7 +56,7 @@ class Server:
         What is served.
     realtime
         By the clock; else as fast as it can be computed.
-    tcp, prologix_tcp
+    tcp, prologix_tcp, vxi11, hislip
         Ports, 0 for any free one, None for none.
     prologix_pty
         Whether to open a pseudo-terminal with an adapter behind it.
@@ -69,6 +79,8 @@ class Server:
         realtime: bool = True,
         tcp: int | None = None,
         prologix_tcp: int | None = None,
+        vxi11: int | None = None,
+        hislip: int | None = None,
         prologix_pty: bool = False,
         serial_pty: SerialInstrument | None = None,
         dialect: str = "prologix",
@@ -82,16 +94,29 @@ class Server:
         self._away_until: float | None = None
         self._cables: list[Cable] = []
         self._listeners: list[Listener] = []
-        self._clients: list[RawClient | AdapterClient] = []
+        self._clients: list[Client] = []
         self._terminals: dict[str, Terminal] = {}
         self.addresses: dict[str, str] = {}
-        """Where it is served: ``tcp``, ``prologix_tcp``, ``prologix_pty``, ``serial_pty``."""
+        """Where it is served: ``tcp``, ``prologix_tcp``, ``vxi11``, ``hislip``, ``prologix_pty``,
+        ``serial_pty``."""
         try:
             if tcp is not None:
-                self._listen("tcp", tcp, None)
+                self._listen(
+                    "tcp", tcp, lambda wire, place: RawClient(wire, self.instrument, place)
+                )
             if prologix_tcp is not None:
                 bridge = _ARDUINOS.get(dialect, PROLOGIX_ETHERNET)
-                self._listen("prologix_tcp", prologix_tcp, self._adapter(bridge, realtime))
+                adapter = self._adapter(bridge, realtime)
+                self._listen(
+                    "prologix_tcp", prologix_tcp, lambda wire, _: AdapterClient(wire, adapter)
+                )
+            if vxi11 is not None:
+                gateway = Vxi11Gateway(instrument)
+                self._listen("vxi11", vxi11, lambda wire, _: gateway.core(wire))
+                gateway.abort_port = self._listen(None, 0, lambda wire, _: gateway.abort(wire))
+            if hislip is not None:
+                sessions = HislipGateway(instrument)
+                self._listen("hislip", hislip, lambda wire, _: sessions.client(wire))
             if prologix_pty:
                 cable = _ARDUINOS.get(dialect, PROLOGIX_USB)
                 self._open_terminal("prologix_pty", self._adapter(cable, realtime))
@@ -117,7 +142,10 @@ class Server:
         self._cables.append(adapter)
         return adapter
 
-    def _listen(self, name: str, port: int, adapter: FakeAdapter | None) -> None:
+    def _listen(
+        self, name: str | None, port: int, meet: Callable[[socket.socket, Listener], Client]
+    ) -> int:
+        """Listen on a port, under a name if others are told of it; the port."""
         try:
             wire = socket.create_server((HOST, port))
         except (OSError, OverflowError) as error:
@@ -126,10 +154,13 @@ class Server:
                 "for any free one"
             ) from error
         wire.setblocking(False)
-        listener = Listener(wire, adapter)
+        listener = Listener(wire, meet)
         self._listeners.append(listener)
         self._selector.register(wire, selectors.EVENT_READ, listener)
-        self.addresses[name] = f"{HOST}:{wire.getsockname()[1]}"
+        found = int(wire.getsockname()[1])
+        if name is not None:
+            self.addresses[name] = f"{HOST}:{found}"
+        return found
 
     def __enter__(self) -> Server:
         return self
@@ -157,7 +188,7 @@ class Server:
         for key, _events in self._selector.select(wait_s):
             if isinstance(key.data, Listener):
                 self._accept(key.data)
-            elif isinstance(key.data, RawClient | AdapterClient):
+            elif isinstance(key.data, Client):
                 self._pace.touch()
                 key.data.gather()
         now_s = time.monotonic()
@@ -183,12 +214,12 @@ class Server:
             self._forget(client)
 
     def _accept(self, listener: Listener) -> None:
-        client = listener.accept(self.instrument)
+        client = listener.accept()
         if client is not None:
             self._clients.append(client)
             self._selector.register(client.wire, selectors.EVENT_READ, client)
 
-    def _forget(self, client: RawClient | AdapterClient) -> None:
+    def _forget(self, client: Client) -> None:
         self._clients.remove(client)
         self._selector.unregister(client.wire)
         client.close()

@@ -12,6 +12,7 @@ import shutil
 import socket
 import struct
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
@@ -19,7 +20,7 @@ from daq.errors import LinkError
 from sim.instrument.bus import Instrument, TalkState
 from sim.instrument.gpib_adapter import FakeAdapter
 
-__all__ = ["AdapterClient", "Cable", "Listener", "RawClient", "Terminal"]
+__all__ = ["AdapterClient", "Cable", "Client", "Listener", "RawClient", "Terminal"]
 
 _CHUNK = 65536
 _LONGEST_LINE = 4_000_000
@@ -30,13 +31,15 @@ _REPLUG_S = 0.5
 
 
 class Listener:
-    """A listening socket; clients speak to the instrument, or to an adapter if there is one."""
+    """A listening socket; `meet` makes a client of each connection."""
 
-    def __init__(self, wire: socket.socket, adapter: FakeAdapter | None) -> None:
+    def __init__(
+        self, wire: socket.socket, meet: Callable[[socket.socket, Listener], Client]
+    ) -> None:
         self.wire = wire
         self.owner: RawClient | None = None
         """Who spoke last on a raw socket: the reply is his."""
-        self._adapter = adapter
+        self._meet = meet
         self._place = wire.getsockname()
 
     def leave(self) -> None:
@@ -48,7 +51,7 @@ class Listener:
         self.wire = socket.create_server(self._place)
         self.wire.setblocking(False)
 
-    def accept(self, instrument: Instrument) -> RawClient | AdapterClient | None:
+    def accept(self) -> Client | None:
         """A new client, None if it has gone already."""
         try:
             wire, _address = self.wire.accept()
@@ -56,12 +59,10 @@ class Listener:
             return None
         wire.setblocking(False)
         wire.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        if self._adapter is None:
-            return RawClient(wire, instrument, self)
-        return AdapterClient(wire, self._adapter)
+        return self._meet(wire, self)
 
 
-class _Client:
+class Client:
     """Bytes in and out of one connection."""
 
     def __init__(self, wire: socket.socket) -> None:
@@ -69,6 +70,10 @@ class _Client:
         self.closed = False
         self._in = bytearray()
         self._out = bytearray()
+
+    def work(self, now_s: float) -> None:
+        """Go on with what has come."""
+        raise NotImplementedError
 
     def gather(self) -> None:
         """Take what has come."""
@@ -109,7 +114,7 @@ class _Client:
             self.closed = True
 
 
-class RawClient(_Client):
+class RawClient(Client):
     """SCPI over a bare socket: lines in, replies out as soon as they are there.
 
     There is no way to be told to talk here, so -420 cannot arise; a query
@@ -164,7 +169,7 @@ class RawClient(_Client):
         super().close()
 
 
-class AdapterClient(_Client):
+class AdapterClient(Client):
     """A connection to an adapter; the adapter outlives it."""
 
     def __init__(self, wire: socket.socket, adapter: FakeAdapter) -> None:

@@ -25,7 +25,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tests"))
 
-from fault_bench.fault_cases import BENCHES, DISTURBANCES, Case, draw_cases  # noqa: E402
+from fault_bench.fault_cases import BENCHES, DISTURBANCES, GATEWAY_BENCHES, Case, draw_cases  # noqa: E402
 from fault_bench.fault_runs import Campaign, Outcome  # noqa: E402
 
 from sim.models import models  # noqa: E402
@@ -39,22 +39,26 @@ def main() -> int:
     """Run, print, and perhaps write."""
     words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     words.add_argument("--runs", type=int, default=800)
+    words.add_argument("--gateways", type=int, default=300, help="further runs behind gateways")
     words.add_argument("--seed", type=int, default=SEED)
     words.add_argument("--lanes", type=int, default=4, help="runs at the same time")
     words.add_argument("--minutes", type=float, default=1e6, help="begin no run after that")
     words.add_argument("--only", type=int, help="only the run of that number")
     words.add_argument("--kind", help="only runs with that fault or disturbance")
     words.add_argument("--driver", help="only runs of the driver with that scheme")
+    words.add_argument("--wire", help="only runs over that wire")
     words.add_argument("--on", action="store_true", help="only runs not kept, or not well, yet")
     words.add_argument("--write", action="store_true", help="write the table into the docs")
     given = words.parse_args()
-    cases = list(draw_cases(given.runs, given.seed))
+    cases = list(draw_cases(given.runs, given.seed, given.gateways))
     if given.only is not None:
         cases = [case for case in cases if case.number == given.only]
     if given.kind is not None:
         cases = [case for case in cases if given.kind in (case.fault_name, case.disturbance)]
     if given.driver is not None:
         cases = [case for case in cases if case.driver == given.driver]
+    if given.wire is not None:
+        cases = [case for case in cases if case.wire == given.wire]
     # A shell's background job is started with Ctrl-C ignored, and so would be its programs.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     kept = ROOT / "build" / f"faults-{given.seed}.jsonl"
@@ -105,7 +109,10 @@ def recorded(kept: Path) -> list[Outcome]:
 def table(outcomes: Sequence[Outcome], seed: int, repeated: int) -> list[str]:
     """What came of it, with a row for each fault and disturbance that broke a promise."""
     benches = Counter((outcome.case.driver, outcome.case.wire) for outcome in outcomes)
-    shown = [f"{driver or '35670a'} {wire} {benches[driver, wire]}" for driver, wire in BENCHES]
+    shown = [
+        f"{driver or '35670a'} {wire} {benches[driver, wire]}"
+        for driver, wire in (*BENCHES, *GATEWAY_BENCHES)
+    ]
     broken = sum(bool(outcome.wrongs) for outcome in outcomes)
     stopped = [o.stopped_s for o in outcomes if o.stopped_s is not None]
     off = [o.off_after_s for o in outcomes if o.off_after_s is not None]
@@ -120,9 +127,9 @@ def table(outcomes: Sequence[Outcome], seed: int, repeated: int) -> list[str]:
         f"{max(stopped, default=0.0):.1f} s. Measurements that one further session "
         f"did not complete, two or three did: {sum(o.resumes > 1 for o in outcomes)}.",
     ]
-    named = dict.fromkeys(name for model in models() for name in model.faults)
+    faults = dict.fromkeys(name for model in models() for name in model.faults)
     rows = {}
-    for name in (*named, *DISTURBANCES):
+    for name in (*faults, *DISTURBANCES):
         mine = [o for o in outcomes if name in (o.case.fault_name, o.case.disturbance)]
         if mine:
             rows[name] = mine

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from fault_bench import fault_child
+from instruments.bench_server import GATEWAYS
 from instruments.bench_server import url as url_of
 
 from sim.serve import Server
@@ -96,8 +97,8 @@ class Served:
     def __init__(self, instrument: Any, wire: str, driver: str = "") -> None:
         name = "prologix_pty" if wire == "ar488_pty" else wire
         ports: dict[str, Any] = {"tcp": 0}
-        if name == "prologix_tcp":
-            ports["prologix_tcp"] = 0
+        if name in ("prologix_tcp", *GATEWAYS):
+            ports[name] = 0
         if name == "prologix_pty":
             ports["prologix_pty"] = True
         if name == "serial_pty":

@@ -22,6 +22,9 @@ BENCHES = tuple(
     for wire in WIRES + (("serial_pty",) if model.has_serial else ())
 )
 """Schemes of drivers, each with every wire that its instrument has."""
+GATEWAYS = ("vxi11", "hislip")
+GATEWAY_BENCHES = tuple((model.scheme, wire) for model in models() for wire in GATEWAYS)
+"""The same behind LAN gateways, which are drawn for themselves: a seed keeps its other runs."""
 LEVELS_VPK = (1.0, 2.0)
 _POINTS, _MORE_POINTS = 7, 11
 _TRIAL_POINTS = 12
@@ -107,13 +110,22 @@ def points_of(driver: str) -> int:
     return _MORE_POINTS if driver else _POINTS
 
 
-def draw_cases(count: int, seed: int) -> Iterator[Case]:
-    """So many cases; the same for the same seed."""
-    chance = random.Random(seed)
-    wanted = _every_one_once()
+def draw_cases(count: int, seed: int, gateways: int = 0) -> Iterator[Case]:
+    """So many cases, and so many more behind gateways; the same for the same seed."""
+    yield from _drawn(BENCHES, range(1, count + 1), random.Random(seed))
+    numbers = range(count + 1, count + gateways + 1)
+    yield from _drawn(GATEWAY_BENCHES, numbers, random.Random(seed + 1))
+
+
+_Benches = tuple[tuple[str, str], ...]
+
+
+def _drawn(benches: _Benches, numbers: range, chance: random.Random) -> Iterator[Case]:
+    wanted = _every_one_once(benches)
     chance.shuffle(wanted)
-    for number in range(1, count + 1):
-        driver, wire, name, phase, disturbance = wanted.pop() if wanted else _any(chance)
+    for number in numbers:
+        kind = wanted.pop() if wanted else _any(benches, chance)
+        driver, wire, name, phase, disturbance = kind
         yield Case(
             number=number,
             driver=driver,
@@ -129,14 +141,14 @@ def draw_cases(count: int, seed: int) -> Iterator[Case]:
 _Kind = tuple[str, str, str | None, str | None, str | None]
 
 
-def _every_one_once() -> list[_Kind]:
+def _every_one_once(benches: _Benches) -> list[_Kind]:
     faults: list[_Kind] = []
-    for place, (driver, wire) in enumerate(BENCHES):
+    for place, (driver, wire) in enumerate(benches):
         for number, name in enumerate(model_of(driver).faults):
             faults.append((driver, wire, name, PHASES[(place + number) % len(PHASES)], None))
     others = [
         (driver, wire, None, None, one)
-        for (driver, wire), one in product(BENCHES, DISTURBANCES)
+        for (driver, wire), one in product(benches, DISTURBANCES)
         if can_strike(one, wire)
     ]
     return [*faults, *others]
@@ -147,8 +159,8 @@ def can_strike(disturbance: str, wire: str) -> bool:
     return wire != "loopback" or disturbance not in NEEDS_WIRE
 
 
-def _any(chance: random.Random) -> _Kind:
-    driver, wire = chance.choice(BENCHES)
+def _any(benches: _Benches, chance: random.Random) -> _Kind:
+    driver, wire = chance.choice(benches)
     disturbance = chance.choice([d for d in DISTURBANCES if can_strike(d, wire)])
     kind = chance.choice(("fault", "disturbance", "both"))
     name = None if kind == "disturbance" else chance.choice(list(model_of(driver).faults))

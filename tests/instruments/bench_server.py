@@ -18,6 +18,7 @@ from sim.unit import load_unit
 WIRES = ("tcp", "prologix_tcp", "prologix_pty")
 
 
+GATEWAYS = ("vxi11", "hislip")
 SERIAL = ("serial_pty",)
 """What an instrument with RS-232 has beside."""
 
@@ -30,6 +31,10 @@ def url(name: str, place: str, driver: str = "") -> str:
         return f"{lead}TCPIP::{host}::{port}::SOCKET"
     if name == "serial_pty":
         return f"{lead}serial:{place}"
+    if name in GATEWAYS:
+        host, port = place.rsplit(":", 1)
+        device = f"{host},{port}::inst0" if name == "vxi11" else f"{host}::hislip0,{port}"
+        return f"{lead}TCPIP::{device}::INSTR"
     scheme = "prologix-tcp" if name == "prologix_tcp" else "prologix"
     # Another driver's instrument has another address, which is its driver's preset.
     return f"{lead}{scheme}:{place}" + ("" if driver else "?addr=11")
@@ -67,6 +72,8 @@ def served(instrument, wire: str = "tcp", driver: str = "", **options):
     ports = {
         "tcp": {"tcp": 0},
         "prologix_tcp": {"prologix_tcp": 0},
+        "vxi11": {"vxi11": 0},
+        "hislip": {"hislip": 0},
         "serial_pty": {"serial_pty": instrument},
     }
     wires = ports.get(wire, {"prologix_pty": True})
