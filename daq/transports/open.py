@@ -91,6 +91,10 @@ def open_transport(
             from daq.transports.hislip import open_hislip
 
             transport = open_hislip(resource, Deadline.after(opening_s))
+        case VisaAddress(resource=resource) if resource.upper().startswith("TCPIP"):
+            from daq.transports.vxi11 import open_vxi11
+
+            transport = open_vxi11(resource, Deadline.after(opening_s))
         case VisaAddress(resource=resource):
             from daq.transports.visa import open_visa
 
@@ -135,6 +139,9 @@ def load_transport(url: str) -> None:
         case VisaAddress(resource=resource) if is_hislip(resource):
             import daq.transports.hislip
             import daq.transports.links  # noqa: F401
+        case VisaAddress(resource=resource) if resource.upper().startswith("TCPIP"):
+            import daq.transports.links
+            import daq.transports.vxi11  # noqa: F401
         case VisaAddress(resource=resource):
             from daq.transports.visa import load_backend
 

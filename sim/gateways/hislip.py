@@ -117,9 +117,9 @@ class HislipClient(Client):
     def waiting(self) -> bool:
         """Whether a message, a reply or a lock is under way."""
         session = self._session
-        busy = session is not None and session.sync is self and (
-            bool(session.inbound) or session.replies_to is not None
-        )  # fmt: skip
+        busy = False
+        if session is not None and session.sync is self:
+            busy = bool(session.inbound) or self._gateway.instrument.reply_due
         return busy or self._waits_for_lock_until_s is not None or bool(self._out)
 
     def close(self) -> None:
@@ -155,7 +155,7 @@ class HislipClient(Client):
         if kind in (Kind.DATA, Kind.DATA_END):
             if session.clearing:
                 return  # what was on its way when it was cleared
-            if session.replies_to is not None and not session.inbound:
+            if session.replies_to is not None and not session.inbound and bus.reply_due:
                 self.say(Kind.INTERRUPTED, 0, parameter)
                 if session.aside is not None:
                     session.aside.say(Kind.ASYNC_INTERRUPTED, 0, parameter)

@@ -8,11 +8,10 @@ enabling service requests is answered with error 8, as by several gateways.
 from __future__ import annotations
 
 import socket
-import struct
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
 
-from sim.gateways.calls import (
+from daq.transports.rpc import (
     GARBAGE_ARGUMENTS,
     PROCEDURE_UNAVAILABLE,
     PROGRAM_UNAVAILABLE,
@@ -24,6 +23,7 @@ from sim.gateways.calls import (
     parse_call,
     refused,
 )
+from daq.transports.rpc import words as packed
 from sim.instrument.bus import Instrument, TalkState
 from sim.instrument.server_endpoints import Client
 
@@ -148,11 +148,11 @@ class AbortClient(_RpcClient):
     def _procedure(self, number: int) -> Callable[[Arguments], _Work] | None:
         return self._abort if number == 1 else None
 
-    def _abort(self, words: Arguments) -> _Work:
-        link = self._gateway.links.get(words.whole())
+    def _abort(self, given: Arguments) -> _Work:
+        link = self._gateway.links.get(given.whole())
         if link is not None:
             link.aborted = True
-        return iter([_words(_INVALID_LINK if link is None else _NO_ERROR)])
+        return iter([packed(_INVALID_LINK if link is None else _NO_ERROR)])
 
 
 class CoreClient(_RpcClient):
@@ -179,7 +179,7 @@ class CoreClient(_RpcClient):
             17: lambda: setattr(bus, "remote", False),
         }
         if number in simple:
-            return lambda words: self._generic(words, lambda: simple[number]() or b"")
+            return lambda given: self._generic(given, lambda: simple[number]() or b"")
         return {
             10: self._create, 11: self._write, 12: self._read, 13: self._status, 18: self._lock,
             19: self._unlock, 20: self._unsupported, 22: self._command, 23: self._destroy,
@@ -188,9 +188,9 @@ class CoreClient(_RpcClient):
 
     # ------------------------------------------------------------ links and locks
 
-    def _create(self, words: Arguments) -> _Work:
+    def _create(self, given: Arguments) -> _Work:
         _client, locks, patience_ms, _device = (
-            words.whole(), words.whole(), words.whole(), words.bytes(),
+            given.whole(), given.whole(), given.whole(), given.bytes(),
         )  # fmt: skip
         return self._created(bool(locks), patience_ms)
 
@@ -202,19 +202,19 @@ class CoreClient(_RpcClient):
             error = yield from self._locking(link, _WAIT_LOCK, patience_ms)
         if error:
             self._gateway.drop(link)
-        yield _words(error, link.number, self._gateway.abort_port, _LONGEST_WRITE)
+        yield packed(error, link.number, self._gateway.abort_port, _LONGEST_WRITE)
 
-    def _destroy(self, words: Arguments) -> _Work:
-        link = self._gateway.links.get(words.whole())
+    def _destroy(self, given: Arguments) -> _Work:
+        link = self._gateway.links.get(given.whole())
         if link is not None:
             self._gateway.drop(link)
-        return iter([_words(_INVALID_LINK if link is None else _NO_ERROR)])
+        return iter([packed(_INVALID_LINK if link is None else _NO_ERROR)])
 
-    def _lock(self, words: Arguments) -> _Work:
-        link, flags, patience_ms = self._link(words), words.whole(), words.whole()
+    def _lock(self, given: Arguments) -> _Work:
+        link, flags, patience_ms = self._link(given), given.whole(), given.whole()
 
         def locked() -> _Work:
-            yield _words(
+            yield packed(
                 _INVALID_LINK
                 if link is None
                 else (yield from self._locking(link, flags, patience_ms))
@@ -228,17 +228,17 @@ class CoreClient(_RpcClient):
             self._gateway.holder = link
         return error
 
-    def _unlock(self, words: Arguments) -> _Work:
-        link, gateway = self._link(words), self._gateway
+    def _unlock(self, given: Arguments) -> _Work:
+        link, gateway = self._link(given), self._gateway
         if link is None:
-            return iter([_words(_INVALID_LINK)])
+            return iter([packed(_INVALID_LINK)])
         if gateway.holder is not link:
-            return iter([_words(_NO_LOCK)])
+            return iter([packed(_NO_LOCK)])
         gateway.holder = None
-        return iter([_words(_NO_ERROR)])
+        return iter([packed(_NO_ERROR)])
 
-    def _link(self, words: Arguments) -> Link | None:
-        link = self._gateway.links.get(words.whole())
+    def _link(self, given: Arguments) -> Link | None:
+        link = self._gateway.links.get(given.whole())
         if link is not None:
             link.aborted = False  # an abort ends what is under way, and nothing later
         return link
@@ -256,12 +256,12 @@ class CoreClient(_RpcClient):
 
     # ------------------------------------------------------------ the bus
 
-    def _write(self, words: Arguments) -> _Work:
+    def _write(self, given: Arguments) -> _Work:
         link, patience_ms, lock_ms, flags, data = (
-            self._link(words), words.whole(), words.whole(), words.whole(), words.bytes(),
+            self._link(given), given.whole(), given.whole(), given.whole(), given.bytes(),
         )  # fmt: skip
         if link is None:
-            return iter([_words(_INVALID_LINK, 0)])
+            return iter([packed(_INVALID_LINK, 0)])
         return self._written(link, patience_ms, lock_ms, flags, data)
 
     def _written(
@@ -278,14 +278,14 @@ class CoreClient(_RpcClient):
                 break
             else:
                 yield None
-        yield _words(error, sent)
+        yield packed(error, sent)
 
-    def _read(self, words: Arguments) -> _Work:
+    def _read(self, given: Arguments) -> _Work:
         link, size, patience_ms, lock_ms, flags, character = (
-            self._link(words), *(words.whole() for _ in range(5)),
+            self._link(given), *(given.whole() for _ in range(5)),
         )  # fmt: skip
         if link is None:
-            return iter([_words(_INVALID_LINK, 0) + opaque(b"")])
+            return iter([packed(_INVALID_LINK, 0) + opaque(b"")])
         return self._taken(link, size, patience_ms, lock_ms, flags, character)
 
     def _taken(
@@ -310,24 +310,24 @@ class CoreClient(_RpcClient):
             error = self._over(link, latest_s)
             if not error:
                 yield None
-        yield _words(error, reason) + opaque(data)
+        yield packed(error, reason) + opaque(data)
 
-    def _status(self, words: Arguments) -> _Work:
+    def _status(self, given: Arguments) -> _Work:
         def poll() -> bytes | None:
             byte = self._gateway.instrument.serial_poll()
-            return None if byte is None else _words(byte)
+            return None if byte is None else packed(byte)
 
-        return self._generic(words, poll, _words(0))
+        return self._generic(given, poll, packed(0))
 
     def _generic(
-        self, words: Arguments, act: Callable[[], bytes | None], nothing: bytes = b""
+        self, given: Arguments, act: Callable[[], bytes | None], nothing: bytes = b""
     ) -> _Work:
         """Wait for the lock, then act until there is a result; `nothing` goes with an error."""
         link, flags, lock_ms, patience_ms = (
-            self._link(words), words.whole(), words.whole(), words.whole(),
+            self._link(given), given.whole(), given.whole(), given.whole(),
         )  # fmt: skip
         if link is None:
-            return iter([_words(_INVALID_LINK) + nothing])
+            return iter([packed(_INVALID_LINK) + nothing])
 
         def done() -> _Work:
             error = yield from self._allowed(link, flags, lock_ms)
@@ -336,7 +336,7 @@ class CoreClient(_RpcClient):
                 error = self._over(link, latest_s)
                 if not error:
                     yield None
-            yield _words(error) + (nothing if result is None else result)
+            yield packed(error) + (nothing if result is None else result)
 
         return done()
 
@@ -346,12 +346,8 @@ class CoreClient(_RpcClient):
             return _ABORTED
         return _IO_TIMEOUT if self._now_s >= latest_s else _NO_ERROR
 
-    def _command(self, words: Arguments) -> _Work:
-        return iter([_words(_NOT_SUPPORTED) + opaque(b"")])
+    def _command(self, given: Arguments) -> _Work:
+        return iter([packed(_NOT_SUPPORTED) + opaque(b"")])
 
-    def _unsupported(self, words: Arguments) -> _Work:
-        return iter([_words(_NOT_SUPPORTED)])
-
-
-def _words(*values: int) -> bytes:
-    return struct.pack(f">{len(values)}I", *values)
+    def _unsupported(self, given: Arguments) -> _Work:
+        return iter([packed(_NOT_SUPPORTED)])

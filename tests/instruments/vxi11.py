@@ -21,6 +21,7 @@ class Vxi11Instrument:
         self.messages: list[bytes] = []
         self.cleared = 0
         self.largest_read = 1 << 20
+        self.abort_port = 0
         self.errors: dict[int, int] = {}
         """Error number that a procedure is answered with instead of being done."""
         self._message = b""
@@ -55,7 +56,7 @@ class Vxi11Instrument:
         if error := self.errors.get(procedure):
             return struct.pack(">2I", error, 0)[: 4 if procedure == CLEAR else 8]
         if procedure == CREATE_LINK:
-            return struct.pack(">4I", 0, 7, 0, 1024)
+            return struct.pack(">4I", 0, 7, self.abort_port, 1024)
         if procedure == WRITE:
             flags, size = struct.unpack(">12xII", body[:20])
             self._message += body[20 : 20 + size]

@@ -28,6 +28,8 @@ def serve(
     effect: list[str] | None = None,
     tcp: Annotated[Whole | None, Parameter(help="The analyser's language on this port.")] = None,
     prologix_tcp: Annotated[Whole | None, Parameter(help="An adapter on this port.")] = None,
+    vxi11: Annotated[Whole | None, Parameter(help="A VXI-11 gateway on this port.")] = None,
+    hislip: Annotated[Whole | None, Parameter(help="A HiSLIP gateway on this port.")] = None,
     prologix_pty: bool = False,
     serial_pty: bool = False,
     model: str = "35670A",
@@ -54,6 +56,10 @@ def serve(
         Port of the bare language; 0 picks a free one.
     prologix_tcp
         Port of a Prologix-style bridge; 0 picks a free one.
+    vxi11
+        Port of a VXI-11 gateway; 0 picks a free one. There is no port mapper.
+    hislip
+        Port of a HiSLIP gateway; 0 picks a free one.
     prologix_pty
         A Prologix-style adapter on a pseudo-terminal.
     serial_pty
@@ -73,13 +79,15 @@ def serve(
     dialect
         Which make of adapter; ar488-late-eoi asserts EOI after the last byte.
     """
-    if tcp is None and prologix_tcp is None and not prologix_pty and not serial_pty:
+    ports = {"tcp": tcp, "prologix-tcp": prologix_tcp, "vxi11": vxi11, "hislip": hislip}
+    if all(port is None for port in ports.values()) and not prologix_pty and not serial_pty:
         raise InputError(
-            "nothing to serve; give --tcp PORT, --prologix-tcp PORT, --prologix-pty or --serial-pty"
+            f"nothing to serve; give {', '.join(f'--{name} PORT' for name in ports)}, "
+            "--prologix-pty or --serial-pty"
         )
-    for name, port in (("--tcp", tcp), ("--prologix-tcp", prologix_tcp)):
+    for name, port in ports.items():
         if port is not None and port not in _PORTS:
-            raise InputError(f"{name} {port} is no port; give 0 to 65535, 0 for any free one")
+            raise InputError(f"--{name} {port} is no port; give 0 to 65535, 0 for any free one")
     if not 0.0 <= noise <= 10.0:
         raise InputError(f"--noise {noise} V must be between 0 and 10 V")
     if seed < 0:
@@ -110,6 +118,8 @@ def serve(
         realtime=speed == "realtime",
         tcp=tcp,
         prologix_tcp=prologix_tcp,
+        vxi11=vxi11,
+        hislip=hislip,
         prologix_pty=prologix_pty,
         serial_pty=instrument if serial_pty and isinstance(instrument, SerialInstrument) else None,
         dialect=dialect,

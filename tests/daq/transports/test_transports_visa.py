@@ -1,6 +1,5 @@
-"""VISA resources over the Python back end: raw socket and VXI-11, each against its own server."""
+"""VISA resources: raw socket and VXI-11, each against its own server."""
 
-import gc
 import struct
 import threading
 import time
@@ -31,7 +30,9 @@ from daq.session_request import SessionRequest
 from daq.store_records import MeasurementHeader
 from daq.transports.base import Deadline, ask, ask_block
 from daq.transports.open import open_transport
+from daq.transports.rpc import Records, accepted, parse_call, words
 from daq.transports.visa import open_visa
+from daq.transports.vxi11 import open_vxi11
 from sim.instrument.plant import LinearPlant
 
 PAYLOAD = struct.pack(">6d", 1.0, -2.0, 10.0, 43.0, 9.9e37, 0.0) + b"\n\r\x1b+\0#\n"
@@ -151,11 +152,14 @@ def test_a_gpib_card_without_a_back_end_is_said_so():
         open_transport("GPIB0::11::INSTR")
 
 
-@pytest.fixture
-def vxi11():
+@pytest.fixture(params=[open_vxi11, open_visa], ids=["own", "visa"])
+def vxi11(request):
+    """Our own client, and that of the Python back end, which makers' VISA takes the place of."""
     device = Vxi11Instrument(instrument, status_byte=96)
     with ByteServer(device.feed) as server:
-        transport = open_visa(f"TCPIP::127.0.0.1,{server.port}::inst0::INSTR", Deadline.after(3.0))
+        transport = request.param(
+            f"TCPIP::127.0.0.1,{server.port}::inst0::INSTR", Deadline.after(3.0)
+        )
         yield transport, device
         transport.close()
 
@@ -318,11 +322,35 @@ def test_vxi11_says_how_much_of_a_block_came(vxi11, query, fault):
         ask_block(vxi11[0], query, Deadline.after(0.5))
 
 
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-@pytest.mark.filterwarnings("ignore::ResourceWarning")
 def test_vxi11_without_anybody_there_is_no_connection():
     with ByteServer(lambda data: b"") as server:
         port = server.port
     with pytest.raises(LinkError, match="cannot be opened"):
         open_transport(f"TCPIP::127.0.0.1,{port}::inst0::INSTR", opening_s=1.0)
-    gc.collect()  # the back end leaves its socket to the collector
+
+
+def test_a_call_that_a_gateway_does_not_end_is_aborted():
+    """Its link keeps the bus otherwise, and the next session waits behind it."""
+    aborted, records = [], Records()
+
+    def abort(data):
+        records.feed(data)
+        call = parse_call(records.take())
+        aborted.append((call.program, call.procedure, call.arguments.whole()))
+        return accepted(call, words(0))
+
+    device = Vxi11Instrument(instrument)
+
+    def core(data):
+        read = len(data) >= 28 and struct.unpack(">I", data[24:28])[0] == READ
+        return b"" if read else device.feed(data)
+
+    with ByteServer(abort) as side, ByteServer(core) as server:
+        device.abort_port = side.port
+        transport = open_transport(f"TCPIP::127.0.0.1,{server.port}::inst0::INSTR")
+        with pytest.raises(BenchTimeout, match=r"'N\?' got no answer"):
+            ask(transport, "N?", Deadline.after(0.1))
+        # The connection is of use again.
+        assert transport.serial_poll(Deadline.after(1.0)) == 0
+        transport.close()
+    assert aborted == [(0x0607B0, 1, 7)]
