@@ -21,6 +21,8 @@ from analysis.execution.progress import Progress, part_of
 from analysis.inference.checkpoint import Checkpoint, find_checkpoint, posterior_name
 from analysis.inference.nominal import nominal_families, nominal_of
 from analysis.inference.posterior import lent_checkpoint
+from analysis.inference.prior import Prior
+from analysis.inference.transfer import transfer_weights, vocabulary_of
 from analysis.observation.observation import Observation
 from daq.errors import InputError, LashbenchError
 from daq.untrusted.trust import distrust
@@ -61,33 +63,36 @@ def prepare_unit(
     """Train the posterior of a unit on so many simulated machines, and keep it.
 
     It serves every sweep of the unit. What was interrupted goes on. Training begins with the
-    posterior that comes with lashbench, of this unit or of another one with as many stages.
+    posterior that comes with lashbench, of this unit or of another one.
 
     Raises
     ------
     LashbenchError
         If there is no room to keep anything.
     InputError
-        If the unit has one gear stage, JAX is not installed, nothing can be written into the
-        folder, or others may write there.
+        If JAX is not installed, nothing can be written into the folder, or others may write there.
     AnalysisError
         If a motion grew without bound.
     """
     from analysis.inference.campaign import Recipe, train_unit
 
-    if unit.stages == 1:
-        raise InputError(
-            f"unit {unit.name} has one gear stage: no posterior is trained for it; diagnose uses "
-            "that of the paper's units"
-        )
     _check_usable(cache)
     name = posterior_name(unit)
     runs = cache / name.removesuffix(".npz").replace("posterior", "training")
-    start = find_checkpoint(unit) or lent_checkpoint(unit, borrowed=False)
+    start = find_checkpoint(unit) or _of_another(unit)
     recipe = Recipe(rate=_RATE_FROM_ANOTHER) if start else Recipe()
     return train_unit(
         unit, cache / name, runs, machines, recipe, start, executor=executor, told=told
     )
+
+
+def _of_another(unit: Unit) -> Checkpoint | None:
+    """What the posterior of another unit knows of the effects and values that this one has."""
+    lent = lent_checkpoint(unit)
+    if lent is None:
+        return None
+    known, wanted = (vocabulary_of(Prior(unit, borrowed)) for borrowed in (True, False))
+    return transfer_weights(lent, known, wanted)
 
 
 def prepare_sweep(

@@ -21,8 +21,12 @@ from sim.effect import (
     EffectParameter,
     around,
     drive_voltage,
+    load_critical,
     load_frequency,
+    shaft_at_load,
+    shaft_critical,
     span,
+    stall_torque,
     table_1,
     times,
 )
@@ -33,20 +37,19 @@ from sim.elements import (
     Inertia,
     Spring,
 )
+from sim.own_effects.registry import Catalogue
 from sim.rare_effects import RARE
 from sim.unit import Unit
 
-__all__ = ["CATALOGUE", "COMMON", "Effect", "EffectParameter", "not_of_unit"]
-
-
-def _load_critical(unit: Unit) -> float:
-    """Damping that would be critical for the load on shaft 1, N.m.s/rad: a natural scale."""
-    stiffness = unit.stage1.k_s1 * unit.output_ratio**2
-    return 2.0 * math.sqrt(stiffness * unit.load.J_L)
-
-
-def _shaft_critical(unit: Unit) -> float:
-    return _load_critical(unit) / unit.output_ratio**2
+__all__ = [
+    "BUILT_IN",
+    "CATALOGUE",
+    "COMMON",
+    "Effect",
+    "EffectParameter",
+    "effects_of",
+    "not_of_unit",
+]
 
 
 def _add_load_damper(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrain:
@@ -112,25 +115,13 @@ def _move_corner(d: Drivetrain, unit: Unit, v: Mapping[str, float]) -> Drivetrai
     )
 
 
-def _stall_torque(unit: Unit) -> float:
-    """Torque at the load for 1 V at the amplifier, a natural scale of load torques, N.m."""
-    motor = unit.motor
-    ratio = unit.stage1.N_1 * unit.output_ratio
-    # A current-controlled amplifier makes a current of the command, without a resistance.
-    return unit.electronics.k_a * motor.k_t / (motor.R_m or 1.0) * ratio
-
-
-def _shaft_at_load(unit: Unit) -> float:
-    return unit.stage1.k_s1 * unit.output_ratio**2
-
-
 _P = EffectParameter
 _TORQUE, _DAMPING, _STIFFNESS = "N.m", "N.m.s/rad", "N.m/rad"
 
 _ALL = (
     Effect(
         "load-viscous-damping",
-        (_P("B_L", _DAMPING, times(_load_critical, 3e-4, 0.1)),),
+        (_P("B_L", _DAMPING, times(load_critical, 3e-4, 0.1)),),
         "plant",
         "The load is braked in proportion to its speed.",
         "grease or a seal dragging on the load, or eddy currents",
@@ -142,7 +133,7 @@ _ALL = (
     ),
     Effect(
         "shaft-damping",
-        (_P("c_s1", _DAMPING, times(_shaft_critical, 1e-3, 0.3)),),
+        (_P("c_s1", _DAMPING, times(shaft_critical, 1e-3, 0.3)),),
         "plant",
         "Shaft 1 loses energy as it twists.",
         "a press fit or coupling that works on shaft 1",
@@ -247,7 +238,7 @@ _ALL = (
     ),
     Effect(
         "cable-stiffness",
-        (_P("K_c", _STIFFNESS, times(_shaft_at_load, 0.005, 2.0)),),
+        (_P("K_c", _STIFFNESS, times(shaft_at_load, 0.005, 2.0)),),
         "plant",
         "A spring ties the load to ground.",
         "a stiff cable bundle or hose across the joint",
@@ -257,7 +248,7 @@ _ALL = (
     ),
     Effect(
         "load-torque-bias",
-        (_P("T_b", _TORQUE, times(_stall_torque, 0.02, 2.0), (-math.inf, math.inf)),),
+        (_P("T_b", _TORQUE, times(stall_torque, 0.02, 2.0), (-math.inf, math.inf)),),
         "plant",
         "A constant torque pulls on the load.",
         "an imbalance, a hanging cable or a tilted base",
@@ -346,16 +337,42 @@ _ALL = (
     *RARE,
 )
 
-CATALOGUE: Mapping[str, Effect] = MappingProxyType({effect.id: effect for effect in _ALL})
-"""Every effect by identifier."""
+BUILT_IN: Mapping[str, Effect] = MappingProxyType({effect.id: effect for effect in _ALL})
+"""Every effect that comes with lashbench, by identifier."""
+
+CATALOGUE = Catalogue(BUILT_IN)
+"""Every effect by identifier, with those that files of units define (`sim.own_effects`)."""
+
+
+def effects_of(unit: Unit) -> tuple[str, ...]:
+    """Effects that a unit can have, in the order of the catalogue, its own last.
+
+    Raises
+    ------
+    ConfigurationError
+        If it names files of its own effects that were not read, or that are wrong.
+    """
+    foreign = not_of_unit(unit)
+    return (*(name for name in BUILT_IN if name not in foreign), *CATALOGUE.own_of(unit))
 
 
 def not_of_unit(unit: Unit) -> dict[str, str]:
-    """Effects that a unit cannot have or show, by identifier, and why."""
-    found: dict[str, str] = {}
+    """Effects that a unit cannot have or show, by identifier, and why.
+
+    Raises
+    ------
+    ConfigurationError
+        As `effects_of`.
+    """
+    own = CATALOGUE.own_of(unit)
+    found = {
+        name: f"it is an effect of another unit's own, not of {unit.name}"
+        for name in CATALOGUE
+        if name not in BUILT_IN and name not in own
+    }
     if unit.stages == 1:
         why = f"unit {unit.name} has one gear stage"
-        found |= dict.fromkeys((name for name in CATALOGUE if name.startswith("mesh2-")), why)
+        found |= dict.fromkeys((name for name in BUILT_IN if name.startswith("mesh2-")), why)
     if unit.amplifier is not None:
         why = f"the amplifier of unit {unit.name} controls the current"
         found |= dict.fromkeys(("motor-resistance", "amplifier-saturation"), why)

@@ -20,8 +20,12 @@ __all__ = [
     "EffectParameter",
     "around",
     "drive_voltage",
+    "load_critical",
     "load_frequency",
+    "shaft_at_load",
+    "shaft_critical",
     "span",
+    "stall_torque",
     "table_1",
     "times",
 ]
@@ -155,3 +159,27 @@ def load_frequency(unit: Unit) -> float:
     decade = 10.0 ** math.floor(math.log10(scale))
     steps = (decade, 2.0 * decade, 5.0 * decade, 10.0 * decade)
     return min(steps, key=lambda step: abs(math.log(step / scale)))
+
+
+def load_critical(unit: Unit) -> float:
+    """Damping that would be critical for the load on shaft 1, N.m.s/rad: a natural scale."""
+    stiffness = unit.stage1.k_s1 * unit.output_ratio**2
+    return 2.0 * math.sqrt(stiffness * unit.load.J_L)
+
+
+def shaft_critical(unit: Unit) -> float:
+    """The same of shaft 1, N.m.s/rad."""
+    return load_critical(unit) / unit.output_ratio**2
+
+
+def stall_torque(unit: Unit) -> float:
+    """Torque at the load for 1 V at the amplifier, a natural scale of load torques, N.m."""
+    motor = unit.motor
+    ratio = unit.stage1.N_1 * unit.output_ratio
+    # A current-controlled amplifier makes a current of the command, without a resistance.
+    return unit.electronics.k_a * motor.k_t / (motor.R_m or 1.0) * ratio
+
+
+def shaft_at_load(unit: Unit) -> float:
+    """Stiffness of shaft 1 as the load sees it, N.m/rad."""
+    return unit.stage1.k_s1 * unit.output_ratio**2

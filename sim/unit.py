@@ -11,6 +11,7 @@ from daq.errors import ConfigurationError
 from daq.untrusted.toml_files import read_toml
 from sim.datasheet.plausibility import find_impossible
 from sim.drive.unit import StageBacklash, Unit, stage_backlash, unit_from_mapping
+from sim.own_effects.sources import read_sources
 
 __all__ = ["StageBacklash", "Unit", "load_unit", "stage_backlash", "unit_from_mapping"]
 
@@ -21,11 +22,14 @@ def load_unit(name_or_path: str) -> Unit:
     Raises
     ------
     ConfigurationError
-        If the file is not there, is not TOML, or any value in it is wrong or cannot be.
+        If the file is not there, is not TOML, or any value in it is wrong or cannot be; or if it
+        names files of its own effects and nobody allowed these (`sim.own_effects`).
     """
     path = config_path("units", name_or_path)
     unit = unit_from_mapping(read_toml(path), source=str(path))
     impossible = find_impossible(unit)
     if impossible:
         raise ConfigurationError(f"{path}: values that cannot be: {'; '.join(impossible)}")
-    return unit
+    if unit.own_effects is None:
+        return unit
+    return unit.with_effect_sources(read_sources(path, unit.own_effects.files))

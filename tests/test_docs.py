@@ -9,19 +9,15 @@ from importlib import import_module
 from pathlib import Path
 
 import api_page
-import numpy as np
 import pytest
 from links import broken_links
 from outputs.printed import Newcomer, mentions, pages, pieces, stocked_history
 
-from analysis.ensemble.model import every_single_cause
 from daq.analyser import SourceState
-from daq.formats import read_response
 from daq.plan import SweepPlan
 from daq.store import Store
 from daq.store_records import MeasurementHeader
-from sim.catalogue import CATALOGUE
-from sim.unit import load_unit
+from sim.catalogue import BUILT_IN
 from tui import cli
 
 ROOT = Path(__file__).parents[1]
@@ -210,31 +206,14 @@ def test_the_citation_is_of_this_version():
 def test_the_physics_tells_of_every_effect():
     page = (ROOT / "docs" / "physics.md").read_text(encoding="utf-8")
     table = page[page.index("| effect |") : page.index("## Symbols")]
-    assert re.findall(r"^\| ([a-z0-9-]+) \|", table, re.MULTILINE)[2:] == list(CATALOGUE)
+    assert re.findall(r"^\| ([a-z0-9-]+) \|", table, re.MULTILINE)[2:] == list(BUILT_IN)
 
 
-def test_the_effect_of_the_page_needs_nothing_but_its_entry(monkeypatch, tmp_path):
+def test_the_effect_of_the_page_is_the_file_of_the_example():
     (code,) = [text for kind, text in pieces(ROOT / "docs/your-own-gimbal.md") if kind == "python"]
+    file = (ROOT / "docs/examples/own-effect/tight_bearing.py").read_text(encoding="utf-8")
+    assert code == file.partition("\n\n")[2]
     assert len(code.splitlines()) < 30
-    names = {}
-    exec(code, names)
-    effect = names["tight_bearing"]
-    for module in ("sim.effects", "analysis.ensemble.model"):
-        name = f"{module}.CATALOGUE"
-        monkeypatch.setattr(name, {**CATALOGUE, effect.id: effect})
-    unit = load_unit("adss")
-    assert effect.id in [cause.effects[0] for cause in every_single_cause(unit)]
-    words = ["simulate", "--unit", "adss", "--ratio", "0.3", "--level", "2.5", "--start", "110"]
-    words += ["--stop", "150", "--points", "3", "--settle-cycles", "5", "--integrate-cycles", "5"]
-    plain, tight = tmp_path / "plain.csv", tmp_path / "tight.csv"
-    assert cli.main([*words, "--out", str(plain)]) == 0
-    wanted = [*words, "--effect", f"{effect.id}:T_f_g1=0.1", "--out"]
-    assert cli.main([*wanted, str(tight)]) == 0
-    difference = read_response(tight).gain_db - read_response(plain).gain_db
-    assert np.abs(difference).max() > 1.0
-    none = [*words, "--effect", f"{effect.id}:T_f_g1=0", "--out"]
-    assert cli.main([*none, str(tight)]) == 0
-    np.testing.assert_allclose(read_response(tight).gain_db, read_response(plain).gain_db, atol=0.5)
 
 
 SAYS = {

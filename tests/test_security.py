@@ -43,9 +43,12 @@ def dangers(source: str) -> list[str]:
 
 
 def test_nothing_in_the_package_can_run_what_it_reads():
+    """But for one place: effects of a unit's own, which a person asks for (--trust-effects)."""
     assert len(SOURCES) > 150
-    assert {str(path): dangers(path.read_text()) for path in SOURCES
-            if dangers(path.read_text())} == {}  # fmt: skip
+    found = {str(path.relative_to(ROOT)): dangers(path.read_text()) for path in SOURCES}
+    allowed = found.pop("sim/own_effects/definitions.py")
+    assert allowed == ["compile"]
+    assert {path: names for path, names in found.items() if names} == {}
 
 
 @pytest.mark.parametrize(

@@ -15,9 +15,11 @@ if __name__ == "__main__":
 
 import errno
 import logging
+import os
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib.metadata import version
 
 from cyclopts import App, CycloptsError, MissingArgumentError, Parameter
@@ -30,6 +32,9 @@ from tui.text.output import Console, hush
 from tui.verbs import EPILOGUE, FRONT_PAGES, SUMMARY, VERBS, front_page
 
 __all__ = ["VERBS", "build_app", "main"]
+
+TRUST_EFFECTS = "LASHBENCH_TRUST_EFFECTS"
+"""As `sim.own_effects.TRUST`, which takes time to import."""
 
 _USAGE = 2
 _OF_THE_SYSTEM = {
@@ -72,8 +77,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug, words = _switch("--debug", words)
     quiet, words = _switch("--quiet", words)
+    trusts, words = _switch("--trust-effects", words)
     console = Console(quiet)
     silence()
+    with _trusting_effects(trusts):
+        return _logged(words, console, debug)
+
+
+@contextmanager
+def _trusting_effects(trusts: bool) -> Iterator[None]:
+    """Let effect files of unit files be executed, here and in processes that are started."""
+    before = os.environ.get(TRUST_EFFECTS)
+    if trusts:
+        os.environ[TRUST_EFFECTS] = "1"
+    try:
+        yield
+    finally:
+        if trusts:
+            os.environ.pop(TRUST_EFFECTS)
+            os.environ.update({} if before is None else {TRUST_EFFECTS: before})
+
+
+def _logged(words: list[str], console: Console, debug: bool) -> int:
+    """Run a command, with a log file if one is asked for."""
     try:
         level, words = _log_level(words)
     except LashbenchError as error:

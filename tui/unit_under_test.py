@@ -53,14 +53,17 @@ def read_unit(
     Raises
     ------
     ConfigurationError
-        If there is no such unit, or a value in it is wrong or cannot be.
+        If there is no such unit, a value in it is wrong or cannot be, or an effect of its own is
+        wrong or not trusted.
     InputError
         If a tolerance is no share.
     """
     from sim.datasheet import find_impossible, find_unusual
+    from sim.own_effects.trial import try_own_effects
     from sim.unit import load_unit
 
     unit = load_unit(name_or_path)
+    try_own_effects(unit)
     if settings:
         unit = unit.with_parameters(**settings)
     unit = unit.with_tolerance(tolerance_shares(tolerance))

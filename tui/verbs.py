@@ -48,8 +48,9 @@ VERBS = {
 
 SUMMARY = "Bench application for geared servos: how much backlash sits in each gear stage."
 EPILOGUE = (
-    "Every command also takes --quiet (no narration), --debug (trace of an error) and "
-    "--log-level debug|info|warning|error (write the log file)."
+    "Every command also takes --quiet (no narration), --debug (trace of an error), "
+    "--log-level debug|info|warning|error (write the log file) and --trust-effects (execute the "
+    "Python files of effects that a unit file names)."
 )
 
 FRONT_PAGES = (["--help"], ["-h"], ["--version"])

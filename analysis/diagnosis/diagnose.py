@@ -45,6 +45,7 @@ from analysis.selection.datasheet_test import compare_with_datasheet
 from analysis.selection.verdict import Judged, Verdict, judge_candidates
 from daq.errors import AnalysisError
 from daq.frf import FrequencyResponse
+from sim.catalogue import CATALOGUE
 from sim.engine.effort import counting
 from sim.unit import Unit
 
@@ -293,11 +294,12 @@ def _warnings(diagnosis: Diagnosis) -> tuple[str, ...]:
     if trusts_much(diagnosis.believed) and (diagnosis.verdict.word == "unexplained" or any(near)):
         found.append(HINT)
     if diagnosis.lent_by:
-        one_stage = diagnosis.verdict.baseline.candidate.hypothesis.unit.stages == 1
-        way_on = "" if one_stage else "; train its own: lashbench prepare --unit FILE"
+        own = CATALOGUE.own_of(diagnosis.verdict.baseline.candidate.hypothesis.unit)
+        unasked = f", and did not ask for {', '.join(own)}" if own else ""
         found.append(
             f"no posterior was trained for unit {diagnosis.unit}: that of {diagnosis.lent_by} "
-            f"chose what was simulated, and may have missed the cause{way_on}"
+            f"chose what was simulated, and may have missed the cause{unasked}; train its own: "
+            "lashbench prepare --unit FILE"
         )
     if len(observation.levels) == 1:
         halves = len(observation.blocks) == 1

@@ -21,7 +21,7 @@ from analysis.inference.network import Architecture
 from daq.configs import posterior_folder
 from daq.formats.atomic import replacing
 from daq.untrusted.trust import own_folder, read_own
-from sim.catalogue import CATALOGUE
+from sim.catalogue import BUILT_IN
 from sim.unit import Unit
 
 __all__ = [
@@ -61,7 +61,7 @@ class Checkpoint:
 
 def posterior_name(unit: Unit) -> str:
     """File name of a unit's posterior, another for everything that it depends on."""
-    effects = {e.id: [p.name for p in e.parameters] for e in CATALOGUE.values()}
+    effects = {e.id: [p.name for p in e.parameters] for e in BUILT_IN.values()}
     text = json.dumps([EDITION, effects, unit.physics], sort_keys=True)
     return f"posterior-{hashlib.sha256(text.encode()).hexdigest()[:24]}.npz"
 

@@ -165,12 +165,9 @@ class Posterior:
         return SetPosterior(names, probability, ratio / ratio.sum(), sizes)
 
 
-def lent_checkpoint(unit: Unit, borrowed: bool = True) -> Checkpoint | None:
-    """A posterior of another unit, trained for the causes and values of the paper's units.
-
-    Not `borrowed`: one that training for this unit may begin with, as it has the same.
-    """
-    prior = Prior(unit, borrowed=borrowed)
+def lent_checkpoint(unit: Unit) -> Checkpoint | None:
+    """A posterior of another unit, trained for the causes and values of the paper's units."""
+    prior = Prior(unit, borrowed=True)
     counts = len(prior.effects), len(prior.parameters), len(prior.symbols)
     for one in shipped_checkpoints():
         shape = one.shape

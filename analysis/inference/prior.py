@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.ensemble.machine import Machine
-from sim.catalogue import CATALOGUE, EffectParameter, not_of_unit
+from sim.catalogue import BUILT_IN, CATALOGUE, EffectParameter, effects_of
 from sim.effects import EffectSetting
 from sim.response import START_SPREAD, Servo
 from sim.unit import Unit
@@ -28,9 +28,9 @@ COUNTS = (0.12, 0.38, 0.38, 0.12)
 _RARE_WEIGHT = 0.3
 """How often a rare effect is drawn, beside a usual one."""
 
-_EXACT = ("N_1", "N", "b_t_deg", "filter_numerator")
-"""Datasheet values without tolerance: gear ratios are counted, total backlash is a cause of its
-own, and the filter's gain at rest is that of the tachometer."""
+_EXACT = ("N_1", "N", "filter_numerator")
+"""Datasheet values without tolerance: gear ratios are counted, and the filter's gain at rest is
+that of the tachometer. Total backlash has none either: it is a cause of its own."""
 
 _TABLE_1 = (
     "L_a", "R_m", "k_b", "k_t", "J_m", "B_m", "T_f_m", "k_a", "k_ts", "k_g1", "J_g1", "k_s1",
@@ -89,13 +89,13 @@ class Prior:
         """Datasheet values that may deviate."""
         if self.borrowed:
             return _TABLE_1
-        return tuple(s for s, v in self.unit.parameters.items() if s not in _EXACT and v != 0.0)
+        known, may_deviate = self.unit.parameters, self.unit.tolerances
+        return tuple(s for s in may_deviate if s not in _EXACT and known[s] != 0.0)
 
     @cached_property
     def effects(self) -> tuple[str, ...]:
-        """Effects that this unit can have, in the order of the catalogue."""
-        foreign = {} if self.borrowed else not_of_unit(self.unit)
-        return tuple(effect for effect in CATALOGUE if effect not in foreign)
+        """Effects that this unit can have, in the order of the catalogue, its own last."""
+        return tuple(BUILT_IN) if self.borrowed else effects_of(self.unit)
 
     @cached_property
     def weights(self) -> NDArray[np.float64]:

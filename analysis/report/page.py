@@ -212,7 +212,9 @@ def _doubts(data: Mapping[str, Any], unit: Unit) -> list[str]:
 
 def _other_unit(text: str, unit: Unit) -> bool:
     try:
-        return unit_from_mapping(tomllib.loads(text), source="unit as measured") != unit
+        measured = unit_from_mapping(tomllib.loads(text), source="unit as measured")
+        # What the files say: not what an option overrides.
+        return measured.model_dump() != unit.model_dump()
     except (ConfigurationError, tomllib.TOMLDecodeError):
         # What cannot be read any more is another file at any rate.
         return True

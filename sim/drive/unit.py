@@ -26,6 +26,7 @@ from sim.drive.sections import (
     Sensor,
     find_contradiction,
 )
+from sim.own_effects.sources import EffectSource, OwnEffects, announce
 from sim.tolerance import Share, believed_shares, find_fault
 
 __all__ = ["StageBacklash", "Unit", "stage_backlash", "unit_from_mapping"]
@@ -34,7 +35,10 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
-NO_PHYSICS = {"schema_", "schema", "name", "limits", "acceptance", "tolerance", "commissioning"}
+NO_PHYSICS = {
+    "schema_", "schema", "name", "limits", "acceptance", "tolerance", "commissioning",
+    "own_effects",
+}  # fmt: skip
 """Sections of a unit that do not decide how it moves."""
 
 
@@ -155,8 +159,15 @@ class Unit(_Section):
     """One standard deviation of datasheet values, as a share, by symbol or ``default``."""
     commissioning: Commissioning | None = None
     """Where the values and their tolerance come from, if not from a datasheet."""
+    own_effects: OwnEffects | None = None
     _override: dict[str, float] = PrivateAttr(default_factory=dict)
     """The same, as told on a command line in place of the file."""
+    _sources: tuple[EffectSource, ...] = PrivateAttr(default=())
+    """What the files of `own_effects` hold; empty where they were not read, as of a stored unit."""
+
+    def __setstate__(self, state: dict[Any, Any]) -> None:
+        super().__setstate__(state)
+        announce(self._sources)
 
     @model_validator(mode="after")
     def _has_no_contradiction(self) -> Self:
@@ -230,6 +241,17 @@ class Unit(_Section):
         }
 
     @property
+    def effect_sources(self) -> tuple[EffectSource, ...]:
+        """Its files of further effects; empty where they were not read, as of a stored unit."""
+        return self._sources
+
+    def with_effect_sources(self, sources: tuple[EffectSource, ...]) -> Unit:
+        """A copy with the files of its own effects."""
+        copy = self.model_copy()
+        copy._sources = sources
+        return copy
+
+    @property
     def tolerances(self) -> dict[str, float]:
         """What is believed of the datasheet: one standard deviation of each value, as a share."""
         return {symbol: share for symbol, (share, _) in self.believed.items()}
@@ -263,10 +285,15 @@ class Unit(_Section):
     def physics(self) -> dict[str, Any]:
         """What decides how it moves, as JSON: not its name, limits, tolerance or commissioning.
 
+        Files of its own effects count by their digests.
+
         Whatever is stored of a unit, and every seed, depends on this alone.
         """
         known = self.model_dump(mode="json", exclude=NO_PHYSICS)
-        return {k: v for k, v in known.items() if v is not None or k not in OPTIONAL_SECTIONS}
+        known = {k: v for k, v in known.items() if v is not None or k not in OPTIONAL_SECTIONS}
+        if self._sources:
+            known["own_effects"] = [source.digest for source in self._sources]
+        return known
 
     def with_parameters(self, **changes: float) -> Unit:
         """A copy with some parameters changed by symbol, checked like a file.
@@ -291,6 +318,7 @@ class Unit(_Section):
                     section[symbol] = float(value)
         changed = unit_from_mapping(document, source=f"unit {self.name}")
         changed._override = dict(self._override)
+        changed._sources = self._sources
         return changed
 
 

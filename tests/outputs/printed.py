@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager, redirect_stdout
 from io import StringIO
 from pathlib import Path
+from unittest.mock import patch
 
 from instruments.bench_server import gimbal_analyser, served, serving
 from markdown_it import MarkdownIt
@@ -181,6 +182,8 @@ class Newcomer:
 
     def _parse(self, words: list[str], line: str) -> str:
         """Read a line that is not run; what it would write counts as being there."""
+        trusted = {"LASHBENCH_TRUST_EFFECTS": "1"} if "--trust-effects" in words else {}
+        words = [word for word in words if word != "--trust-effects"]
         _bound(words)
         for word in words[1:2]:
             known = word.startswith("-") or word.isdecimal() or word in self._written
@@ -188,7 +191,8 @@ class Newcomer:
         if "--unit" in words:
             from sim.unit import load_unit
 
-            load_unit(words[words.index("--unit") + 1])
+            with patch.dict(os.environ, trusted):
+                load_unit(words[words.index("--unit") + 1])
         options = zip(words, words[1:], strict=False)
         self._written |= {word for option, word in options if option in ("--out", "--db")}
         return ""

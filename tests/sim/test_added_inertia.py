@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from sim.catalogue import CATALOGUE
+from sim.catalogue import BUILT_IN
 from sim.effects import EffectSetting, drivetrain_with
 from sim.engine.system import PiecewiseLinearSystem
 from sim.unit import Unit, load_unit
 
 FREQUENCIES = np.geomspace(10.0, 400.0, 9)
-AT_LOAD = {name: effect for name, effect in CATALOGUE.items() if effect.added_inertia is not None}
+AT_LOAD = {name: effect for name, effect in BUILT_IN.items() if effect.added_inertia is not None}
 
 
 def system(unit: Unit, *effects: EffectSetting) -> PiecewiseLinearSystem:

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from sim.catalogue import CATALOGUE
+from sim.catalogue import BUILT_IN
 
 PAGE = Path(__file__).parents[2] / "docs" / "effects.md"
 
@@ -10,8 +10,8 @@ PAGE = Path(__file__).parents[2] / "docs" / "effects.md"
 def test_every_effect_stands_on_the_page_with_its_parameters():
     rows = [line.split("|") for line in PAGE.read_text().splitlines() if line.startswith("| ")]
     listed = {row[1].strip(): row for row in rows[2:]}
-    assert list(listed) == list(CATALOGUE)
-    for identifier, effect in CATALOGUE.items():
+    assert list(listed) == list(BUILT_IN)
+    for identifier, effect in BUILT_IN.items():
         row = listed[identifier]
         assert [f"`{p.name}` [{p.unit_symbol}]" for p in effect.parameters] == [
             cell.strip() for cell in row[2].split(",")

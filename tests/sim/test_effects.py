@@ -8,7 +8,7 @@ from oracle import rk4
 from worlds.side_by_side import ADSS, EDSS, departure, drive, engine_gain, half_plays
 
 from daq.errors import ConfigurationError
-from sim.catalogue import CATALOGUE
+from sim.catalogue import BUILT_IN
 from sim.effects import EffectSetting, drivetrain_with, parse_effect
 
 QUIET = {"c_s1": 0.02, "c_g1": 0.8, "c_2": 2.0}
@@ -83,7 +83,7 @@ def without():
 
 
 def test_every_effect_of_the_catalogue_is_held_against_the_oracle():
-    assert [identifier(text) for text in CASES] == list(CATALOGUE)
+    assert [identifier(text) for text in CASES] == list(BUILT_IN)
 
 
 @pytest.mark.parametrize("text", CASES)
@@ -109,7 +109,7 @@ def test_torque_bias_makes_even_harmonics_and_a_clip_odd_ones(without):
 
 
 def ends(unit):
-    for effect in CATALOGUE.values():
+    for effect in BUILT_IN.values():
         for end in (0, 1):
             yield EffectSetting(effect.id, {p.name: p.range(unit)[end] for p in effect.parameters})
 
@@ -117,7 +117,7 @@ def ends(unit):
 def everything(unit, end):
     """Every effect at once, at one end of its range."""
     return [s for s in ends(unit) if s.values == {
-        p.name: p.range(unit)[end] for p in CATALOGUE[s.id].parameters}]  # fmt: skip
+        p.name: p.range(unit)[end] for p in BUILT_IN[s.id].parameters}]  # fmt: skip
 
 
 @pytest.mark.parametrize("unit", [ADSS, EDSS], ids=["adss", "edss"])
@@ -162,7 +162,7 @@ def test_effects_leave_the_paper_model_and_its_unit_alone():
 
 
 def test_catalogue_entries_are_whole():
-    for key, effect in CATALOGUE.items():
+    for key, effect in BUILT_IN.items():
         assert key == effect.id
         assert (effect.on_unit is None) != (effect.on_drivetrain is None)
         assert effect.meaning.endswith(".")
@@ -173,13 +173,13 @@ def test_catalogue_entries_are_whole():
 
 
 @given(
-    effect=st.sampled_from(sorted(CATALOGUE)),
+    effect=st.sampled_from(sorted(BUILT_IN)),
     share=st.floats(0.0, 1.0),
     spaces=st.sampled_from(["", " "]),
 )
 def test_what_is_written_is_what_is_read(effect, share, spaces):
     values = {}
-    for parameter in CATALOGUE[effect].parameters:
+    for parameter in BUILT_IN[effect].parameters:
         low, high = parameter.range(ADSS)
         values[parameter.name] = low + share * (high - low)
     text = ",".join(f"{spaces}{name}={value!r}" for name, value in values.items())

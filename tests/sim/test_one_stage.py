@@ -9,7 +9,7 @@ import pytest
 from daq.configs import config_path
 from daq.errors import ConfigurationError
 from daq.plan import SweepPlan
-from sim.catalogue import CATALOGUE
+from sim.catalogue import BUILT_IN
 from sim.drivetrain import paper_drivetrain
 from sim.effects import EffectSetting, drivetrain_with
 from sim.response import Servo, simulate_cycles
@@ -85,7 +85,7 @@ def test_all_of_the_play_sits_in_its_one_stage():
 
 
 def test_every_effect_but_that_of_mesh_2_has_its_place():
-    for identifier, effect in CATALOGUE.items():
+    for identifier, effect in BUILT_IN.items():
         setting = EffectSetting(
             identifier, {p.name: 0.5 * sum(p.range(ONE)) for p in effect.parameters}
         )

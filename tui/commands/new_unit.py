@@ -126,10 +126,13 @@ def _tell_of(out: Path, asked: bool, console: Console) -> None:
 
 
 def _describe(path: Path, console: Console) -> None:
+    from sim.catalogue import CATALOGUE
     from sim.datasheet import describe_chain, find_unusual
+    from sim.own_effects.trial import try_own_effects
     from sim.unit import load_unit
 
     unit = load_unit(str(path))
+    own = [f"own effect {name}: {CATALOGUE[name].meaning}" for name in try_own_effects(unit)]
     warnings = [f"warning: {text}" for text in find_unusual(unit)]
-    lines = [f"unit {unit.name}", *describe_chain(unit), *(warnings or ["no warnings"])]
+    lines = [f"unit {unit.name}", *describe_chain(unit), *own, *(warnings or ["no warnings"])]
     console.data("\n".join(lines))

@@ -73,6 +73,16 @@ def test_machines_of_group_share_linear_part(prior):
             np.testing.assert_array_equal(system.o, systems[0].o)
 
 
+@pytest.mark.parametrize("name", ["irb", "r3-1", "walkman-b11"])
+def test_every_machine_of_a_drive_that_is_not_the_papers_can_be_built(name):
+    """Counts, clock and current limit of a drive are no values of a datasheet that deviate."""
+    unit, rng = load_unit(name), np.random.default_rng(4)
+    drawn = [one for _ in range(10) for one in Prior(unit).draw_group(2, rng)]
+    for one in drawn:
+        one.machine.servo(unit)
+    assert {symbol for one in drawn for symbol, _ in one.machine.deviations} <= set(unit.tolerances)
+
+
 def test_reference_is_linear_response_far_from_resonance(prior):
     """Without friction and play the loss factor matters at resonances only."""
     frequency_hz = np.array([12.0, 20.0, 30.0])

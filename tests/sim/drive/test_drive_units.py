@@ -9,7 +9,7 @@ from worlds import drives
 from analysis.ensemble.model import every_single_cause
 from daq.configs import config_names
 from daq.errors import ConfigurationError
-from sim.catalogue import CATALOGUE, not_of_unit
+from sim.catalogue import BUILT_IN, not_of_unit
 from sim.datasheet import describe_chain, find_impossible, natural_frequencies
 from sim.drawn_effects import draw_effect
 from sim.drivetrain import paper_drivetrain
@@ -103,7 +103,7 @@ def test_what_a_drive_cannot_have_is_refused_and_named():
 def test_every_other_effect_can_be_had_by_every_drive(name):
     unit = drives.unit(drives.DRIVES[name])
     foreign = not_of_unit(unit)
-    for effect in CATALOGUE.values():
+    for effect in BUILT_IN.values():
         if effect.id not in foreign:
             ends = {p.name: sum(p.range(unit)) / 2.0 for p in effect.parameters}
             drivetrain_with(unit, 0.5, [EffectSetting(effect.id, ends)]).system()

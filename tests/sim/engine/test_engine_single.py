@@ -6,7 +6,7 @@ from worlds.permutation import permutation_p
 from worlds.side_by_side import ADSS, EDSS, FRICTIONLESS, departure, drive, engine_gain
 
 from daq.plan import SweepPlan
-from sim.catalogue import CATALOGUE
+from sim.catalogue import BUILT_IN
 from sim.drivetrain import paper_drivetrain
 from sim.effects import EffectSetting, drivetrain_with, parse_effect
 from sim.engine import propagator, stepping
@@ -55,11 +55,11 @@ def test_agrees_with_double_where_motion_is_periodic(unit, ratio, damped, freque
     assert degree < 0.1
 
 
-@pytest.mark.parametrize("effect", sorted(CATALOGUE))
+@pytest.mark.parametrize("effect", sorted(BUILT_IN))
 @pytest.mark.parametrize("unit", [ADSS, EDSS], ids=["adss", "edss"])
 def test_every_effect_is_the_same_for_as_long_as_a_start_is_remembered(unit, effect):
     sizes = {}
-    for p in CATALOGUE[effect].parameters:
+    for p in BUILT_IN[effect].parameters:
         low, high = p.range(unit)
         sizes[p.name] = np.sqrt(max(low, 0.01 * high) * high)
     system = drivetrain_with(unit, 0.4, [EffectSetting(effect, sizes)]).system()

@@ -76,7 +76,6 @@ def test_one_that_was_interrupted_goes_on(tmp_path, monkeypatch):
         (["--unit", "adss", "--level", "2"], "--start, --stop, --points is missing"),
         (["--unit", "adss", *SHORT, "--machines", "10"], "--machines"),
         (["--unit", "adss", "--machines", "0"], "0 is too few"),
-        (["--unit", str(config_path("templates", "one-stage"))], "one gear stage"),
         (["--unit", "adss", *SHORT[:-2]], "--points is missing"),
         (["x.csv", "--unit", "adss", "--start", "2"], "not both"),
         (["x.csv", "--unit", "adss", "--level", "2", "--level", "3"], "give --level once"),
@@ -139,9 +138,9 @@ def test_on_a_disk_without_room_nothing_is_simulated(small_disk, monkeypatch, ca
 
 
 def test_the_posterior_of_a_unit_is_trained_for_every_sweep(run, cache):
-    """Of another unit than the shipped ones; a second call finds it and trains no further."""
+    """Of one with fewer stages and effects; a second call finds it and trains no further."""
     pytest.importorskip("jax", reason="training needs the extra `train`")
-    unit = config_path("templates", "two-stage")
+    unit = config_path("templates", "one-stage")
     words = ["prepare", "--unit", str(unit), "--machines", "90", "--json"]
     code, out, err = run(*words, history=False)
     assert code == 0
