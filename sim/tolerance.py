@@ -1,29 +1,68 @@
 """How far the values of a datasheet may be off: which have a tolerance, and what is believed.
 
-Owns the names of ``[tolerance]`` in a unit file and of ``--tolerance``, the shares that are
-taken where nobody gives one, and which of several counts. What follows from them is the analysis's.
+Owns the names of ``[tolerance]`` in a unit file and of ``--tolerance``, the shares by kind that are
+taken where nobody gives one, how limits with a distribution become a standard deviation, and which
+of several counts. What follows from them is the analysis's.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field, ValidationError
+
+from daq.untrusted.toml_files import Positive, Section
 
 __all__ = ["DEFAULT", "MOST", "RESPONSE_SCALES", "USUAL", "Share", "believed_shares", "find_fault"]
 
 MOST = 0.5
 """Largest tolerance: a value that is known no better is not known."""
 
-Share = Annotated[float, Field(ge=0, le=MOST)]
+_DIVISORS = {"uniform": math.sqrt(3.0), "triangular": math.sqrt(6.0), "normal": 1.96}
+"""Half-width over standard deviation (JCGM 100:2008, 4.3); limits of a normal one hold 95 %."""
+
+
+class _Limits(Section):
+    """Limits of a datasheet value: it is off by no more than so large a share."""
+
+    within: Positive
+    distribution: Literal["uniform", "triangular", "normal"] = "uniform"
+
+
+def _standard_deviation(value: Any) -> Any:
+    """Limits as one standard deviation; what is none stays, to be checked as a number."""
+    if not isinstance(value, Mapping):
+        return value
+    try:
+        limits = _Limits.model_validate(dict(value))
+    except ValidationError as error:
+        keys = ", ".join(".".join(map(str, fault["loc"])) for fault in error.errors())
+        raise ValueError(
+            f"{keys}: limits are written {{ within = 0.1, distribution = "
+            '"uniform" }, or triangular, or normal'
+        ) from None
+    return limits.within / _DIVISORS[limits.distribution]
+
+
+Share = Annotated[float, BeforeValidator(_standard_deviation), Field(ge=0, le=MOST)]
 """One standard deviation of a datasheet value, as a share of it."""
 
 DEFAULT = "default"
 """Key of the tolerance of all values that none is given for."""
 
 USUAL = 0.05
-"""Of a datasheet of which nobody said how good it is."""
+"""Of a value of which nobody said how good it is, and which is of no kind below."""
+
+_BY_KIND = {
+    **dict.fromkeys(("R_m", "k_t", "k_b"), 0.08),
+    **dict.fromkeys(("L_a", "J_m", "J_g1", "J_s1", "J_p2", "J_cm", "J_cL", "bandwidth_hz"), 0.10),
+    **dict.fromkeys(("k_g1", "k_s1", "k_2", "k_cm", "k_cL"), 0.15),
+    **dict.fromkeys(("B_m", "T_f_m", "T_f_L", "B_L", "c_s1", "c_g1", "c_2", "c_cm", "c_cL"), 0.30),
+}
+"""By kind: windings and magnets, inertias, stiffness, friction and damping. Gains and the load are
+known better."""
 
 _EXACT = ("filter_numerator", "N_1", "N", "delay_s")
 """Teeth are counted, the filter's gain is the tachometer's, and a delay is so many samples: no
@@ -47,14 +86,15 @@ def believed_shares(
     """One standard deviation of each value that has one, as a share, and where it comes from.
 
     ``option``, ``unit file`` or ``default``. A name counts before ``default``, an option before
-    the file.
+    the file, and what nobody gives is taken by the kind of the value.
     """
     found = {}
     for symbol in _tolerated(parameters):
         keys = (symbol,) if symbol in _EXACT else (symbol, DEFAULT)
         told = ((options, "option"), (file, "unit file"))
         given = [(shares[k], origin) for shares, origin in told for k in keys if k in shares]
-        found[symbol] = (*given, (0.0 if symbol in _EXACT else USUAL, "default"))[0]
+        usual = 0.0 if symbol in _EXACT else _BY_KIND.get(symbol, USUAL)
+        found[symbol] = (*given, (usual, "default"))[0]
     return found
 
 

@@ -27,8 +27,11 @@ _LINES = 5
 _ORIGINS = {
     "option": "by --tolerance",
     "unit file": "by the unit file",
-    "default": "by default; say otherwise under [tolerance] in the unit file, or by --tolerance",
+    "default": "by default",
 }
+
+_SAY_OTHERWISE = "; say otherwise under [tolerance] in the unit file, or by --tolerance)"
+"""End of the first line of what is believed by default."""
 
 
 def believed_document(unit: Unit) -> dict[str, Any]:
@@ -62,6 +65,15 @@ def believed_lines(document: Mapping[str, Any]) -> list[str]:
         named = rest if number == len(ranked) and len(symbols) > 1 else ", ".join(symbols)
         by = f" ({_ORIGINS[origin]})" if origin in _ORIGINS else ""
         lines.append(f"datasheet believed {said}: {named}{by}")
+    return _with_hint(lines)
+
+
+def _with_hint(lines: list[str]) -> list[str]:
+    """Say once what to do about what is believed by default."""
+    end = f" ({_ORIGINS['default']})"
+    first = next((number for number, line in enumerate(lines) if line.endswith(end)), None)
+    if first is not None:
+        lines[first] = lines[first].removesuffix(")") + _SAY_OTHERWISE
     return lines
 
 
@@ -77,7 +89,7 @@ def _ranges(alike: Mapping[tuple[float, str], Sequence[str]]) -> list[str]:
             f"datasheet believed to {100.0 * least:.2g} % ({best}) to {100.0 * most:.2g} % "
             f"({worst}), {len(known)} values{by}"
         )
-    return lines
+    return _with_hint(lines)
 
 
 def trusts_much(document: Mapping[str, Any]) -> bool:

@@ -1,7 +1,9 @@
 """The tolerance of a datasheet: what a unit file, an option and neither of them make of it."""
 
+import re
 import tomllib
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -30,17 +32,70 @@ def test_the_shipped_units_are_believed_to_half_a_per_cent_in_six_values(name):
         assert origin == ("default" if symbol in EXACT else "unit file")
 
 
-def test_a_file_that_says_nothing_is_believed_to_five_per_cent_but_for_teeth():
-    believed = unit_with(None).believed
+KINDS = {
+    0.08: {"R_m", "k_t", "k_b"},
+    0.10: {"L_a", "J_m", "J_g1", "J_s1", "J_p2"},
+    0.15: {"k_g1", "k_s1", "k_2"},
+    0.30: {"B_m", "T_f_m", "T_f_L"},
+    0.05: {"k_a", "k_ts", "J_L"},
+    0.0: set(EXACT),
+}
+
+
+@pytest.mark.parametrize("tolerance", [None, {}, {"R_m": 0.2}])
+def test_a_value_of_which_a_file_says_nothing_is_believed_by_its_kind(tolerance):
+    believed = unit_with(tolerance).believed
     assert "b_t_deg" not in believed
-    assert set(believed) == set(load_unit("adss").parameters) - {"b_t_deg"}
+    expected = {symbol: share for share, symbols in KINDS.items() for symbol in symbols}
     for symbol, (share, origin) in believed.items():
-        assert (share, origin) == (0.0 if symbol in EXACT else 0.05, "default")
+        if symbol in (tolerance or {}):
+            assert (share, origin) == (0.2, "unit file")
+        else:
+            assert (share, origin) == (expected.pop(symbol), "default")
+    assert set(expected) == set(tolerance or {})
+
+
+@pytest.mark.parametrize("name", ["one-stage", "two-stage"])
+def test_a_new_file_tells_what_is_believed_by_kind(name):
+    text = config_path("templates", name).read_text(encoding="utf-8")
+    unit = unit_from_mapping(tomllib.loads(text), name)
+    assert {origin for _, origin in unit.believed.values()} == {"default"}
+    (said,) = re.findall(r"kind: (.*?)\. Counted", text, re.DOTALL)
+    assert [float(word) for word in re.findall(r"0\.\d+", said)] == [0.08, 0.10, 0.15, 0.30, 0.05]
+
+
+@given(
+    st.floats(1e-6, 0.5),
+    st.sampled_from([("uniform", 3.0**0.5), ("triangular", 6.0**0.5), ("normal", 1.96)]),
+)
+def test_limits_count_as_the_standard_deviation_of_their_distribution(within, kind):
+    distribution, divisor = kind
+    unit = unit_with({"R_m": {"within": within, "distribution": distribution}})
+    assert unit.believed["R_m"] == (pytest.approx(within / divisor), "unit file")
+    rng = np.random.default_rng(0)
+    drawn = {
+        "uniform": rng.uniform(-within, within, 20_000),
+        "triangular": rng.triangular(-within, 0.0, within, 20_000),
+        "normal": rng.normal(0.0, within / 1.959964, 20_000),
+    }[distribution]
+    assert unit.tolerances["R_m"] == pytest.approx(drawn.std(), rel=0.03)
+    assert unit.with_parameters(J_L=0.003).believed == unit.believed
+
+
+@pytest.mark.parametrize(
+    "value",
+    [{}, {"within": -0.1}, {"within": "a"}, {"within": 0.1, "distribution": "beta"},
+     {"within": 0.1, "sigma": 2.0}, {"within": 2.0}, {"within": True}],
+)  # fmt: skip
+def test_what_are_no_limits_is_refused_in_one_line(value):
+    with pytest.raises(ConfigurationError, match=r"mine\.toml: tolerance\.R_m") as caught:
+        unit_with({"R_m": value})
+    assert "\n" not in str(caught.value)
 
 
 def test_a_name_counts_before_the_default_and_an_option_before_the_file():
-    unit = unit_with({"default": 0.02, "R_m": 0.08, "N": 0.001, "k_a": 0})
-    assert unit.believed["R_m"] == (0.08, "unit file")
+    unit = unit_with({"default": 0.02, "R_m": 0.06, "N": 0.001, "k_a": 0})
+    assert unit.believed["R_m"] == (0.06, "unit file")
     assert unit.believed["J_L"] == (0.02, "unit file")
     assert unit.believed["N"] == (0.001, "unit file")
     assert unit.believed["N_1"] == (0.0, "default")
@@ -53,7 +108,7 @@ def test_a_name_counts_before_the_default_and_an_option_before_the_file():
     changed = told.with_parameters(R_m=5.0)
     assert changed.parameters["R_m"] == 5.0
     assert changed.believed == told.believed
-    assert unit.believed["R_m"] == (0.08, "unit file")
+    assert unit.believed["R_m"] == (0.06, "unit file")
 
 
 @given(st.sampled_from(["k_s2", "r_m", "", "b_t_deg", "filter_denominator", "J_p2 "]))

@@ -41,17 +41,20 @@ def test_every_answer_says_what_was_believed(estimate, silent, capsys):
     assert shipped["tolerance"]["J_m"] == 0.0
     assert shipped["tolerance_from"]["R_m"] == "unit file"
     usual = answer([*estimate, silent], capsys)
-    assert usual["tolerance"]["R_m"] == usual["tolerance"]["J_m"] == 0.05
+    assert (usual["tolerance"]["R_m"], usual["tolerance"]["J_m"]) == (0.08, 0.10)
     assert usual["tolerance"]["N_1"] == 0.0
     assert set(usual["tolerance_from"].values()) == {"default"}
     told = answer([*estimate, "adss", "--tolerance", "5%", "--tolerance", "R_m=0.08"], capsys)
-    assert told["tolerance"] == usual["tolerance"] | {"R_m": 0.08}
+    shares = dict.fromkeys(usual["tolerance"], 0.05) | dict.fromkeys(("N_1", "N"), 0.0)
+    assert told["tolerance"] == shares | {"R_m": 0.08, "filter_numerator": 0.0}
     assert told["tolerance_from"]["k_t"] == "option"
     # It is used: a sweep of a unit that is hardly known tells less.
     stds = [one["contribution_ratio"]["std"] for one in (shipped, usual)]
     assert stds[0] < stds[1]
     assert main([*estimate, silent]) == 0
-    assert "datasheet believed to 5 %: all values (by default" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "datasheet believed to 8 %: R_m, k_b, k_t (by default" in out
+    assert "to 30 %: B_m, T_f_m, T_f_L (by default" in out
 
 
 @pytest.mark.parametrize(
