@@ -83,18 +83,31 @@ class Analyser(Protocol):
     when a wait runs out and `InstrumentError` when the instrument complains.
     """
 
-    on_wait: Callable[[], None] | None
-    """Called at least five times a second in every wait except those of `make_safe`, and
-    immediately before every command that makes the source drive.
+    @property
+    def on_wait(self) -> Callable[[], None] | None:
+        """Called in every wait.
 
-    May raise, which ends the wait and comes out of the method that waited: this
-    is how a session interrupts a point that takes long. None does nothing.
-    """
-    on_exchange: Callable[[float], None] | None
-    """Told before each exchange, those of `make_safe` included, how long it may take, s.
+        At least five times a second, except in the waits of `make_safe`, and immediately before
+        every command that makes the source drive. It may raise, which ends the wait and comes out
+        of the method that waited: this is how a session interrupts a point that takes long. None
+        does nothing.
+        """
+        ...
 
-    A watchdog hears from it that the session lives; it must not raise. None does nothing.
-    """
+    @on_wait.setter
+    def on_wait(self, look: Callable[[], None] | None, /) -> None: ...
+
+    @property
+    def on_exchange(self) -> Callable[[float], None] | None:
+        """Told before each exchange how long it may take, s.
+
+        Those of `make_safe` are included. A watchdog hears from it that the session lives; it must
+        not raise. None does nothing.
+        """
+        ...
+
+    @on_exchange.setter
+    def on_exchange(self, told: Callable[[float], None] | None, /) -> None: ...
 
     def identify(self) -> Identity:
         """Ask who is there, and refuse an instrument that cannot do the job."""

@@ -149,7 +149,7 @@ def take_trial(
 
 def check_wire(analyser: Analyser) -> Iterator[CheckLine]:
     """Say what the way to the instrument turned out not to have, and what follows."""
-    lacks = tuple(getattr(analyser, "wire_lacks", ()))
+    lacks: tuple[str, ...] = tuple(getattr(analyser, "wire_lacks", ()))
     if not lacks:
         return
     follows = {

@@ -87,7 +87,7 @@ def _at_rest(
     )
     rows = np.vstack([outlets, elastic / max(np.abs(elastic).max(), 1e-300)])
     wanted = np.vstack([where.T, np.zeros((n, len(where)))])
-    return np.linalg.lstsq(rows, wanted, rcond=None)[0]
+    return np.asarray(np.linalg.lstsq(rows, wanted, rcond=None)[0], dtype=float)
 
 
 def _held(

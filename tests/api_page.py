@@ -34,8 +34,8 @@ shapes and errors are in the docstrings (`python -m pydoc sim.response`). Exampl
 _FIELDS = 6
 """Fields of a class that are listed; its docstring has all of them."""
 
-_USUAL = ("to_json", "summary", "close")
-"""Methods that say what they do by their name."""
+_USUAL = ("to_json", "summary", "close", "model_post_init")
+"""Methods that say what they do by their name, and one of pydantic's own."""
 
 
 def page() -> str:

@@ -373,7 +373,7 @@ def _check_same_values(before: Measurement, unit: Unit) -> None:
 def _shown(value: float | tuple[float, ...] | None) -> str:
     if value is None:
         return "left out"
-    return f"{value:.12g}" if isinstance(value, float) else str(list(value))
+    return f"{value:.12g}" if isinstance(value, float | int) else str(list(value))
 
 
 def _spacing(plan: SweepPlan, asked: Spacing) -> str:

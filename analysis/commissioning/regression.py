@@ -119,7 +119,7 @@ def regress(
     basis = np.column_stack([np.ones(len(x)), summaries])
     coefficients = np.linalg.lstsq(basis, x, rcond=None)[0]
     basis_at = np.concatenate([[1.0], summary])
-    at = basis_at @ coefficients
+    at = np.asarray(basis_at @ coefficients, dtype=float)
     errors = x - basis @ coefficients
     families = len(np.unique(drawn.families))
     # Drives of a family differ little: as many say something of their own as there are families.
@@ -187,7 +187,7 @@ class _ResponseModel:
         """Least-squares estimates (n, d) of the coordinates, drawn a little to the middle."""
         right = ((y - self.centre) / self.std**2) @ self.slopes.T
         solved = np.linalg.solve(self.precision + np.eye(len(self.precision)), right.T)
-        return np.asarray(solved.T)
+        return np.asarray(solved.T, dtype=float)
 
     def remainder(self, y: Vector) -> Vector:
         """What the best coordinates leave (n, rows), over its standard deviation."""

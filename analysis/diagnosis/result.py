@@ -96,7 +96,7 @@ class Diagnosis:
     @property
     def site_probability(self) -> dict[str, float]:
         """What is believed of a fault in the "plant", in the "chain", in "both" or in "none"."""
-        believed = dict.fromkeys(("plant", "chain", "both", "none"), 0.0)
+        believed: dict[str, float] = dict.fromkeys(("plant", "chain", "both", "none"), 0.0)
         for one in self.verdict.judged:
             sites = [] if is_within_tolerance(one.candidate) else _sites(one)
             believed["none" if not sites else "both" if len(sites) > 1 else sites[0]] += (

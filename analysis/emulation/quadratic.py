@@ -123,7 +123,7 @@ class QuadraticEmulator:
                 break
         else:
             raise AnalysisError(
-                f"only {int((weight > 0).sum())} simulated machines lie near a place that "
+                f"only {np.count_nonzero(weight > 0)} simulated machines lie near a place that "
                 f"needs {needed}"
             )
         near = weight > 1e-6

@@ -43,7 +43,7 @@ class ClusterExecutor:
     def __init__(self, address: str) -> None:
         try:
             from distributed import Client
-            from distributed.comm import parse_address, parse_host_port
+            from distributed.comm.addressing import parse_address, parse_host_port
             from distributed.comm.registry import get_backend
         except ImportError as error:
             raise InputError(

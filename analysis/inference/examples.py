@@ -220,7 +220,9 @@ def read_batch(
             [conditions(batch.tolerance, batch.total_known, scatter_known, phase_known), believed],
             axis=1,
         ),
-        set=np.array([index[tuple(np.flatnonzero(e))] for e in batch.effects], dtype=np.int32),
+        set=np.array(
+            [index[tuple(np.flatnonzero(e).tolist())] for e in batch.effects], dtype=np.int32
+        ),
         chosen=batch.effects.astype(np.float32),
         ratio=batch.ratio,
         size=((np.log(np.abs(batch.sizes)) - low) / (high - low)).astype(np.float32),

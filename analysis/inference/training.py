@@ -12,10 +12,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import jax
-import jax.numpy as jnp
+import jax  # pyright: ignore[reportMissingImports] # an extra
+import jax.numpy as jnp  # pyright: ignore[reportMissingImports] # an extra
 import numpy as np
-import optax
+import optax  # pyright: ignore[reportMissingImports] # an extra
 
 from analysis.inference.examples import ROWS, Examples, Scales, read_batch
 from analysis.inference.network import Architecture, densities, set_logits, summarise

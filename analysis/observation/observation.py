@@ -175,7 +175,7 @@ def observe(*responses: FrequencyResponse) -> Observation:
     log_gain = np.log(gain)
     with np.errstate(divide="ignore"):
         log_scatter = np.where(scatter > 0, np.log(scatter), np.nan)
-    values = np.stack([log_gain.real, np.where(known, log_gain.imag, np.nan), log_scatter])
+    values = np.stack([np.real(log_gain), np.where(known, np.imag(log_gain), np.nan), log_scatter])
     values[0, drowned] = _log_above(np.abs(gain), floor)[drowned]
     values[1:, drowned] = np.nan
     return Observation(
@@ -369,8 +369,8 @@ def channels_of_readings(
     """
     scatter = 0.5 * np.log(variance + 2.0 * noise**2)
     log_gain = np.log(mean)
-    above = np.where(floor > 0.0, _log_above(np.abs(mean), floor), log_gain.real)
-    return np.stack([above, log_gain.imag, scatter], axis=-2)
+    above = np.where(floor > 0.0, _log_above(np.abs(mean), floor), np.real(log_gain))
+    return np.stack([above, np.imag(log_gain), scatter], axis=-2)
 
 
 def _log_above(gain: NDArray[np.float64], floor: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -24,6 +24,6 @@ def settled(response: FrequencyResponse) -> FrequencyResponse:
     """The response with log gain and phase rounded; what is zero or no number stays."""
     with np.errstate(divide="ignore", invalid="ignore"):
         logs = np.log(response.gain)
-        gain = np.exp(np.round(logs.real, _DECIMALS) + 1j * np.round(logs.imag, _DECIMALS))
+        gain = np.exp(np.round(np.real(logs), _DECIMALS) + 1j * np.round(np.imag(logs), _DECIMALS))
     usable = np.isfinite(logs)
     return replace(response, gain=np.where(usable, gain, response.gain))

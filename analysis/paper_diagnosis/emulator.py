@@ -115,4 +115,5 @@ def _local_lines(
         scale = np.maximum(scale, _FLOOR)
         trust = (FREEDOM + 1.0) / (FREEDOM + (residual / scale[..., None]) ** 2)
     leverage = np.linalg.inv(normal)[..., 0, 0]
-    return line[..., 0], scale * np.sqrt(1.0 + np.clip(leverage, 0.0, 4.0))
+    wide = scale * np.sqrt(1.0 + np.clip(leverage, 0.0, 4.0))
+    return np.asarray(line[..., 0], dtype=float), np.asarray(wide, dtype=float)

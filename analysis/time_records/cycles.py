@@ -41,7 +41,7 @@ class Dwell:
 
 def cycle_starts(record: TimeRecord) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """When each cycle of the input begins, s, and its amplitude, V peak."""
-    analytic = hilbert(record.input_v - np.mean(record.input_v))
+    analytic = np.asarray(hilbert(record.input_v - np.mean(record.input_v)), dtype=complex)
     size = np.abs(analytic)
     turns = np.maximum.accumulate(np.unwrap(np.angle(analytic))) / (2.0 * np.pi)
     whole = np.arange(np.ceil(turns[0]), np.floor(turns[-1]) + 1.0)

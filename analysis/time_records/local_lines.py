@@ -81,7 +81,7 @@ def swept_response(record: TimeRecord, resolution_hz: float | None = None) -> Po
     gain, along = _solved(basis, y[rows], scale)
     level = np.full(centres.size, np.sqrt(2.0) * float(np.std(record.input_v)))
     return Points(
-        centres * spacing, level, gain, along, along,
+        np.asarray(centres * spacing, dtype=float), level, gain, along, along,
         f"local polynomials over {2 * half + 1} lines of the spectrum",
         ("the level is that of a sine of the input's rms",),
     )  # fmt: skip

@@ -86,7 +86,7 @@ _Spectra = tuple[NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64
 
 def _spectra(record: TimeRecord, size: int) -> _Spectra:
     """Cross power, input power, output power, and number of segments."""
-    transform = ShortTimeFFT(get_window("hann", size), hop=size // 2, fs=record.rate_hz)
+    transform = ShortTimeFFT(_window(size), hop=size // 2, fs=record.rate_hz)
     low, high = transform.lower_border_end[1], transform.upper_border_begin(len(record))[1]
     x, y = (
         transform.stft_detrend(v, "constant", p0=low, p1=high)
@@ -98,6 +98,10 @@ def _spectra(record: TimeRecord, size: int) -> _Spectra:
         np.mean(np.abs(y) ** 2, axis=1),
         x.shape[1],
     )
+
+
+def _window(size: int) -> NDArray[np.float64]:
+    return np.asarray(get_window("hann", size), dtype=float)
 
 
 def _coherence(spectra: _Spectra) -> NDArray[np.float64]:
@@ -113,14 +117,14 @@ def _gain(spectra: _Spectra, estimator: Estimator) -> NDArray[np.complex128]:
             return np.asarray(h1)
         h2 = output / np.conj(cross)
         if estimator == "H2":
-            return np.asarray(h2)
+            return np.asarray(h2, dtype=complex)
         return np.asarray(np.sqrt(np.abs(h1) * np.abs(h2)) * np.exp(1j * np.angle(h1)))
 
 
 def _error(spectra: _Spectra, size: int) -> NDArray[np.float64]:
     """Standard error along and across the gain, as a share (Bendat and Piersol, eq. 9.90)."""
     coherence, segments = _coherence(spectra), spectra[3]
-    window = get_window("hann", size)
+    window = _window(size)
     overlap = np.sum(window[: size // 2] * window[size - size // 2 :]) / np.sum(window**2)
     # Half overlapped segments share a part of their noise (Welch 1967).
     averages = segments / (1.0 + 2.0 * overlap**2 * (segments - 1) / segments)

@@ -103,7 +103,7 @@ def check_order(table: Table, direction: str | None) -> None:
         step = np.diff(frequency)
         wrong = np.flatnonzero(step < 0.0 if may_repeat else step <= 0.0)
         if wrong.size:
-            row = rows[wrong[0] + 1]
+            row = int(rows[wrong[0] + 1])
             what, remedy = _REPEATED if step[wrong[0]] == 0.0 else _OUT_OF_ORDER
             _refuse(
                 table,

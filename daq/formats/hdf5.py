@@ -91,7 +91,7 @@ def write(response: FrequencyResponse, path: Path) -> None:
 
 def _document(file: h5py.File, path: Path) -> str:
     held = _plain_dataset(file, "document", path)
-    if held.dtype != np.uint8 or held.ndim != 1 or held.size > _DOCUMENT_LIMIT_BYTES:
+    if held.dtype != np.uint8 or held.ndim != 1 or len(held) > _DOCUMENT_LIMIT_BYTES:
         raise FileFormatError(f"{path}: its document is not a text; give {_KIND}")
     return bytes(held[()]).decode("ascii")
 
@@ -100,7 +100,7 @@ def _array(file: h5py.File, name: str, path: Path) -> Any:
     held = _plain_dataset(file, f"{_GROUP}/{name}", path)
     if held.dtype.newbyteorder("=") != np.dtype(ARRAYS[name][0]):
         raise FileFormatError(f"{path}: {name} holds {held.dtype}; give {_KIND}")
-    if held.ndim != 1 or held.size > ROW_LIMIT:
+    if held.ndim != 1 or len(held) > ROW_LIMIT:
         raise FileFormatError(f"{path}: {name} has the shape {held.shape}; give {_KIND}")
     return held[()]
 

@@ -127,9 +127,9 @@ def _abscissa(
     first, step = float(trace["abscissa_first_x"]), float(trace["abscissa_delta_x"])
     with np.errstate(over="ignore", invalid="ignore"):
         if trace["x_resolution_type"] == "Linear":
-            return np.asarray(first + step * np.arange(points))
+            return np.asarray(first + step * np.arange(points), dtype=float)
         if trace["x_resolution_type"] == "Logarithmic":
-            return np.asarray(first * step ** np.arange(points))
+            return np.asarray(first * step ** np.arange(points), dtype=float)
     return _record(
         content,
         header["file_hdr"]["offset_xdata_record"],

@@ -122,7 +122,7 @@ def _companion(arrays: Mapping[str, NDArray[Any]], document: str) -> str:
     rows: dict[str, Any] = {}
     for name, values in arrays.items():
         if values.dtype.kind == "c":
-            rows[name] = [values.real.tolist(), values.imag.tolist()]
+            rows[name] = [np.real(values).tolist(), np.imag(values).tolist()]
         else:
             rows[name] = values.tolist()
     # Python's JSON writes every digit, and NaN as a word of its own.

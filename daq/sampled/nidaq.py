@@ -42,8 +42,8 @@ def open_nidaq(rest: str) -> InsideTransport:
     if not (1000 <= rate <= 1e6 and 0 < full_v <= 10.0) or not device:
         raise ConfigurationError(f"nidaq:{rest}: a device, rate 1000 to 1000000, range up to 10 V")
     try:
-        import nidaqmx
-        from nidaqmx.constants import AcquisitionType, RegenerationMode
+        import nidaqmx  # pyright: ignore[reportMissingImports] # an extra
+        from nidaqmx.constants import AcquisitionType, RegenerationMode  # pyright: ignore[reportMissingImports] # an extra
     except (ImportError, OSError) as error:
         raise LinkError(
             f"nidaq:{device}: needs nidaqmx and the maker's driver ({error}); "

@@ -44,7 +44,7 @@ def open_sound(rest: str) -> InsideTransport:
             f"sound:{rest}: rate 8000 to 384000, block 16 to 16384, volts above 0"
         )
     try:
-        import sounddevice
+        import sounddevice  # pyright: ignore[reportMissingImports] # an extra
     except (ImportError, OSError) as error:
         raise LinkError(
             f"sound:{device}: needs sounddevice and PortAudio ({error}); "

@@ -154,7 +154,7 @@ def _wav(path: Path) -> tuple[dict[str, NDArray[Any]], float]:
 
 def _tdms(path: Path) -> tuple[dict[str, NDArray[Any]], float | None]:
     try:
-        from nptdms import TdmsFile
+        from nptdms import TdmsFile  # pyright: ignore[reportMissingImports] # an extra
     except ImportError as error:
         raise InputError(
             f"{path}: TDMS files need nptdms; install it: pip install nptdms"

@@ -41,12 +41,15 @@ class KeptValues(Protocol):
 
     def get(self, key: str, *numbers: int, mode: Mode | None = None) -> Any:
         """A value, of the present mode unless another is named."""
+        ...
 
     def put(self, key: str, value: Any, *numbers: int) -> None:
         """Store a value for the present mode."""
+        ...
 
     def dump(self) -> bytes:
         """The whole state, for ``SYST:SET?``."""
+        ...
 
 
 class MeasurementPart(Protocol):
@@ -57,21 +60,27 @@ class MeasurementPart(Protocol):
     @property
     def running(self) -> bool:
         """Whether points are being taken."""
+        ...
 
     def start(self) -> None:
         """Begin anew."""
+        ...
 
     def stop(self) -> None:
         """``ABOR``."""
+        ...
 
     def pause(self) -> None:
         """Stop taking points."""
+        ...
 
     def go_on(self) -> None:
         """Continue a paused measurement, or start."""
+        ...
 
     def check_level(self) -> None:
         """Pause at a level of 0."""
+        ...
 
 
 class SpectrumPart(Protocol):
@@ -82,38 +91,48 @@ class SpectrumPart(Protocol):
     @property
     def record_s(self) -> float:
         """Length of a time record."""
+        ...
 
     @property
     def bandwidth_hz(self) -> float:
         """Noise bandwidth of a line."""
+        ...
 
     @property
     def averages(self) -> bool:
         """Whether records are averaged."""
+        ...
 
     @property
     def wanted(self) -> int:
         """Records of an average."""
+        ...
 
     @property
     def freezes(self) -> bool:
         """Whether a measurement ends with its last average."""
+        ...
 
     @property
     def complete(self) -> bool:
         """Whether all records were taken."""
+        ...
 
     def begin(self) -> None:
         """Throw the average away."""
+        ...
 
     def take(self) -> None:
         """One more record."""
+        ...
 
     def picture(self, feed: str) -> Picture:
         """Data of one kind."""
+        ...
 
     def shown_axis(self, axis: NDArray[np.float64]) -> NDArray[np.float64]:
         """The X axis as it is read."""
+        ...
 
 
 class TracesPart(Protocol):
@@ -123,18 +142,23 @@ class TracesPart(Protocol):
 
     def change_over(self, trace: int, key: str, old: str) -> None:
         """Show the old data or coordinates a little longer."""
+        ...
 
     def effective(self, trace: int, key: str) -> str:
         """The data or coordinates that the trace really shows now."""
+        ...
 
     def picture(self, trace: int) -> Picture:
         """What is in a trace box."""
+        ...
 
     def register(self, number: int) -> Picture:
         """Content of D1 to D8."""
+        ...
 
     def replace(self, number: int, values: NDArray[np.float64]) -> None:
         """New numbers for a register."""
+        ...
 
 
 class CalibrationPart(Protocol):
@@ -143,15 +167,19 @@ class CalibrationPart(Protocol):
     @property
     def remaining_s(self) -> float:
         """Time left of a calibration under way."""
+        ...
 
     def follow_setting(self) -> None:
         """Show ``CAL:AUTO`` in the Device State register."""
+        ...
 
     def run(self, done: Callable[[bool], None] | None = None) -> None:
         """Calibrate now."""
+        ...
 
     def run_and_report(self) -> Callable[[], str | None]:
         """``CAL?``."""
+        ...
 
 
 class InstrumentCore(Protocol):
@@ -175,52 +203,68 @@ class InstrumentCore(Protocol):
     @property
     def settings(self) -> KeptValues:
         """What it is set to."""
+        ...
 
     @property
     def measurement(self) -> MeasurementPart:
         """The measurement."""
+        ...
 
     @property
     def traces(self) -> TracesPart:
         """Trace boxes and registers."""
+        ...
 
     @property
     def spectrum(self) -> SpectrumPart:
         """Records of FFT mode."""
+        ...
 
     @property
     def calibration(self) -> CalibrationPart:
         """The calibration."""
+        ...
 
     def report(self, number: int, detail: str = "") -> None:
         """Queue an error and set its bit."""
+        ...
 
     def begin_point(self) -> None:
         """A point is about to be measured."""
+        ...
 
     def begin_read_out(self) -> None:
         """Data are about to be read."""
+        ...
 
     def cancel_completion(self) -> None:
         """Forget ``*OPC`` and ``*OPC?``."""
+        ...
 
     def after_a_while(self, seconds: float, reply: str) -> Callable[[], str | None]:
         """A reply that is ready after some of the instrument's time."""
+        ...
 
     def refresh_source(self) -> None:
         """Let the output follow settings and mode."""
+        ...
 
     def enter_mode(self, mode: Mode) -> None:
         """Change over to another mode."""
+        ...
 
     def shown_unit(self, unit: str) -> str:
         """The answer to ``? UNIT``."""
+        ...
 
     def reset(self, after_reset: bool) -> None:
         """``*RST`` (True) or ``SYST:PRES`` (False)."""
+        ...
 
     def restore(self, state: bytes) -> None:
         """``SYST:SET``."""
+        ...
 
     def switch_off(self) -> None:
         """``SYST:POW:STAT OFF``."""
+        ...

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core import config
 
 from daq.untrusted.trust import distrust, fresh_folder, own_folder, pass_over
 from sim.engine.machine_code import code_folder, has_wide_vectors, machine_features
@@ -27,7 +28,7 @@ def _ask_for_whole_vectors() -> None:
     That is for code that uses them now and then. It holds for all that numba compiles in this
     process, if it has not compiled anything yet; what a user set in its environment stays.
     """
-    settings: Any = numba.config
+    settings: Any = config
     if settings.CPU_FEATURES or settings.CPU_NAME or not settings.ENABLE_AVX:
         return
     if has_wide_vectors():
@@ -45,7 +46,7 @@ def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """
 
     def compiling(function: Callable[..., Any]) -> Any:
-        settings: Any = numba.config
+        settings: Any = config
         before = settings.CACHE_DIR
         if options.get("cache"):
             settings.CACHE_DIR = _safe_place(Path(function.__code__.co_filename).parent, before)

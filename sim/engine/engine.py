@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -366,7 +367,7 @@ def _times(matrix: NDArray[np.float64], columns: NDArray) -> NDArray:
     return total
 
 
-def _coefficients(sums: NDArray[np.float64], steps: int) -> NDArray[np.complex128]:
+def _coefficients(sums: NDArray[Any], steps: int) -> NDArray[Any]:
     """Sums over a cycle to amplitudes C_k with V = Im(C_k exp(i k theta)), C_0 the mean."""
     cosine, sine, seen = sums[:, 1::2], sums[:, 2::2], steps // STEPS_SEEN
     harmonics = (2.0 / seen) * (sine + 1j * cosine)

@@ -248,7 +248,7 @@ class _Independent(Program):
         emit, code = self._emit, self._code
         waves: list[list[Any]] = [[] for _ in range(count)]
         for v in self._all:
-            vectors = [ir.Constant(code.vector, ir.Undefined)] * count
+            vectors: list[Any] = [ir.Constant(code.vector, ir.Undefined)] * count
             for i in range(code.width):
                 word = self._word(_AT, _INT(v * code.width + i))
                 place = self._pointer(emit.add(emit.load(word), offset))

@@ -123,7 +123,7 @@ class Program:
         # A few lanes of double precision wait for each other, and hardly ever cross an end at once.
         branches = vectors == 1 and not layout.structure.single
         self._code = Code(self._module, self._emit, layout.structure.single, fused, branches)
-        self._sweeps = self._emit.alloca(_INT)
+        self._sweeps: Any = self._emit.alloca(_INT)
         # Aligns the stack with it: a vector that lies across two lines of the cache costs twice.
         self._sweeps.align = VECTOR_BYTES
         self._emit.store(_INT(FIRST_SWEEPS), self._sweeps)

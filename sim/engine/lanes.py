@@ -116,7 +116,7 @@ class Code:
         yield
         tell(before)
 
-    def _x86_control(self) -> tuple[Callable[[], Any], Callable[[Any], None]]:
+    def _x86_control(self) -> tuple[Callable[[], Any], Callable[[Any], Any]]:
         """What reads the control word and what sets it; here both go by way of memory."""
         emit, pointer, word = self.builder, ir.IntType(8).as_pointer(), ir.IntType(32)
         kind = ir.FunctionType(ir.VoidType(), [pointer])
@@ -136,7 +136,7 @@ class Code:
 
         return ask, tell
 
-    def _arm_control(self) -> tuple[Callable[[], Any], Callable[[Any], None]]:
+    def _arm_control(self) -> tuple[Callable[[], Any], Callable[[Any], Any]]:
         """The same, where the word comes and goes in a register."""
         word = ir.IntType(64)
         read = ir.Function(self._module, ir.FunctionType(word, []), "llvm.aarch64.get.fpcr")

@@ -30,22 +30,27 @@ class LinearParts(Protocol):
     @property
     def A(self) -> Real:  # noqa: N802
         """Matrix, shape (n, n)."""
+        ...
 
     @property
     def b(self) -> Real:
         """Input, shape (n,)."""
+        ...
 
     @property
     def o(self) -> Real:
         """Output row, shape (n,)."""
+        ...
 
     @property
     def sampled(self) -> tuple[Nonlinearity, ...]:
         """The laws that a clock samples."""
+        ...
 
     @property
     def reading(self) -> Reading:
         """How the output is read."""
+        ...
 
 
 def smooth_parts(system: LinearParts) -> tuple[Real, Real, Real]:
@@ -110,4 +115,4 @@ def _sequence(
 def _solve(A: Real, b: Real, s: NDArray[Any]) -> Complex:
     eye = np.eye(len(b))
     x = np.linalg.solve(s[..., None, None] * eye - A, b[:, None].astype(complex))
-    return np.asarray(x)
+    return np.asarray(x, dtype=complex)

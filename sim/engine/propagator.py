@@ -90,10 +90,10 @@ def _modes_of(matrix: bytes, n: int) -> Modes:
     # keeps eigenvectors and exponentials accurate.
     balanced, (scale, _) = matrix_balance(A, permute=False, separate=True)
     rates, vectors = np.linalg.eig(balanced)
-    upper, real = np.flatnonzero(rates.imag > 0.0), np.flatnonzero(rates.imag == 0.0)
+    upper, real = np.flatnonzero(np.imag(rates) > 0.0), np.flatnonzero(np.imag(rates) == 0.0)
     order = np.concatenate([np.repeat(upper, 2), real])
-    basis = vectors[:, order].real
-    basis[:, 1 : 2 * len(upper) : 2] = vectors[:, upper].imag
+    basis = np.real(vectors[:, order])
+    basis[:, 1 : 2 * len(upper) : 2] = np.imag(vectors[:, upper])
     if not np.linalg.cond(basis) < _WORST_CONDITION:
         return _unmoded(balanced, scale)
     return Modes(
@@ -178,5 +178,5 @@ def _exponential(
     p, k = forcings.shape
     augmented = np.zeros((p + k, p + k))
     augmented[:p, :p], augmented[:p, p:] = A * h, forcings * h
-    exponential = expm(augmented)
+    exponential = np.asarray(expm(augmented), dtype=float)
     return np.ascontiguousarray(exponential[:p, :p]), exponential[:p, p:]

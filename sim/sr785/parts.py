@@ -24,6 +24,7 @@ class Displays(Protocol):
 
     def keep_all(self) -> None:
         """There are no data any more that a display could have lost."""
+        ...
 
 
 class InstrumentCore(Protocol):
@@ -42,23 +43,30 @@ class InstrumentCore(Protocol):
     @property
     def traces(self) -> Displays:
         """Both displays."""
+        ...
 
     @property
     def group(self) -> str:
         """The measurement group of display A."""
+        ...
 
     @property
     def driven_v(self) -> float:
         """Largest magnitude at the connector now, V."""
+        ...
 
     def begin_point(self) -> None:
         """A point is about to be measured."""
+        ...
 
     def begin_read_out(self) -> None:
         """A trace is about to be read."""
+        ...
 
     def refresh_source(self) -> None:
         """Let the output follow settings and measurement."""
+        ...
 
     def reset(self) -> None:
         """``*RST``."""
+        ...

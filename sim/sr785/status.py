@@ -83,8 +83,8 @@ class Status:
     """All words of one instrument."""
 
     def __init__(self) -> None:
-        self.words = dict.fromkeys(WORDS, 0)
-        self.enables = dict.fromkeys(WORDS, 0)
+        self.words: dict[str, int] = dict.fromkeys(WORDS, 0)
+        self.enables: dict[str, int] = dict.fromkeys(WORDS, 0)
         self.request_enable = 0
         self.keeps_enables = False
         """What ``*PSC 0`` asks for."""

@@ -27,21 +27,28 @@ class AppState(Host, Protocol):
     @property
     def analyses(self) -> AnalysisKeeper:
         """The analyses, and where their results go."""
+        ...
 
     def go(self, step: int) -> None:
         """Put a step on top, if what it needs is there; else say what is missing."""
+        ...
 
     def banner_text(self) -> str:
         """Line of every screen: simulated or not, source, unit, measurement."""
+        ...
 
     def find_instruments(self) -> None:
         """List instruments beside the screen."""
+        ...
 
     def open_session(self, measurement: int) -> None:
         """Read a stored measurement and look at it."""
+        ...
 
     def put_away(self) -> None:
         """Another unit is on the desk: drop what was about the one before."""
+        ...
 
     def action_copy(self) -> None:
         """Copy the step's result."""
+        ...

@@ -82,7 +82,7 @@ def _user() -> str:
 def check_visa() -> Iterator[Finding]:
     """Whether VISA serves a LAN, and whether anything serves a GPIB card."""
     import pyvisa
-    from pyvisa.ctwrapper import IVIVisaLibrary
+    from pyvisa.ctwrapper.highlevel import IVIVisaLibrary
 
     try:
         pyvisa.ResourceManager("@py").close()

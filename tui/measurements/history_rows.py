@@ -30,7 +30,7 @@ __all__ = [
 QUANTITIES = ("contribution_ratio", "b1_deg", "b2_deg")
 """What is followed over time, by its name in an estimate's document."""
 
-_LIMITED = dict(zip(QUANTITIES, ("r", "b1_deg", "b2_deg"), strict=True))
+_LIMITED: dict[str, str] = dict(zip(QUANTITIES, ("r", "b1_deg", "b2_deg"), strict=True))
 """What a table of limits calls them."""
 
 _HORIZON_S = 365 * 86400.0

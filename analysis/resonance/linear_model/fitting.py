@@ -304,7 +304,7 @@ class _Problem:
         off = measured - np.abs(model)
         slope = jacobian[:, self.free] * np.abs(model)[:, None]
         return (
-            np.stack([off.real / along, off.imag / across]),
+            np.stack([np.real(off) / along, np.imag(off) / across]),
             np.stack([slope.real / along[:, None], slope.imag / across[:, None]]),
         )
 

@@ -6,6 +6,8 @@ Owns the relaxed iteration of Gustavsen and Semlyen (IEEE Trans. Power Delivery 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -81,14 +83,14 @@ def _relocated(x: Vector, gain: Complex, weight: Vector, poles: Complex) -> Comp
     if moved is None or not np.all(np.isfinite(moved)):
         return None
     # What is measured is stable.
-    return -np.abs(moved.real) + 1j * moved.imag
+    return np.asarray(-np.abs(moved.real) + 1j * moved.imag, dtype=complex)
 
 
-def _real(rows: Complex | Vector) -> Vector:
-    return np.concatenate([rows.real, rows.imag])
+def _real(rows: NDArray[Any]) -> Vector:
+    return np.concatenate([np.real(rows), np.imag(rows)])
 
 
-def _solve(rows: Vector, right: Vector) -> Vector | None:
+def _solve(rows: NDArray[Any], right: Vector) -> Vector | None:
     scale = np.linalg.norm(rows, axis=0)
     if not np.all(np.isfinite(scale)) or np.any(scale <= 0.0) or not np.all(np.isfinite(right)):
         return None

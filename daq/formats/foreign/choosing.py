@@ -154,7 +154,7 @@ def _columns(
     }
     coherence = [_coherence_of(one, functions) for one in chosen]
     if all(found is not None for found in coherence):
-        held["coherence"] = np.concatenate([f.values.real for f in coherence if f is not None])
+        held["coherence"] = np.concatenate([np.real(f.values) for f in coherence if f is not None])
     return held, remarks
 
 

@@ -88,9 +88,10 @@ def _functions(
     if len(values) != needed:
         raise FileFormatError(f"{place} should have {needed} numbers, found {len(values)}")
     if listed:
-        hertz, values = values[:points].real.astype(float), values[points:]
+        hertz, values = np.real(values[:points]).astype(float), values[points:]
     else:
-        hertz = _real(said, "f0", place) + _real(said, "df", place) * np.arange(points)
+        grid = _real(said, "f0", place) + _real(said, "df", place) * np.arange(points)
+        hertz = np.asarray(grid, dtype=float)
     if not (np.all(np.isfinite(values)) and np.all(np.isfinite(hertz))):
         raise FileFormatError(f"{place} holds a number that is none")
     below = said.get("ChannelA", "") or "A"

@@ -178,7 +178,7 @@ def _gain(columns: Columns) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
     columns.believe("phase_deg", phase)
     known = np.isfinite(phase)
     turned = np.exp(1j * np.radians(np.where(known, phase, 0.0)))
-    return np.asarray(magnitude * turned), known
+    return np.asarray(magnitude * turned, dtype=complex), known
 
 
 def _complex(columns: Columns) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
@@ -261,7 +261,7 @@ def _in_order(columns: Columns, response: FrequencyResponse, reading: Reading) -
                 else "is out of order; sort the rows, or give each its source level by --column "
                 "source_vpk=COLUMN"
             )
-            columns.refuse(rows[bad + 1], f"frequency {f[bad + 1]:g} Hz {what}")
+            columns.refuse(int(rows[bad + 1]), f"frequency {f[bad + 1]:g} Hz {what}")
         turn = falls and reading.direction != "down"
         turned |= turn
         parts.append(rows[::-1] if turn else rows)

@@ -171,8 +171,8 @@ def table_in(
 
 
 def _column(values: NDArray[Any]) -> NDArray[Any]:
-    if values.dtype.kind == "c" and not np.any(values.imag != 0.0):
-        return np.asarray(values.real)
+    if values.dtype.kind == "c" and not np.any(np.imag(values) != 0.0):
+        return np.asarray(np.real(values))
     return values
 
 

@@ -223,7 +223,7 @@ class _Layout:
         if self.even:
             if self.points > 1 and not step > 0.0:
                 raise FileFormatError(f"{self.place} states an abscissa in steps of {step:g}")
-            x, rest = np.asarray(first + step * np.arange(self.points)), table
+            x, rest = np.asarray(first + step * np.arange(self.points), dtype=float), table
         else:
             x, rest = table[:, 0], table[:, 1:]
         values: NDArray[Any] = rest[:, 0] + 1j * rest[:, 1] if self.complex else rest[:, 0].copy()

@@ -83,11 +83,11 @@ def transform(picture: Picture, form: str, radians: bool) -> NDArray[np.float64]
         case "UPH":
             return np.unwrap(phase) * scale
         case "REAL":
-            return values.real.copy()
+            return np.real(values).copy()
         case "IMAG":
-            return values.imag.copy()
+            return np.imag(values).copy()
         case "NYQ":
-            return _pairs(values.real, values.imag)
+            return _pairs(np.real(values), np.imag(values))
         case "POL":
             return _pairs(magnitude, phase * scale)
     return _group_delay(picture.x, phase)

@@ -158,7 +158,9 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
             self.notify("diagnose first: step 6")
             return
         document = diagnosis.to_json()
-        there = [one for one in _MODELS if one is None or predictions_of(document, one)]
+        there: list[Which | None] = [
+            one for one in _MODELS if one is None or predictions_of(document, one)
+        ]
         if len(there) == 1:
             self.notify("this diagnosis tells no prediction; D in step 6 makes it anew")
         shown = _shown(self._model, document)

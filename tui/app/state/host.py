@@ -23,6 +23,7 @@ class View(Protocol):
 
     def view(self, measurement: int | None) -> None:
         """Make a measurement the one that results are about."""
+        ...
 
 
 class Host(Protocol):
@@ -33,13 +34,16 @@ class Host(Protocol):
     @property
     def analyses(self) -> View:
         """Where results are shown."""
+        ...
 
     @property
     def log_words(self) -> str:
         """Where whoever wants to know more should look."""
+        ...
 
     def post_message(self, message: Message) -> bool:
         """Put a message into the queue of the event loop; safe in any thread."""
+        ...
 
     def run_worker(
         self,
@@ -51,6 +55,7 @@ class Host(Protocol):
         thread: bool = False,
     ) -> Any:
         """Do something in a thread of its own."""
+        ...
 
     def notify(
         self,
@@ -60,9 +65,12 @@ class Host(Protocol):
         timeout: float | None = None,
     ) -> None:
         """Say something for a moment."""
+        ...
 
     def show_error(self, title: str, error: Exception | str) -> None:
         """A dialog with an error."""
+        ...
 
     def action_stop_source(self) -> None:
         """The one key that stops the source."""
+        ...
