@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from importlib.metadata import version
+from importlib import metadata
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
@@ -21,8 +21,6 @@ __all__ = ["ClusterExecutor"]
 T = TypeVar("T")
 R = TypeVar("R")
 
-_CONNECT_S, _WORKERS_S = 10.0, 10.0
-
 
 class ClusterExecutor:
     """The workers of one scheduler; a context manager that leaves none of its tasks behind.
@@ -31,16 +29,18 @@ class ClusterExecutor:
     ----------
     address
         As Dask writes it: ``tcp://host:8786``, or ``host:8786``.
+    connect_s, workers_s
+        How long to wait for the scheduler, and then for its first worker, s.
 
     Raises
     ------
     InputError
         If Dask is not installed, or the address is none.
     LinkError
-        If nothing answers there within ten seconds, or no worker is connected to it.
+        If nothing answers there in that time, or no worker is connected to it.
     """
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, *, connect_s: float = 10.0, workers_s: float = 10.0) -> None:
         try:
             from distributed import Client
             from distributed.comm.addressing import parse_address, parse_host_port
@@ -58,14 +58,14 @@ class ClusterExecutor:
         except ValueError as error:
             raise InputError(f"{address!r} is no address of a Dask scheduler: {error}") from error
         try:
-            self._client: Any = Client(address, timeout=_CONNECT_S, set_as_default=False)
+            self._client: Any = Client(address, timeout=connect_s, set_as_default=False)
         except (OSError, TimeoutError) as error:
             raise LinkError(
-                f"no Dask scheduler answers at {address} within {_CONNECT_S:g} s; start one with: "
+                f"no Dask scheduler answers at {address} within {connect_s:g} s; start one with: "
                 "dask scheduler"
             ) from error
         try:
-            self._client.wait_for_workers(1, timeout=_WORKERS_S)
+            self._client.wait_for_workers(1, timeout=workers_s)
         except TimeoutError as error:
             self._client.close()
             raise LinkError(
@@ -104,7 +104,7 @@ class ClusterExecutor:
         """
         from distributed import CancelledError, KilledWorker, as_completed
 
-        made_by = version("lashbench")
+        made_by = metadata.version("lashbench")
         # Not pure: equal tasks are told apart, and nothing is taken from an earlier run.
         futures = self._client.map(
             _run, [(work, task, made_by) for task in tasks], pure=False, batch_size=64
@@ -140,7 +140,7 @@ def _run(parcel: tuple[Callable[[T], R], T, str]) -> tuple[R, tuple[float, float
         If this is another lashbench than the one that sent it.
     """
     work, task, made_by = parcel
-    here = version("lashbench")
+    here = metadata.version("lashbench")
     if here != made_by:
         raise AnalysisError(
             f"a worker holds lashbench {here}, this is {made_by}; install the same everywhere"

@@ -89,6 +89,7 @@ def advance(
     stretches: Sequence[Stretch],
     longest_step_s: float = LONGEST_STEP_S,
     single: bool = False,
+    modes: Modes | None = None,
 ) -> Iterator[Motion]:
     """Carry trajectories through stretches, one after the other.
 
@@ -108,13 +109,15 @@ def advance(
     single
         Step in single precision, at half of the cost; for what is judged by its distribution.
         A system without usable modes is stepped in double all the same.
+    modes
+        Coordinates to step in; those of `find_modes` if left out.
 
     Yields
     ------
     Motion
         One per stretch, as soon as it is done.
     """
-    moving = _Moving(system, find_modes(system), single)
+    moving = _Moving(system, find_modes(system) if modes is None else modes, single)
     for stretch in stretches:
         (motion,) = step_together([_dwell(moving, parameters, state, stretch, longest_step_s)])
         state = motion.state

@@ -23,12 +23,19 @@ from scipy.linalg import expm, matrix_balance
 from sim.engine.layout import STEPS_SEEN
 from sim.engine.system import PiecewiseLinearSystem
 
-__all__ = ["FEWEST_STEPS", "Modes", "Propagator", "build_propagator", "find_modes"]
+__all__ = [
+    "FEWEST_STEPS",
+    "WORST_CONDITION",
+    "Modes",
+    "Propagator",
+    "build_propagator",
+    "find_modes",
+]
 
 FEWEST_STEPS = 256
 """Steps per drive cycle at least, so that harmonics 0 to 3 and the laws' kinks are resolved."""
 
-_WORST_CONDITION = 1e7
+WORST_CONDITION = 1e7
 """Eigenvectors worse conditioned than this cost more digits than modes are worth."""
 
 
@@ -78,13 +85,19 @@ class Propagator:
         return self.carry @ columns if self.whole else _by_blocks(self.carry, columns)
 
 
-def find_modes(system: PiecewiseLinearSystem) -> Modes:
-    """Eigenmodes of a system with every mesh closed, or its states where it has no good ones."""
-    return _modes_of(system.A.tobytes(), len(system.b))
+def find_modes(system: PiecewiseLinearSystem, worst_condition: float = WORST_CONDITION) -> Modes:
+    """Eigenmodes of a system with every mesh closed, or its states where it has no good ones.
+
+    Parameters
+    ----------
+    worst_condition
+        Condition number from which on eigenvectors are no good; with 0 there are none.
+    """
+    return _modes_of(system.A.tobytes(), len(system.b), worst_condition)
 
 
 @lru_cache(maxsize=64)
-def _modes_of(matrix: bytes, n: int) -> Modes:
+def _modes_of(matrix: bytes, n: int, worst_condition: float) -> Modes:
     A = np.frombuffer(matrix).reshape(n, n)
     # Stiffness over inertia makes entries of 1e9 beside entries of 1; balancing
     # keeps eigenvectors and exponentials accurate.
@@ -94,7 +107,7 @@ def _modes_of(matrix: bytes, n: int) -> Modes:
     order = np.concatenate([np.repeat(upper, 2), real])
     basis = np.real(vectors[:, order])
     basis[:, 1 : 2 * len(upper) : 2] = np.imag(vectors[:, upper])
-    if not np.linalg.cond(basis) < _WORST_CONDITION:
+    if not np.linalg.cond(basis) < worst_condition:
         return _unmoded(balanced, scale)
     return Modes(
         shapes=scale[:, None] * basis,

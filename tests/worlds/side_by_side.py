@@ -57,7 +57,7 @@ def law_parameters(system, lanes=1):
 
 
 def drive(system, state, frequency_hz, cycles, amplitude=0.0, offset=0.0, step_s=5e-6, settle=0,
-          parameters=None, single=False):  # fmt: skip
+          parameters=None, single=False, modes=None):  # fmt: skip
     """Coefficients (cycles, 4, lanes) in V, and the state at the end (n, lanes)."""
     state = np.array(state, dtype=float).reshape(len(system.states), -1)
     lanes = state.shape[1]
@@ -65,7 +65,7 @@ def drive(system, state, frequency_hz, cycles, amplitude=0.0, offset=0.0, step_s
     stretch = Stretch(frequency_hz, amplitude * one, 0.0 * one, offset * one, settle, cycles)
     if parameters is None:
         parameters = law_parameters(system, lanes)
-    (motion,) = advance(system, parameters, state, [stretch], step_s, single)
+    (motion,) = advance(system, parameters, state, [stretch], step_s, single, modes)
     return motion.coefficients, motion.state
 
 

@@ -5,12 +5,12 @@ import signal
 import subprocess
 import sys
 import time
+from importlib import metadata
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-import analysis.execution.dask_executor
 from analysis.ensemble.machine import Machine
 from analysis.ensemble.model import Hypothesis
 from analysis.ensemble.run_cache import run_families
@@ -33,11 +33,9 @@ BEGIN = "import sys; from distributed.cli.dask_{0} import main; sys.argv[0] = 'd
 QUIET = {"DASK_LOGGING__DISTRIBUTED": "error", "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "0"}
 
 
-@pytest.fixture(autouse=True)
-def patience(monkeypatch):
+def patient(address):
     """A machine that is busy with other things answers late."""
-    monkeypatch.setattr(analysis.execution.dask_executor, "_CONNECT_S", 60.0)
-    monkeypatch.setattr(analysis.execution.dask_executor, "_WORKERS_S", 60.0)
+    return ClusterExecutor(address, connect_s=60.0, workers_s=60.0)
 
 
 def begin(role, *words):
@@ -103,15 +101,14 @@ def refuse(task):
     return task
 
 
-def test_without_workers_it_says_how_to_start_one(scheduler, monkeypatch):
-    monkeypatch.setattr(analysis.execution.dask_executor, "_WORKERS_S", 0.5)
+def test_without_workers_it_says_how_to_start_one(scheduler):
     with pytest.raises(LinkError, match="dask worker"):
-        ClusterExecutor(scheduler)
+        ClusterExecutor(scheduler, connect_s=60.0, workers_s=0.5)
 
 
 def test_an_error_comes_back_as_it_was_and_stops_the_rest(workers):
     address, _ = workers
-    with ClusterExecutor(address) as cluster:
+    with patient(address) as cluster:
         with pytest.raises(AnalysisError, match="task 3 carries no answer"):
             cluster.each(refuse, list(range(8)))
         # The connection is as good as before.
@@ -138,7 +135,7 @@ def test_runs_on_a_cluster_are_those_of_this_machine_to_the_last_bit(workers):
     ]
     seen = unread(plan, 5e-4)
     unit = load_unit("adss")
-    with ClusterExecutor(address) as cluster, counting() as spent_there:
+    with patient(address) as cluster, counting() as spent_there:
         there = run_families(unit, families, seen, executor=cluster)
     with counting() as spent_here:
         here = run_families(unit, families, seen)
@@ -164,7 +161,7 @@ def test_a_search_on_a_cluster_makes_the_runs_of_this_machine(workers):
         rng = np.random.default_rng(3)
         return simulate_groups(unit, groups, unread(plan, 5e-4), rng, executor)
 
-    with ClusterExecutor(address) as cluster:
+    with patient(address) as cluster:
         there = runs(cluster)
     here = runs(None)
     assert set(there) == set(here) == {(), ("load-inertia",), ("shaft-damping",)}
@@ -179,7 +176,7 @@ def test_cancelled_work_is_not_begun(workers, tmp_path):
     def progress(share):
         raise StopError
 
-    with ClusterExecutor(address) as cluster, pytest.raises(StopError):
+    with patient(address) as cluster, pytest.raises(StopError):
         cluster.each(square, [(number, str(tmp_path), 0.2) for number in range(40)], progress)
     time.sleep(0.8)
     begun = len(list(tmp_path.iterdir()))
@@ -190,18 +187,20 @@ def test_cancelled_work_is_not_begun(workers, tmp_path):
 
 def test_another_edition_on_a_worker_is_refused(workers, monkeypatch):
     address, _ = workers
-    monkeypatch.setattr(analysis.execution.dask_executor, "version", lambda name: "0.0.0")
+    known = metadata.version
+    monkeypatch.setattr(
+        metadata, "version", lambda name: "0.0.0" if name == "lashbench" else known(name)
+    )
     with (
-        ClusterExecutor(address) as cluster,
+        patient(address) as cluster,
         pytest.raises(AnalysisError, match="this is 0.0"),
     ):
         cluster.each(refuse, [1])
 
 
-def test_an_address_without_a_scheduler_is_refused(monkeypatch):
-    monkeypatch.setattr(analysis.execution.dask_executor, "_CONNECT_S", 1.0)
+def test_an_address_without_a_scheduler_is_refused():
     with pytest.raises(LinkError, match="no Dask scheduler answers"):
-        ClusterExecutor("127.0.0.1:9")
+        ClusterExecutor("127.0.0.1:9", connect_s=1.0)
 
 
 @pytest.mark.parametrize(
@@ -241,7 +240,7 @@ def test_a_lost_worker_costs_its_task_only(workers, tmp_path):
         if len(told) == 6:
             os.kill(both[0].pid, signal.SIGKILL)
 
-    with ClusterExecutor(address) as cluster:
+    with patient(address) as cluster:
         results = cluster.each(square, tasks, progress)
     assert [r[0] for r in results] == [n**2 for n in range(24)]
     assert {r[1] for r in results} == {one.pid for one in both}, "both workers took part"

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from worlds.edited_files import edit
 from worlds.responses import measured, responses, same
 
 from daq.errors import FileFormatError, InputError, LashbenchError
 from daq.formats import READABLE, read_response, write_response
-from daq.formats import record as record_module
+from daq.formats.record import FILE_LIMIT_BYTES
 from daq.frf import FrequencyResponse, PointFlag
 
 SUFFIXES = [".h5", ".mat", ".uff"]
@@ -92,21 +93,24 @@ def test_a_provenance_without_a_form_is_refused_and_nothing_written(tmp_path, su
         ({"flags": -1}, "flags are not those of a point in row 2"),
     ],
 )
-def test_an_impossible_reading_is_refused_in_both_directions(
-    tmp_path, suffix, changes, fault, monkeypatch
-):
+def test_an_impossible_reading_is_refused_in_both_directions(tmp_path, suffix, changes, fault):
     response = measured(flags=0)
+    path = tmp_path / f"x{suffix}"
+    write_response(response, path)
+
+    def impossible(arrays, document):
+        for name, value in changes.items():
+            arrays[name][1] = value
+
+    edit(path, impossible)
+    with pytest.raises(FileFormatError, match=fault):
+        read_here(path)
     for name, value in changes.items():
         getattr(response, name)[1] = value
-    path = tmp_path / f"x{suffix}"
+    other = tmp_path / f"y{suffix}"
     with pytest.raises(InputError, match=fault):
-        write_response(response, path)
-    assert not path.exists()
-    with monkeypatch.context() as patch:
-        patch.setattr(record_module, "_fault", lambda _: None)
-        write_response(response, path)
-    with pytest.raises(FileFormatError, match=fault):
-        read_response(path)
+        write_response(response, other)
+    assert not other.exists()
 
 
 @every_format
@@ -117,44 +121,28 @@ def test_a_response_without_readings_is_refused(tmp_path, suffix):
 
 
 @every_format
-def test_a_newer_file_is_refused(tmp_path, suffix, monkeypatch):
+def test_a_newer_file_is_refused(tmp_path, suffix):
     path = tmp_path / f"new{suffix}"
-    with monkeypatch.context() as patch:
-        patch.setattr(record_module, "VERSION", 9)
-        write_response(measured(), path)
+    write_response(measured(), path)
+    edit(path, lambda arrays, document: document.update(version=9))
     with pytest.raises(FileFormatError, match=r"newer lashbench \(version 9"):
         read_response(path)
 
 
 @every_format
-def test_a_missing_array_is_refused(tmp_path, suffix, monkeypatch):
+def test_a_missing_array_is_refused(tmp_path, suffix):
     path = tmp_path / f"x{suffix}"
-    whole = record_module.taken_apart
-
-    def short(response, where):
-        arrays, document = whole(response, where)
-        return {k: v for k, v in arrays.items() if k != "dc_v"}, document
-
-    for module in ("hdf5", "mat", "uff"):
-        monkeypatch.setattr(f"daq.formats.{module}.taken_apart", short)
     write_response(measured(), path)
+    edit(path, lambda arrays, document: arrays.pop("dc_v"))
     with pytest.raises(FileFormatError, match="dc_v"):
         read_response(path)
 
 
 @every_format
-def test_columns_of_unequal_length_are_refused(tmp_path, suffix, monkeypatch):
+def test_columns_of_unequal_length_are_refused(tmp_path, suffix):
     path = tmp_path / f"x{suffix}"
-    whole = record_module.taken_apart
-
-    def uneven(response, where):
-        arrays, document = whole(response, where)
-        return arrays | {"dc_v": arrays["dc_v"][:-1]}, document
-
-    monkeypatch.setattr(record_module, "_digest", lambda *_: "0" * 64)
-    for module in ("hdf5", "mat", "uff"):
-        monkeypatch.setattr(f"daq.formats.{module}.taken_apart", uneven)
     write_response(measured(), path)
+    edit(path, lambda arrays, document: arrays.update(dc_v=arrays["dc_v"][:-1]))
     with pytest.raises(FileFormatError, match="dc_v has shape"):
         read_here(path)
 
@@ -226,7 +214,7 @@ def test_what_is_no_file_is_refused(tmp_path, suffix):
 def test_an_absurd_size_is_refused_unread(tmp_path, suffix):
     path = tmp_path / f"huge{suffix}"
     with path.open("wb") as file:
-        file.truncate(record_module.FILE_LIMIT_BYTES + 1)
+        file.truncate(FILE_LIMIT_BYTES + 1)
     with pytest.raises(FileFormatError, match="more than any response"):
         read_response(path)
 
@@ -355,3 +343,11 @@ def test_unknown_level_and_phase_survive(tmp_path):
     for suffix in SUFFIXES:
         write_response(response, tmp_path / f"x{suffix}")
         same(read_response(tmp_path / f"x{suffix}"), response)
+
+
+@every_format
+def test_a_file_that_was_edited_without_a_fault_is_read(tmp_path, suffix):
+    path = tmp_path / f"x{suffix}"
+    write_response(measured(), path)
+    edit(path, lambda arrays, document: document["provenance"].update(edited="yes"))
+    assert read_here(path).provenance["edited"] == "yes"

@@ -1,10 +1,12 @@
 """A disk or a store that refuses: the source is made safe, and what was stored stays."""
 
 import sqlite3
+from contextlib import ExitStack
 
 import pytest
 from instruments.fake_analyser import FakeAnalyser
 from instruments.session_runs import OFF, request
+from worlds.full_disk import files_end_at, largest
 
 from daq.errors import LinkError, MeasurementError
 from daq.plan import SweepPlan, spaced_frequencies
@@ -19,10 +21,10 @@ def test_a_full_disk_stops_the_source_and_keeps_the_points(tmp_path):
     store = Store(path, create=True)
     events = []
 
+    full = ExitStack()
+
     def fill_the_disk():
-        with store._writer.connect() as connection:
-            pages = connection.exec_driver_sql("PRAGMA page_count").scalar_one()
-            connection.exec_driver_sql(f"PRAGMA max_page_count = {pages}")
+        full.enter_context(files_end_at(largest(tmp_path)))
 
     plan = SweepPlan(spaced_frequencies(100.0, 180.0, 900), (0.5,))
     analyser.faults[("point", 20)] = fill_the_disk
@@ -31,7 +33,7 @@ def test_a_full_disk_stops_the_source_and_keeps_the_points(tmp_path):
         for event in Session(analyser, store, request(plan)).run():
             events.append(event)
 
-    with pytest.raises(MeasurementError, match="disk refused the data"):
+    with full, pytest.raises(MeasurementError, match="disk refused the data"):
         run()
     assert analyser.level_vpk == 0.0
     assert analyser.log[-1] == ("make_safe",)

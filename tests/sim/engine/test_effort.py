@@ -2,14 +2,11 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
-from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from daq.plan import SweepPlan
 from sim.effects import parse_effect
-from sim.engine import engine
 from sim.engine.effort import counting, spend
 from sim.response import Servo, simulate_cycles
 from sim.unit import load_unit
@@ -36,23 +33,18 @@ def test_motion_of_a_hardening_shaft_is_worth_more_of_a_plain_units():
     assert 4 * plan.duration_s < effort.worth_s < 5 * plan.duration_s
 
 
-def test_motion_that_needs_shorter_steps_is_worth_more(monkeypatch):
-    """At 125 Hz the first step will not do: that and the one before take twice as long."""
-    plan = SweepPlan((100.0, 110.0, 125.0), (1.5,), settle_cycles=2, integrate_cycles=3)
-    plain = engine._dwell
-
-    def growing(moving, parameters, state, stretch, step_s):
-        motion = yield from plain(moving, parameters, state, stretch, step_s)
-        grows = stretch.frequency_hz == 125.0 and step_s > 5e-6
-        return replace(motion, coefficients=motion.coefficients * (np.nan if grows else 1.0))
-
-    monkeypatch.setattr(engine, "_dwell", growing)
-    servos = [Servo.of(load_unit("adss"), 0.5)] * 2
-    with counting() as effort:
-        simulate_cycles(servos, plan, longest_step_s=1e-5, shorter_steps_s=(5e-6,))
-    assert effort.simulated_s == pytest.approx(2 * plan.duration_s)
-    worth_s = 5 / 100.0 + 2 * (5 / 110.0 + 5 / 125.0)
-    assert effort.worth_s == pytest.approx(2 * worth_s, rel=2e-3)
+def test_motion_that_needs_shorter_steps_is_worth_more():
+    """At the first step the motion of the harder shaft grows without bound."""
+    plan = SweepPlan((40.0, 60.0, 80.0), (4.0,), settle_cycles=2, integrate_cycles=3)
+    steps = {"longest_step_s": 1e-5, "shorter_steps_s": (5e-6, 1.25e-6)}
+    worth = []
+    for hardening in (1e4, 2e7):
+        effect = parse_effect(f"shaft-hardening:h={hardening}")
+        with counting() as effort:
+            simulate_cycles([Servo.of(load_unit("edss"), 0.6, [effect])], plan, **steps)
+        assert effort.simulated_s == pytest.approx(plan.duration_s)
+        worth.append(effort.worth_s)
+    assert worth[1] > 1.3 * worth[0]
 
 
 def test_what_is_not_said_to_be_dear_is_worth_itself():

@@ -6,7 +6,6 @@ from worlds.side_by_side import ADSS, EDSS, FRICTIONLESS, drive, state_space
 
 from sim.drivetrain import paper_drivetrain
 from sim.effects import drivetrain_with, parse_effect
-from sim.engine import propagator
 from sim.engine.propagator import build_propagator, find_modes
 
 FREQUENCIES = np.geomspace(1.0, 1000.0, 16)
@@ -74,15 +73,12 @@ def state_step(system, modes):
 
 @pytest.mark.parametrize("unit", [ADSS, EDSS], ids=["adss", "edss"])
 @pytest.mark.parametrize("effects", [(), ("shaft-damping:c_s1=0.1", "amplifier-lag:tau_a=1e-4")])
-def test_one_step_is_the_matrix_exponential_by_modes_and_without(unit, effects, monkeypatch):
+def test_one_step_is_the_matrix_exponential_by_modes_and_without(unit, effects):
     system = drivetrain_with(unit, 0.3, [parse_effect(text) for text in effects]).system()
     n, inlets = len(system.b), np.array([law.inlet for law in system.nonlinearities]).T
     by_modes = find_modes(system)
     assert by_modes.rates.size >= n
-    monkeypatch.setattr(propagator, "_WORST_CONDITION", 0.0)
-    # What is found so is kept for nobody else.
-    monkeypatch.setattr(propagator, "_modes_of", propagator._modes_of.__wrapped__)
-    without = find_modes(system)
+    without = find_modes(system, worst_condition=0.0)
     assert without.rates.size == 0
     scale = np.sqrt(np.maximum(np.diag(system.energy), 1e-9))
     for modes in (by_modes, without):
@@ -103,14 +99,12 @@ def test_one_step_is_the_matrix_exponential_by_modes_and_without(unit, effects, 
             assert apart.max() < 1e-8 * (np.abs(expected) * scale[:, None]).max()
 
 
-def test_modes_or_not_the_motion_with_play_and_friction_is_the_same(monkeypatch):
+def test_modes_or_not_the_motion_with_play_and_friction_is_the_same():
     system = paper_drivetrain(ADSS, 0.25).system()
     start = np.zeros(len(system.states))
     kept, state = drive(system, start, 130.0, 2, amplitude=2.5)
-    monkeypatch.setattr(propagator, "_WORST_CONDITION", 0.0)
-    # What is found so is kept for nobody else.
-    monkeypatch.setattr(propagator, "_modes_of", propagator._modes_of.__wrapped__)
-    again, other = drive(system, start, 130.0, 2, amplitude=2.5)
+    without = find_modes(system, worst_condition=0.0)
+    again, other = drive(system, start, 130.0, 2, amplitude=2.5, modes=without)
     assert np.abs(again - kept).max() < 1e-7
     # Rounding, which differs between processors, grows where the meshes hit: 1.4e-6 on one.
     assert other[:, 0] == pytest.approx(state[:, 0], rel=1e-5, abs=1e-6)

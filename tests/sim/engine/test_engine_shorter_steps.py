@@ -1,15 +1,14 @@
 """Where a motion grows without bound at one step, it is gone through again at a shorter one."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from worlds.asked_steps import growing
 from worlds.side_by_side import EDSS, law_parameters
 
 from daq.errors import AnalysisError
 from sim.effects import drivetrain_with, parse_effect
-from sim.engine import engine
 from sim.engine.engine import Stretch, advance, carry
+from sim.engine.propagator import build_propagator, find_modes
 from sim.engine.stepping import step_together
 
 LONG, SHORT, SHORTEST = 1e-5, 5e-6, 2.5e-6
@@ -32,33 +31,37 @@ def carried(*how):
     return motions
 
 
-def taken(monkeypatch, steps, grows):
+def taken(steps, grows):
     """What is stepped how long, and told done, where `grows(frequency, step)` grows."""
-    plain, seen, told = engine._dwell, [], []
-
-    def watched(moving, parameters, state, stretch, step):
-        motion = yield from plain(moving, parameters, state, stretch, step)
-        seen.append((stretch.frequency_hz, step))
-        if grows(stretch.frequency_hz, step):
-            motion = replace(motion, coefficients=motion.coefficients * np.nan)
-        return motion
-
-    monkeypatch.setattr(engine, "_dwell", watched)
+    seen, told = [], []
     system, parameters, state = machine(1e4)
+    modes = find_modes(system)
+    # Steps a cycle tell frequency and step: no two of them have as many.
+    which = {
+        build_propagator(system, modes, f, step).steps_per_cycle: (f, step)
+        for f in FREQUENCIES
+        for step in steps
+    }
+    assert len(which) == len(FREQUENCIES) * len(steps)
+
+    def grows_at(asked):
+        seen.append(which[asked.steps])
+        return grows(*seen[-1])
+
     done = lambda: told.append(len(seen))  # noqa: E731
-    motions = carried(system, parameters, state, stretches(), steps, True, done)
+    asking = carry(system, parameters, state, stretches(), steps, True, done)
+    (motions,) = step_together([growing(asking, grows_at)])
     assert len(told) == len(motions) == len(FREQUENCIES)
     return seen, motions
 
 
-def test_a_stretch_and_the_one_before_are_gone_through_again(monkeypatch):
-    seen, motions = taken(monkeypatch, (LONG, SHORT), lambda f, step: f == 76.0 and step == LONG)
+def test_a_stretch_and_the_one_before_are_gone_through_again():
+    seen, motions = taken((LONG, SHORT), lambda f, step: f == 76.0 and step == LONG)
     again = [(74.0, SHORT), (76.0, SHORT)]
     long = [(f, LONG) for f in FREQUENCIES]
     assert seen == [*long[:4], *again, *long[4:]]
     # As long as they agree in their steps, they agree to the last bit.
     system, parameters, state = machine(1e4)
-    monkeypatch.undo()
     plain = list(advance(system, parameters, state, stretches(), LONG, True))
     same = [
         np.array_equal(a.coefficients, b.coefficients) for a, b in zip(motions, plain, strict=1)
@@ -66,29 +69,27 @@ def test_a_stretch_and_the_one_before_are_gone_through_again(monkeypatch):
     assert same == [True, True, *[False] * 9]
 
 
-def test_the_first_of_all_has_none_before_it(monkeypatch):
-    seen, _ = taken(monkeypatch, (LONG, SHORT), lambda f, step: f == 70.0 and step == LONG)
+def test_the_first_of_all_has_none_before_it():
+    seen, _ = taken((LONG, SHORT), lambda f, step: f == 70.0 and step == LONG)
     assert seen[:3] == [(70.0, LONG), (70.0, SHORT), (72.0, LONG)]
 
 
-def test_a_third_step_is_taken_where_the_second_will_not_do(monkeypatch):
-    seen, _ = taken(
-        monkeypatch, (LONG, SHORT, SHORTEST), lambda f, step: f == 76.0 and step > SHORTEST
-    )
+def test_a_third_step_is_taken_where_the_second_will_not_do():
+    seen, _ = taken((LONG, SHORT, SHORTEST), lambda f, step: f == 76.0 and step > SHORTEST)
     assert seen.count((76.0, SHORTEST)) == 1
     assert [f for f, step in seen if step == SHORTEST] == [74.0, 76.0]
 
 
-def test_what_grows_often_keeps_the_shorter_step(monkeypatch):
-    seen, _ = taken(monkeypatch, (LONG, SHORT), lambda f, step: step == LONG)
+def test_what_grows_often_keeps_the_shorter_step():
+    seen, _ = taken((LONG, SHORT), lambda f, step: step == LONG)
     # More than a tenth of eleven is two; from then on nothing is tried in vain.
     assert [f for f, step in seen if step == LONG] == [70.0, 72.0]
     assert [f for f, step in seen if step == SHORT] == [70.0, 70.0, *FREQUENCIES[1:]]
 
 
-def test_what_grows_at_every_step_is_an_error(monkeypatch):
+def test_what_grows_at_every_step_is_an_error():
     with pytest.raises(AnalysisError, match="at 76 Hz grew without bound"):
-        taken(monkeypatch, (LONG, SHORT), lambda f, step: f == 76.0)
+        taken((LONG, SHORT), lambda f, step: f == 76.0)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])

@@ -2,15 +2,26 @@
 
 import numpy as np
 import pytest
+from worlds.asked_steps import overheard
 from worlds.permutation import permutation_p
-from worlds.side_by_side import ADSS, EDSS, FRICTIONLESS, departure, drive, engine_gain
+from worlds.side_by_side import (
+    ADSS,
+    EDSS,
+    FRICTIONLESS,
+    departure,
+    drive,
+    engine_gain,
+    law_parameters,
+)
 
 from daq.plan import SweepPlan
 from sim.catalogue import BUILT_IN
 from sim.drivetrain import paper_drivetrain
 from sim.effects import EffectSetting, drivetrain_with, parse_effect
-from sim.engine import propagator, stepping
+from sim.engine.engine import Stretch, carry
 from sim.engine.machine_code import architecture
+from sim.engine.propagator import find_modes
+from sim.engine.stepping import step_together
 from sim.response import Servo, simulate_cycles
 
 STEP_S = 1e-5
@@ -77,32 +88,27 @@ def test_every_effect_is_the_same_for_as_long_as_a_start_is_remembered(unit, eff
 
 
 @pytest.mark.skipif(not architecture(), reason="what this processor does is not known here")
-def test_what_dies_away_ends_at_zero_and_not_among_numbers_that_take_long(monkeypatch):
+def test_what_dies_away_ends_at_zero_and_not_among_numbers_that_take_long():
     system = drivetrain_with(ADSS, 0.4, [parse_effect("amplifier-lag:tau_a=0.0005")]).system()
-    ends = []
-
-    def kept(layout, coefficients, lanes, *rest):
-        found = step(layout, coefficients, lanes, *rest)
-        ends.append(lanes[layout.lanes["q"]].copy())
-        return found
-
-    step = stepping.step_cycles
-    monkeypatch.setattr(stepping, "step_cycles", kept)
+    one, ends = np.ones(16), []
     # 0.2 s are 400 times the lag; the smallest number of full digits is left behind after 90.
-    drive(system, np.zeros((len(system.states), 16)), 100.0, 20, 2.5, step_s=STEP_S, single=True)
+    stretch = Stretch(100.0, 2.5 * one, 0.0 * one, 0.0 * one, 0, 20)
+    start = np.zeros((len(system.states), 16))
+    asking = carry(system, law_parameters(system, 16), start, [stretch], [STEP_S], True)
+    step_together([overheard(asking, lambda steps, stepped: ends.append(stepped.q) or stepped)])
     (q,) = ends
     assert np.any(np.all(q == 0.0, axis=1))
     assert np.all((q == 0.0) | (np.abs(q) >= np.finfo(np.float32).tiny))
     assert np.float32(1e-38) * np.float32(0.1) > 0.0, "the caller's own arithmetic has changed"
 
 
-def test_a_system_without_usable_modes_keeps_all_its_digits(monkeypatch):
+def test_a_system_without_usable_modes_keeps_all_its_digits():
     system = paper_drivetrain(ADSS, 0.25).system()
-    monkeypatch.setattr(propagator, "_WORST_CONDITION", 0.0)
-    # What is found so is kept for nobody else.
-    monkeypatch.setattr(propagator, "_modes_of", propagator._modes_of.__wrapped__)
+    modes = find_modes(system, worst_condition=0.0)
     start = np.zeros((len(system.states), 3))
-    one, other = (drive(system, start, 120.0, 2, 2.5, single=single) for single in (False, True))
+    one, other = (
+        drive(system, start, 120.0, 2, 2.5, single=single, modes=modes) for single in (False, True)
+    )
     assert np.array_equal(one[0], other[0])
     assert np.array_equal(one[1], other[1])
 

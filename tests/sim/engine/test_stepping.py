@@ -1,16 +1,15 @@
 """Several systems stepped in one call: each gets what it gets alone, to the last bit."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from worlds.asked_steps import growing
 from worlds.side_by_side import ADSS, EDSS, law_parameters
 
 from daq.errors import AnalysisError
 from sim.effects import drivetrain_with, parse_effect
-from sim.engine import engine, stepping
+from sim.engine import stepping
 from sim.engine.engine import Stretch, carry
 from sim.engine.lanes import VECTOR_BYTES
 from sim.engine.stepping import shared_out, step_together
@@ -101,34 +100,25 @@ def test_what_is_not_alike_is_stepped_apart(other, calls):
         assert same(found, alone)
 
 
-def growing(monkeypatch, who, at=110.0):
-    """A system of which what is stepped at the long step grows at one frequency."""
-    plain = engine._dwell
-
-    def watched(moving, parameters, state, stretch, step_s):
-        motion = yield from plain(moving, parameters, state, stretch, step_s)
-        if step_s > SHORT and stretch.frequency_hz == at and state.shape[1] == who:
-            return replace(motion, coefficients=motion.coefficients * np.nan)
-        return motion
-
-    monkeypatch.setattr(engine, "_dwell", watched)
+def growing_asker(**how):
+    """One of which what is stepped at the long step grows at 110 Hz."""
+    return growing(asker(**how), lambda steps: 900 < steps.steps < 920)
 
 
-def test_one_that_goes_back_leaves_the_other_as_it_is(monkeypatch, calls):
-    growing(monkeypatch, who=TWO - 1)
-    ask = [{"lanes": TWO - 1, "steps": (LONG, SHORT)}, {"ratio": 0.3, "steps": (LONG,)}]
-    together = step_together([asker(**how) for how in ask])
-    for how, found in zip(ask, together, strict=True):
-        (alone,) = step_together([asker(**how)])
+def test_one_that_goes_back_leaves_the_other_as_it_is(calls):
+    back = {"lanes": TWO - 1, "steps": (LONG, SHORT)}
+    other = {"ratio": 0.3, "steps": (LONG,)}
+    together = step_together([growing_asker(**back), asker(**other)])
+    for found, ask in zip(together, (growing_asker(**back), asker(**other)), strict=True):
+        (alone,) = step_together([ask])
         assert same(found, alone)
     assert [m.step_s > SHORT for m in together[0]] == [False, False, False]
     assert calls[0] == (2, 4)
 
 
-def test_what_one_raises_ends_the_whole(monkeypatch):
-    growing(monkeypatch, who=TWO - 1)
+def test_what_one_raises_ends_the_whole():
     with pytest.raises(AnalysisError, match="at 110 Hz grew without bound"):
-        step_together([asker(lanes=TWO), asker(lanes=TWO - 1)])
+        step_together([asker(lanes=TWO), growing_asker(lanes=TWO - 1)])
 
 
 def test_who_asks_for_nothing_is_done():
