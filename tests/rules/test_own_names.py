@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from rules.own_names import found_in, patches, private_names
 
-LEFT = {patches: 118, private_names: 53}
+LEFT = {patches: 85, private_names: 32}
 """Of 174 and 69 once. Lower the number with every one that goes; put none in its place."""
 
 
