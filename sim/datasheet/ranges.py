@@ -77,7 +77,7 @@ def _single(
 _INERTIA = ((1e-12, 1e5), (1e-16, 1e9))
 _STIFFNESS = ((1e-3, 1e10), (1e-7, 1e14))
 _STAGE = ((1.05, 400.0), (0.02, 1e5))
-_TURNED = "it is turns of the faster side per turn of the slower one, above 1"
+_TURNED = "it is turns of the faster side per turn of the slower one, 1 or more"
 
 # From motors of 4 mm diameter to drives of antennas.
 SINGLES = (
@@ -90,7 +90,7 @@ SINGLES = (
     _single("T_f_m", (0.0, 100.0), (0.0, 1e5)),
     _single("k_a", (1e-3, 1e3), (1e-7, 1e7)),
     _single("k_ts", (1e-5, 1e3), (1e-10, 1e8)),
-    _single("N_1", *_STAGE, remedy=_TURNED),
+    _single("N_1", (1.0, 400.0), (0.02, 1e5), remedy=_TURNED),
     _single("k_g1", *_STIFFNESS),
     _single("J_g1", *_INERTIA),
     _single("k_s1", *_STIFFNESS),

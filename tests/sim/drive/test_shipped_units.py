@@ -17,8 +17,20 @@ UNITS = config_names("units")
 PUBLISHED = [name for name in UNITS if name not in ("adss", "edss")]
 
 
-def test_there_are_eight_units_or_more():
+KINDS = {
+    "gimbal": ("adss", "edss"),
+    "axis of a robot on a torque loop": ("r3-1", "r3-2", "r3-3"),
+    "robot with a flexible arm, sampled": ("irb",),
+    "harmonic drive with torsion bar and encoder": ("walkman-2300", "walkman-b11"),
+    "feed axis with a ball screw": ("feed-axis",),
+    "two-mass rig behind a planetary gearhead": ("srv02-torsion",),
+}
+
+
+def test_there_are_eight_units_of_six_kinds():
+    assert sorted(name for names in KINDS.values() for name in names) == sorted(UNITS)
     assert len(UNITS) >= 8
+    assert len(KINDS) >= 6
 
 
 @pytest.mark.parametrize("name", UNITS)
