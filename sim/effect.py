@@ -154,8 +154,7 @@ def load_frequency(unit: Unit) -> float:
     A natural scale of what swings on the load. Rounded, so that a small change of the unit
     leaves ranges, and the runs that depend on them, as they are.
     """
-    stiffness = unit.stage1.k_s1 * unit.output_ratio**2
-    scale = math.sqrt(stiffness / unit.load.J_L) / (2.0 * math.pi * 14.0)
+    scale = math.sqrt(shaft_at_load(unit) / unit.load.J_L) / (2.0 * math.pi * 14.0)
     decade = 10.0 ** math.floor(math.log10(scale))
     steps = (decade, 2.0 * decade, 5.0 * decade, 10.0 * decade)
     return min(steps, key=lambda step: abs(math.log(step / scale)))
@@ -163,13 +162,13 @@ def load_frequency(unit: Unit) -> float:
 
 def load_critical(unit: Unit) -> float:
     """Damping that would be critical for the load on shaft 1, N.m.s/rad: a natural scale."""
-    stiffness = unit.stage1.k_s1 * unit.output_ratio**2
-    return 2.0 * math.sqrt(stiffness * unit.load.J_L)
+    return 2.0 * math.sqrt(shaft_at_load(unit) * unit.load.J_L)
 
 
 def shaft_critical(unit: Unit) -> float:
-    """The same of shaft 1, N.m.s/rad."""
-    return load_critical(unit) / unit.output_ratio**2
+    """The same of shaft 1 alone, N.m.s/rad."""
+    stiffness = unit.stage1.k_s1 * unit.output_ratio**2
+    return 2.0 * math.sqrt(stiffness * unit.load.J_L) / unit.output_ratio**2
 
 
 def stall_torque(unit: Unit) -> float:
@@ -181,5 +180,11 @@ def stall_torque(unit: Unit) -> float:
 
 
 def shaft_at_load(unit: Unit) -> float:
-    """Stiffness of shaft 1 as the load sees it, N.m/rad."""
-    return unit.stage1.k_s1 * unit.output_ratio**2
+    """Stiffness that the load works against, N.m/rad: of shaft 1 and couplings in series."""
+    shaft, compliance = unit.stage1.k_s1 * unit.output_ratio**2, 0.0
+    if unit.load_coupling is not None:
+        compliance += 1.0 / unit.load_coupling.k_cL
+    if unit.motor_coupling is not None:
+        ratio = unit.stage1.N_1 * unit.output_ratio
+        compliance += 1.0 / (unit.motor_coupling.k_cm * ratio**2)
+    return shaft / (1.0 + shaft * compliance)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.ensemble.linear_response import linear_response
-from sim.effect import SOURCE_MOST_VPK
+from sim.effect import SOURCE_MOST_VPK, shaft_at_load
 from sim.tolerance import RESPONSE_SCALES
 from sim.unit import Unit
 
@@ -139,8 +139,7 @@ def _spread_of(key: _Key) -> Spread:
 def _sensitivities(unit: Unit, symbols: list[str]) -> NDArray[np.float64]:
     """Change of log gain and phase (rows, p) by a unit of each symbol, over root of the rows."""
     known = unit.parameters
-    stiffness = unit.stage1.k_s1 * unit.output_ratio**2
-    load_hz = math.sqrt(stiffness / unit.load.J_L) / (2.0 * math.pi)
+    load_hz = math.sqrt(shaft_at_load(unit) / unit.load.J_L) / (2.0 * math.pi)
     frequency_hz = load_hz * np.geomspace(*_BAND, _POINTS)
     plain = linear_response(unit, frequency_hz, _LEVELS)
     columns = []

@@ -1,8 +1,9 @@
-"""The sweep that tells most of the contribution ratio in so many minutes.
+"""The sweep that tells most of the backlash of the stages in so many minutes.
 
 Owns one ensemble of drives as the datasheet allows, taken through a wide and dense sweep, and the
-comparison of shorter sweeps as parts of it: expected error of the ratio (Chaloner and Verdinelli
-1995). It measures nothing and knows no bench.
+comparison of shorter sweeps as parts of it: expected error of the contribution ratio, or of the
+total backlash of a drive with one stage (Chaloner and Verdinelli 1995). It measures nothing and
+knows no bench.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from analysis.commissioning.coordinates import RATIO, Coordinates
 from analysis.commissioning.identification import simulate_drives
-from analysis.commissioning.regression import Gaussian, Round, expected_std
+from analysis.commissioning.regression import Gaussian, expected_std
 from analysis.execution.executor import Executor
 from analysis.execution.progress import Progress, part_of
 from analysis.inference.plans import landmarks
@@ -28,9 +29,13 @@ from daq.errors import InputError
 from daq.plan import SweepPlan, spaced_frequencies
 from daq.recipe import Recipe
 from daq.untrusted.bounded_text import parse_toml
+from sim.effect import shaft_at_load
 from sim.unit import Unit
 
 __all__ = ["Planned", "plan_sweep"]
+
+_TOTAL = "b_t_deg"
+"""Name of the total backlash, among coordinates and in documents."""
 
 _POINTS = 61
 """Frequencies of the ensemble's sweep; a shorter sweep takes some of them."""
@@ -66,9 +71,10 @@ class Planned:
     """A sweep, and what is expected of it.
 
     `arf_hz`, `rf_hz`: 5 %, 50 % and 95 % quantiles over drives as the datasheet allows, at the
-    middle level; None where most show none. `ratio_std`: expected error of the contribution ratio
-    by a linear estimate, and `usual_std` that of the best sweep of one level in the same
-    time. `still_vpk`: levels that friction holds. `limits`: what the unit's limits cut off.
+    middle level; None where most show none. `expected_std`: expected error of the `quantity`,
+    ``contribution_ratio`` or ``b_t_deg``, by a linear estimate, and `usual_std` that of the best
+    sweep of one level in the same time. `still_vpk`: levels that friction holds. `limits`: what
+    the unit's limits cut off.
     """
 
     unit: str
@@ -76,7 +82,8 @@ class Planned:
     minutes: float
     arf_hz: tuple[float, float, float] | None
     rf_hz: tuple[float, float, float] | None
-    ratio_std: float
+    quantity: str
+    expected_std: float
     usual_std: float
     still_vpk: tuple[float, ...]
     limits: tuple[str, ...]
@@ -95,6 +102,16 @@ class Planned:
             "integrate_cycles": self.plan.integrate_cycles,
         }
 
+    @property
+    def _symbol(self) -> str:
+        return " deg" if self.quantity == _TOTAL else ""
+
+    @property
+    def _expected(self) -> str:
+        """The quantity and its expected error, in words."""
+        name = "total backlash" if self.quantity == _TOTAL else "contribution ratio"
+        return f"{name} {self.expected_std:.2g}{self._symbol}"
+
     def to_json(self) -> dict[str, Any]:
         """The document of ``plan --json``."""
         return {
@@ -103,7 +120,7 @@ class Planned:
             "minutes": self.minutes,
             "arf_hz": _quantiles(self.arf_hz),
             "rf_hz": _quantiles(self.rf_hz),
-            "contribution_ratio": {"expected_std": self.ratio_std, "one_level": self.usual_std},
+            self.quantity: {"expected_std": self.expected_std, "one_level": self.usual_std},
             "held_by_friction_vpk": list(self.still_vpk),
             "limits": list(self.limits),
         }
@@ -122,8 +139,8 @@ class Planned:
         lines += [
             f"  sweep {len(f)} points, log spaced, from {f[0]:.4g} to {f[-1]:.4g} Hz at {levels} V",
             f"  driving time {self.minutes:.2g} min",
-            f"  expected error of the contribution ratio {self.ratio_std:.2f} "
-            f"({self.usual_std:.2f} with one level in the same time)",
+            f"  expected error of the {self._expected} "
+            f"({self.usual_std:.2g}{self._symbol} with one level in the same time)",
         ]
         if self.still_vpk:
             still = ", ".join(f"{level:g}" for level in self.still_vpk)
@@ -133,11 +150,7 @@ class Planned:
     def recipe(self) -> str:
         """The text of a recipe file (TOML) of this plan."""
         document = tomlkit.document()
-        document.add(
-            tomlkit.comment(
-                f"expected error of the contribution ratio of this sweep: {self.ratio_std:.2f}"
-            )
-        )
+        document.add(tomlkit.comment(f"expected error of this sweep: {self._expected}"))
         document.add("schema", tomlkit.item(1))
         document.add("name", tomlkit.item(self.unit))
         sweep = tomlkit.table()
@@ -158,18 +171,17 @@ def plan_sweep(
 ) -> Planned:
     """The sweep of a unit that tells most of its contribution ratio in a time, minutes.
 
+    Of a drive with one stage it tells most of the total backlash.
+
     Raises
     ------
     AnalysisError
         If a motion grew without bound.
     InputError
-        If the unit has one stage, or the time is too short for any sweep.
+        If the time is too short for any sweep, or a total backlash of zero is to be planned for.
     """
-    if unit.stages == 1:
-        raise InputError(
-            f"unit {unit.name} has one gear stage: there is no ratio to plan for; sweep from below "
-            "the anti-resonance to above the resonance at two levels"
-        )
+    coordinates = Coordinates.of(unit, total_backlash_unknown=unit.stages == 1)
+    quantity, scale = (RATIO, 1.0) if unit.stages == 2 else (_TOTAL, unit.backlash.b_t_deg)
     wide, cut = _wide_plan(unit)
     observation = unread(wide, USUAL_NOISE_V)
     parts = list(_parts(wide, observation, 60.0 * minutes))
@@ -179,7 +191,6 @@ def plan_sweep(
             f"{minutes:g} min: the shortest useful sweep of {unit.name} takes "
             f"{shortest.duration_s / 60.0:.2g} min; give more"
         )
-    coordinates = Coordinates.of(unit)
     prior = Gaussian(coordinates.nominal(), np.eye(len(coordinates)))
     report = part_of(progress, 0.0, 1.0, "simulating drives as the datasheet allows")
     families = max(_PER_COORDINATE * len(coordinates), _LEAST_FAMILIES)
@@ -188,7 +199,9 @@ def plan_sweep(
     )
     found = []
     for rows, frequencies, levels in parts:
-        std = _ratio_std(coordinates, drawn, prior, rows, len(observation))
+        values = scale * coordinates.factors(drawn.z)[:, coordinates.symbols.index(quantity)]
+        columns = np.tile(rows, drawn.y.shape[1] // len(observation))
+        std = expected_std(drawn, prior, columns, values)
         plan = _plan(frequencies, levels)
         found.append((std, plan.duration_s, plan))
     least = min(std for std, _, _ in found)
@@ -198,7 +211,7 @@ def plan_sweep(
     middle = log_gain[:, len(wide.levels_vpk) // 2]
     arf, rf = _features(np.array(wide.frequencies_hz), middle)
     return Planned(
-        unit.name, plan, plan.duration_s / 60.0, arf, rf, std, min(single, default=std),
+        unit.name, plan, plan.duration_s / 60.0, arf, rf, quantity, std, min(single, default=std),
         _still(wide, log_gain), cut,
     )  # fmt: skip
 
@@ -206,7 +219,7 @@ def plan_sweep(
 def _wide_plan(unit: Unit) -> tuple[SweepPlan, tuple[str, ...]]:
     """The ensemble's sweep within the unit's limits, and what these cut off."""
     limits = unit.limits
-    load_hz = math.sqrt(unit.stage1.k_s1 * unit.output_ratio**2 / unit.load.J_L) / (2.0 * math.pi)
+    load_hz = math.sqrt(shaft_at_load(unit) / unit.load.J_L) / (2.0 * math.pi)
     # Where features lie does not depend on where the unit may be driven.
     around = {"start_hz": _AROUND[0] * load_hz, "stop_hz": _AROUND[1] * load_hz}
     marks = landmarks(unit.model_copy(update={"limits": limits.model_copy(update=around)}))
@@ -260,19 +273,6 @@ def _densest(
         if _plan(tuple(grid[kept].tolist()), levels).duration_s <= longest_s:
             return np.asarray(kept)
     return None
-
-
-def _ratio_std(
-    coordinates: Coordinates,
-    drawn: Round,
-    prior: Gaussian,
-    rows: NDArray[np.bool_],
-    count: int,
-) -> float:
-    """Expected error of the ratio by the rows (rows,) of a sweep, over all drives."""
-    ratio = coordinates.factors(drawn.z)[:, coordinates.symbols.index(RATIO)]
-    columns = np.tile(rows, drawn.y.shape[1] // count)
-    return expected_std(drawn, prior, columns, ratio)
 
 
 def _features(

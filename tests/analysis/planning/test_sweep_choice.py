@@ -1,5 +1,6 @@
 """A planned sweep: what it says of a unit, and that it is one that can be measured."""
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -7,9 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from analysis.planning import plan_sweep
+from daq.configs import config_names
 from daq.errors import InputError
 from daq.recipe import Recipe
 from daq.untrusted.bounded_text import parse_toml
+from sim.datasheet import natural_frequencies
+from sim.effect import shaft_at_load
 from sim.unit import load_unit
 
 
@@ -38,12 +42,12 @@ def test_features_lie_where_the_paper_found_them(planned):
 
 def test_it_tells_the_ratio_better_than_nothing_does(planned):
     """A ratio of which nothing is known has a standard deviation of 0.29."""
-    assert 0.01 < planned.ratio_std < 0.15
+    assert 0.01 < planned.expected_std < 0.15
 
 
 def test_several_levels_tell_it_better_than_one(planned):
     assert len(planned.plan.levels_vpk) > 1
-    assert planned.ratio_std < 0.9 * planned.usual_std
+    assert planned.expected_std < 0.9 * planned.usual_std
 
 
 def test_its_recipe_is_one(planned):
@@ -66,8 +70,30 @@ def test_features_outside_the_limits_are_told():
         plan_sweep(unit.model_copy(update={"limits": narrow}), 1.0)
 
 
-def test_one_stage_has_no_ratio_to_plan_for():
-    two = load_unit("adss")
-    document = {"stage2": None, "stage1": two.stage1.model_copy(update={"J_p2": None})}
-    with pytest.raises(InputError, match="one gear stage"):
-        plan_sweep(two.model_copy(update=document), 1.0)
+@pytest.mark.parametrize("name", ["feed-axis", "r3-1"])
+def test_what_is_too_short_is_told_with_the_shortest_sweep_of_every_drive(name):
+    """One stage is no fault, and couplings, which place the features, leave these in the limits."""
+    with pytest.raises(InputError, match="the shortest useful sweep"):
+        plan_sweep(load_unit(name), 1e-6)
+
+
+@pytest.mark.study
+def test_a_drive_with_one_stage_is_planned_for_its_total_backlash():
+    """The screw of a feed axis; a minute or two of a processor."""
+    unit = load_unit("feed-axis")
+    found = plan_sweep(unit, 2.0)
+    said = found.to_json()
+    assert "contribution_ratio" not in said
+    assert 0.0 < said["b_t_deg"]["expected_std"] < 0.5 * unit.backlash.b_t_deg
+    assert f"total backlash {found.expected_std:.2g} deg" in "\n".join(found.summary())
+    modes = natural_frequencies(unit)
+    assert found.plan.frequencies_hz[0] < modes.anti_resonances_hz[0]
+    assert modes.resonances_hz[0] < found.plan.frequencies_hz[-1] < 3.0 * modes.resonances_hz[0]
+
+
+@pytest.mark.parametrize("name", config_names("units"))
+def test_the_natural_scale_of_the_load_is_its_frequency(name):
+    """With couplings in series: of every drive the load swings within a factor of 1.5 of it."""
+    unit = load_unit(name)
+    scale = math.sqrt(shaft_at_load(unit) / unit.load.J_L) / (2.0 * math.pi)
+    assert scale == pytest.approx(natural_frequencies(unit).anti_resonances_hz[0], rel=0.5)
