@@ -13,7 +13,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +34,7 @@ from daq.configs import config_names
 from daq.plan import SweepPlan, spaced_frequencies
 from sim.unit import Unit
 
-__all__ = ["CLEAR_SIGMA", "NextMeasurement", "propose_measurement"]
+__all__ = ["CLEAR_SIGMA", "NextMeasurement", "Separate", "propose_measurement", "separations"]
 
 CLEAR_SIGMA = 2.0
 """What a further sweep has to part two sets by, to be worth its while."""
@@ -117,6 +117,45 @@ class NextMeasurement:
         }
 
 
+class Separate(Protocol):
+    """Says how far groups of runs are from the first one's in a plan, in standard deviations."""
+
+    def __call__(
+        self,
+        unit: Unit,
+        groups: Sequence[Sequence[Group]],
+        plan: SweepPlan,
+        noise_v: float,
+        rng: np.random.Generator,
+        executor: Executor | None,
+        /,
+    ) -> list[float]:
+        """One number for each group but the first."""
+        ...
+
+
+def separations(
+    unit: Unit,
+    groups: Sequence[Sequence[Group]],
+    plan: SweepPlan,
+    noise_v: float,
+    rng: np.random.Generator,
+    executor: Executor | None = None,
+) -> list[float]:
+    """How far groups of runs are from the first hypothesis', in standard deviations of both."""
+    grid = plan.frequencies_hz
+    thinned = replace(plan, frequencies_hz=grid[:: max(len(grid) // _COARSE, 1)])
+    asked = [group for of_one in groups for group in of_one]
+    made = simulate_groups(unit, asked, unread(thinned, noise_v), rng, executor)
+    first, *rivals = (
+        _moments(made[of_one[0].hypothesis.effects], plan.levels_vpk[0], noise_v)
+        for of_one in groups
+    )
+    share = len(grid) / len(thinned.frequencies_hz)
+    least = max(_FLOOR, _OF_GAIN * spread_of(unit).gain)
+    return [float(np.sqrt(share * _squares(first, rival, least) / TEMPERATURE)) for rival in rivals]
+
+
 def propose_measurement(
     unit: Unit,
     first: FittedModel,
@@ -126,8 +165,14 @@ def propose_measurement(
     seed: int = 0,
     executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
+    separate: Separate = separations,
 ) -> NextMeasurement | None:
     """The plan that best separates a candidate from its rivals, or None if the limits allow none.
+
+    Parameters
+    ----------
+    separate
+        How plans are judged; by simulation, if left out.
 
     Raises
     ------
@@ -141,7 +186,7 @@ def propose_measurement(
     for tried, plan in enumerate(plans):
         # The same machines in every plan, off their datasheets alike: plans differ by themselves.
         alike = np.random.default_rng(seed)
-        apart[tried] = _separations(unit, groups, plan, observation.noise_v, alike, executor)
+        apart[tried] = separate(unit, groups, plan, observation.noise_v, alike, executor)
         if progress is not None:
             progress((tried + 1) / len(plans))
     if not len(plans):
@@ -198,28 +243,6 @@ def _feasible_bands(unit: Unit, observation: Observation) -> Iterator[tuple[floa
         allowed = max(bottom, unit.limits.start_hz), min(top, unit.limits.stop_hz)
         if allowed[0] < allowed[1]:
             yield allowed
-
-
-def _separations(
-    unit: Unit,
-    groups: Sequence[Sequence[Group]],
-    plan: SweepPlan,
-    noise_v: float,
-    rng: np.random.Generator,
-    executor: Executor | None = None,
-) -> list[float]:
-    """How far groups of runs are from the first hypothesis', in standard deviations of both."""
-    grid = plan.frequencies_hz
-    thinned = replace(plan, frequencies_hz=grid[:: max(len(grid) // _COARSE, 1)])
-    asked = [group for of_one in groups for group in of_one]
-    made = simulate_groups(unit, asked, unread(thinned, noise_v), rng, executor)
-    first, *rivals = (
-        _moments(made[of_one[0].hypothesis.effects], plan.levels_vpk[0], noise_v)
-        for of_one in groups
-    )
-    share = len(grid) / len(thinned.frequencies_hz)
-    least = max(_FLOOR, _OF_GAIN * spread_of(unit).gain)
-    return [float(np.sqrt(share * _squares(first, rival, least) / TEMPERATURE)) for rival in rivals]
 
 
 def _squares(one: _Moments, other: _Moments, least: float) -> float:

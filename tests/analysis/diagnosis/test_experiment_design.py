@@ -5,8 +5,11 @@ import numpy as np
 import pytest
 from worlds.synthetic import ADSS, LEVELS, candidate, observation, read
 
-import analysis.diagnosis.experiment_design as module
-from analysis.diagnosis.experiment_design import NextMeasurement, propose_measurement
+from analysis.diagnosis.experiment_design import (
+    NextMeasurement,
+    propose_measurement,
+    separations,
+)
 from analysis.inference.run_design import runs_along_ridge
 from daq.plan import SweepPlan
 
@@ -14,21 +17,20 @@ SEEN = observation(read(("load-inertia",), np.array([0.5, 0.5]), np.random.defau
 FIRST, SECOND = (candidate(SEEN, (e,)) for e in ("load-inertia", "shaft-stiffness"))
 
 
-def proposed(monkeypatch, judge, rivals=(SECOND,)):
+def proposed(judge, rivals=(SECOND,)):
     tried = []
 
-    def separations(unit, groups, plan, noise_v, rng, executor):
+    def counted(unit, groups, plan, noise_v, rng, executor):
         tried.append(plan)
         assert len(groups) == 1 + len(rivals)
         sigma = judge(plan)
         return sigma if isinstance(sigma, list) else [sigma]
 
-    monkeypatch.setattr(module, "_separations", separations)
-    return propose_measurement(ADSS, FIRST, rivals, SEEN), tried
+    return propose_measurement(ADSS, FIRST, rivals, SEEN, separate=counted), tried
 
 
-def test_every_plan_lies_within_the_limits_and_the_choice_is_wide(monkeypatch):
-    _, tried = proposed(monkeypatch, lambda plan: 1.0)
+def test_every_plan_lies_within_the_limits_and_the_choice_is_wide():
+    _, tried = proposed(lambda plan: 1.0)
     for plan in tried:
         assert plan.levels_vpk[0] + abs(plan.dc_offset_v) <= ADSS.limits.source_vpk
         assert plan.frequencies_hz[0] >= ADSS.limits.start_hz
@@ -49,18 +51,16 @@ def test_every_plan_lies_within_the_limits_and_the_choice_is_wide(monkeypatch):
         ((900.0, 1000.0), (1.0, 4.0), 0),
     ],
 )
-def test_what_was_measured_beyond_the_limits_is_answered_within_them(
-    band_hz, levels_vpk, plans, monkeypatch
-):
+def test_what_was_measured_beyond_the_limits_is_answered_within_them(band_hz, levels_vpk, plans):
     beyond = SimpleNamespace(
         frequency_hz=np.array(band_hz), source_vpk=np.array(levels_vpk),
         plans=SEEN.plans, noise_v=SEEN.noise_v,
     )  # fmt: skip
     tried = []
-    monkeypatch.setattr(
-        module, "_separations", lambda unit, groups, plan, *_: tried.append(plan) or [1.0]
-    )
-    found = propose_measurement(ADSS, FIRST, [SECOND], beyond)
+    found = propose_measurement(
+        ADSS, FIRST, [SECOND], beyond,
+        separate=lambda unit, groups, plan, *_: tried.append(plan) or [1.0],
+    )  # fmt: skip
     assert len(tried) == plans
     assert (found is None) == (plans == 0)
     for plan in tried:
@@ -69,15 +69,15 @@ def test_what_was_measured_beyond_the_limits_is_answered_within_them(
         assert plan.frequencies_hz[-1] <= ADSS.limits.stop_hz
 
 
-def test_the_plan_that_parts_them_furthest_is_taken(monkeypatch):
-    found, _ = proposed(monkeypatch, lambda plan: 5.0 if plan.dc_offset_v else 1.0)
+def test_the_plan_that_parts_them_furthest_is_taken():
+    found, _ = proposed(lambda plan: 5.0 if plan.dc_offset_v else 1.0)
     assert found.plan.dc_offset_v > 0.0
     assert found.expected_sigma == 5.0
     assert found.separates == ("load-inertia", "shaft-stiffness")
 
 
-def test_a_cheaper_plan_that_does_nearly_as_well_is_preferred(monkeypatch):
-    found, tried = proposed(monkeypatch, lambda plan: 4.0 - 1e-3 * plan.duration_s)
+def test_a_cheaper_plan_that_does_nearly_as_well_is_preferred():
+    found, tried = proposed(lambda plan: 4.0 - 1e-3 * plan.duration_s)
     assert found.plan.duration_s == min(plan.duration_s for plan in tried)
 
 
@@ -105,7 +105,7 @@ def test_of_several_rivals_the_one_that_is_hardest_to_tell_decides(
             return offset
         return down if plan.direction == "down" else [0.5, 0.5]
 
-    found, _ = proposed(monkeypatch, judge, (SECOND, THIRD))
+    found, _ = proposed(judge, (SECOND, THIRD))
     assert bool(found.plan.dc_offset_v) == takes_offset
     assert found.separates == ("load-inertia", separates)
     assert found.expected_sigma == sigma
@@ -150,9 +150,7 @@ def test_two_models_that_differ_are_parted_by_a_real_simulation_and_one_not_from
     )
 
     def apart(*of):
-        return module._separations(
-            ADSS, [groups[i] for i in of], plan, 5e-4, np.random.default_rng(0)
-        )
+        return separations(ADSS, [groups[i] for i in of], plan, 5e-4, np.random.default_rng(0))
 
     assert apart(0, 0) == [0.0]
     (one,) = apart(0, 1)
@@ -161,16 +159,15 @@ def test_two_models_that_differ_are_parted_by_a_real_simulation_and_one_not_from
     assert apart(0, 0, 0) == [0.0, 0.0]
 
 
-def test_every_plan_is_judged_by_the_same_machines(monkeypatch):
+def test_every_plan_is_judged_by_the_same_machines():
     """Or plans would differ by the machines that were drawn for them."""
     asked = []
 
-    def separations(unit, groups, plan, noise_v, rng, executor):
+    def noted(unit, groups, plan, noise_v, rng, executor):
         machines = [[(g.ratios.tolist(), g.sizes.tolist()) for g in of_one] for of_one in groups]
         asked.append((machines, rng.uniform()))
         return [1.0]
 
-    monkeypatch.setattr(module, "_separations", separations)
-    propose_measurement(ADSS, FIRST, [SECOND], SEEN)
+    propose_measurement(ADSS, FIRST, [SECOND], SEEN, separate=noted)
     assert len(asked) > 5
     assert all(one == asked[0] for one in asked)

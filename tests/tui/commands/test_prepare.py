@@ -1,18 +1,20 @@
 """The verb prepare: what is simulated ahead is what a measurement of that sweep is held against."""
 
 import json
+from contextlib import suppress
 
 import pytest
 from instruments.measuring import QUICK, SHORT, measuring
 
-import analysis.precompute as module
 from analysis.estimate import estimate_response
 from analysis.inference.checkpoint import posterior_name, read_checkpoint
 from analysis.inference.nominal import nominal_of
 from analysis.observation.observation import USUAL_NOISE_V, observe, unread
+from analysis.precompute import prepare_sweep
 from daq.configs import config_path
 from daq.formats import read_response
 from daq.plan import SweepPlan
+from sim.engine.effort import counting
 from sim.unit import load_unit
 from tui.cli import main
 
@@ -46,28 +48,34 @@ def test_a_sweep_that_was_prepared_is_estimated_without_simulating(run, cache, t
     assert (code, out) == (0, "ADSS: all of it was there already\n")
 
 
-def test_one_that_was_interrupted_goes_on(tmp_path, monkeypatch):
-    made, whole = [], module.run_families
+class Enough(Exception):
+    """Nothing more is to be prepared."""
 
-    def stopping(unit, families, *rest, **options):
-        if len(made) == 2:
-            raise KeyboardInterrupt
-        made.append(len(families))
-        return whole(unit, families, *rest, **options)
 
-    monkeypatch.setattr(module, "nominal_of", lambda *_, **__: None)
-    with monkeypatch.context() as patch:
-        patch.setattr(module, "run_families", stopping)
-        with pytest.raises(KeyboardInterrupt):
-            module.prepare_sweep(ADSS, TINY, tmp_path)
-    assert len(list(tmp_path.iterdir())) == sum(made) == 16
+def prepared(folder, until=None):
+    """Runs for the estimate alone: seconds simulated, and what was told; until so many are kept."""
     told = []
-    left = module.prepare_sweep(ADSS, TINY, tmp_path, progress=lambda *said: told.append(said))
-    fresh = module.prepare_sweep(ADSS, TINY, tmp_path / "other")
-    count = len(list((tmp_path / "other").iterdir()))
-    assert left.simulated_s == pytest.approx(fresh.simulated_s * (count - 16) / count, rel=0.2)
-    assert (left.before, left.kept) == (16, count)
-    assert [share for share, _ in told] == sorted(share for share, _ in told)
+
+    def tell(share, text):
+        told.append(share)
+        if text == "for the diagnosis" or until and len(list(folder.iterdir())) >= until:
+            raise Enough
+
+    with counting() as effort, suppress(Enough):
+        prepare_sweep(ADSS, TINY, folder, progress=tell)
+    return effort.simulated_s, told
+
+
+def test_one_that_was_interrupted_goes_on(tmp_path):
+    prepared(tmp_path, until=16)
+    made = len(list(tmp_path.iterdir()))
+    left, told = prepared(tmp_path)
+    count = len(list(tmp_path.iterdir()))
+    assert 16 <= made < count
+    fresh, _ = prepared(tmp_path / "other")
+    assert len(list((tmp_path / "other").iterdir())) == count
+    assert left == pytest.approx(fresh * (count - made) / count, rel=0.2)
+    assert told == sorted(told)
 
 
 @pytest.mark.parametrize(
@@ -93,12 +101,11 @@ def test_what_is_no_sweep_is_refused_in_one_line(words, said, capsys, cache, tmp
     assert not cache.exists()
 
 
-def test_a_cache_that_cannot_be_written_is_refused_before_anything_is_simulated(
-    capsys, cache, monkeypatch
-):
+def test_a_cache_that_cannot_be_written_is_refused_before_anything_is_simulated(capsys, cache):
     cache.parent.write_text("no folder")
-    monkeypatch.setattr(module, "run_families", None)
-    assert main(["prepare", "--unit", "adss", *SHORT]) == 2
+    with counting() as effort:
+        assert main(["prepare", "--unit", "adss", *SHORT]) == 2
+    assert effort.simulated_s == 0.0
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert line.startswith(f"error: {cache}: cannot be written (")
     assert line.endswith("set XDG_CACHE_HOME to a folder that can")
