@@ -26,6 +26,7 @@ from cyclopts import App, CycloptsError, MissingArgumentError, Parameter
 
 from daq.errors import InputError, LashbenchError
 from tui.commands.bench import is_terminal
+from tui.computations import Computations
 from tui.exit_codes import INTERRUPTED
 from tui.logs import LEVELS, logging_to_file, silence, telling_what_is_passed_over
 from tui.text.output import Console, hush
@@ -66,19 +67,21 @@ def build_app() -> App:
     return app
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(arguments: Sequence[str] | None = None, compute: Computations | None = None) -> int:
     """Run one command and return its exit code.
 
     Parameters
     ----------
     arguments
         Words after the program's name; those of the process if left out.
+    compute
+        What verbs compute with; the real analyses if left out.
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug, words = _switch("--debug", words)
     quiet, words = _switch("--quiet", words)
     trusts, words = _switch("--trust-effects", words)
-    console = Console(quiet)
+    console = Console(quiet, compute or Computations())
     silence()
     with _trusting_effects(trusts):
         return _logged(words, console, debug)

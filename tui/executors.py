@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from analysis.execution.executor import Executor
+    from tui.computations import Computations
 
 __all__ = ["executor_at"]
 
 
 @contextmanager
-def executor_at(address: str | None) -> Iterator[Executor | None]:
+def executor_at(address: str | None, compute: Computations) -> Iterator[Executor | None]:
     """The workers of a scheduler while the block lasts; None, this machine, without an address.
 
     Raises
@@ -29,7 +30,5 @@ def executor_at(address: str | None) -> Iterator[Executor | None]:
     if address is None:
         yield None
         return
-    from analysis.execution.dask_executor import ClusterExecutor
-
-    with ClusterExecutor(address) as cluster:
+    with compute.cluster(address) as cluster:
         yield cluster

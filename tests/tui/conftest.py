@@ -14,9 +14,9 @@ def db(tmp_path):
 def run(db, capsys):
     """Run a verb on the history; exit code, stdout and stderr."""
 
-    def call(verb, *words, history=True):
+    def call(verb, *words, history=True, compute=None):
         place = ["--db", str(db)] if history else []
-        code = cli.main([verb, *map(str, words), *place])
+        code = cli.main([verb, *map(str, words), *place], compute)
         out, err = capsys.readouterr()
         return code, out, err
 

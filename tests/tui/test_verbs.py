@@ -2,6 +2,7 @@
 
 import functools
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,14 +11,15 @@ import pytest
 from daq.errors import AnalysisError
 from daq.formats import read_response, write_response
 from tui.cli import main
+from tui.computations import Computations
 
 PRACTICE = Path(__file__).parents[1] / "data" / "practice"
 SWEEP = str(PRACTICE / "practice-09.csv")
 
 
-def document(words, capsys):
+def document(words, capsys, compute=None):
     """Run a verb with --json and return its one document; narration may only go to stderr."""
-    assert main([*words, "--json"]) == 0
+    assert main([*words, "--json"], compute) == 0
     out = capsys.readouterr().out
 
     def refuse(constant):
@@ -26,8 +28,8 @@ def document(words, capsys):
     return json.loads(out, parse_constant=refuse)
 
 
-def text(words, capsys):
-    assert main(words) == 0
+def text(words, capsys, compute=None):
+    assert main(words, compute) == 0
     return capsys.readouterr().out
 
 
@@ -89,13 +91,19 @@ def test_estimate_gives_the_fields_that_scripts_use(capsys):
     assert not found["warnings"]
 
 
+class Calls(list):
+    """What was asked of computations that take no time."""
+
+    compute = None
+
+
 @pytest.fixture
-def calls(monkeypatch):
+def calls():
     """Estimates at once, without a simulation; the calls are kept."""
     from analysis import estimate
     from analysis.estimate.from_features import IndexCurve
 
-    made = []
+    made = Calls()
 
     def known(*words, progress=None, **options):
         made.append((words, options))
@@ -106,13 +114,12 @@ def calls(monkeypatch):
         progress(0.5, "half")
         return estimate.Estimate("ADSS", uncertain, *rest)
 
-    monkeypatch.setattr(estimate, "estimate_response", known)
-    monkeypatch.setattr(estimate, "estimate_features", known)
+    made.compute = Computations(estimate_response=known, estimate_features=known)
     return made
 
 
 def test_estimate_hands_the_whole_response_on(calls, capsys):
-    result = document(["estimate", SWEEP, "--unit", "adss"], capsys)
+    result = document(["estimate", SWEEP, "--unit", "adss"], capsys, calls.compute)
     check_estimate(result)
     assert result["error_index"]["std_hz"] == [None] * 5
     (((response, unit, unknown), options),) = calls
@@ -124,7 +131,7 @@ def test_estimate_hands_the_whole_response_on(calls, capsys):
 def test_estimate_hands_several_responses_on_together(calls, capsys, tmp_path):
     other = tmp_path / "other.csv"
     other.write_text(Path(SWEEP).read_text().replace('unit = "ADSS"', 'unit = "OTHER"'))
-    result = document(["estimate", SWEEP, str(other), "--unit", "adss"], capsys)
+    result = document(["estimate", SWEEP, str(other), "--unit", "adss"], capsys, calls.compute)
     (((response, _, _), options),) = calls
     assert response.unit == "ADSS"
     assert [one.unit for one in options["further"]] == ["OTHER"]
@@ -132,38 +139,36 @@ def test_estimate_hands_several_responses_on_together(calls, capsys, tmp_path):
 
 
 def test_estimate_is_told_that_the_total_is_unknown(calls, capsys):
-    document(["estimate", SWEEP, "--unit", "adss", "--total-backlash-unknown"], capsys)
+    document(
+        ["estimate", SWEEP, "--unit", "adss", "--total-backlash-unknown"], capsys, calls.compute
+    )
     assert calls[0][0][2] is True
 
 
 def test_estimate_hands_two_frequencies_on(calls, capsys):
-    document(["estimate", "--unit", "edss", "--arf-hz", "40", "--rf-hz", "75.5"], capsys)
+    document(
+        ["estimate", "--unit", "edss", "--arf-hz", "40", "--rf-hz", "75.5"], capsys, calls.compute
+    )
     arf, rf, unit = calls[0][0]
     assert (arf, rf, unit.name) == (40.0, 75.5, "EDSS")
 
 
-@pytest.mark.usefixtures("calls")
-def test_estimate_warns_where_the_response_is_of_another_unit(capsys, tmp_path):
+def test_estimate_warns_where_the_response_is_of_another_unit(calls, capsys, tmp_path):
     few = str(tmp_path / "few.csv")
     write_response(read_response(Path(SWEEP)).take(np.arange(0, 183, 30)), few)
-    result = document(["estimate", few, "--unit", "edss"], capsys)
+    result = document(["estimate", few, "--unit", "edss"], capsys, calls.compute)
     assert result["warnings"] == ["the response is of unit ADSS, not of EDSS", "a warning"]
-    assert "of unit ADSS" in text(["estimate", few, "--unit", "edss"], capsys)
-
-
-@pytest.fixture
-def short_reproduction(monkeypatch):
-    """One row of Table 2 with few runs: the verb is under test, not the numbers."""
-    from analysis import paper
-
-    short = functools.partial(paper.reproduce, paper_runs=2, exact_runs=2, rows=[("ADSS", 50)])
-    monkeypatch.setattr(paper, "reproduce", short)
+    assert "of unit ADSS" in text(["estimate", few, "--unit", "edss"], capsys, calls.compute)
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("short_reproduction")
 def test_reproduce_gives_the_fields_that_scripts_use(capsys, tmp_path):
-    result = document(["reproduce", "--plots", str(tmp_path / "plots")], capsys)
+    from analysis.paper import reproduce
+
+    # One row of Table 2 with few runs: the verb is under test, not the numbers.
+    short = functools.partial(reproduce, paper_runs=2, exact_runs=2, rows=[("ADSS", 50)])
+    words = ["reproduce", "--plots", str(tmp_path / "plots")]
+    result = document(words, capsys, Computations(reproduce=short))
     assert set(result) >= {"table2", "error_index", "damping", "elapsed_s"}
     row = result["table2"][0]
     assert (row["unit"], row["ratio_percent"]) == ("ADSS", 50)
@@ -178,9 +183,8 @@ def test_reproduce_gives_the_fields_that_scripts_use(capsys, tmp_path):
 
 
 @pytest.fixture
-def cluster(monkeypatch):
+def cluster():
     """A cluster that does nothing but know where it is, and whether it was left."""
-    from analysis.execution import dask_executor as cluster
 
     class Cluster:
         """Knows whether it was closed."""
@@ -196,27 +200,27 @@ def cluster(monkeypatch):
         def __exit__(self, *error):
             Cluster.left = True
 
-    monkeypatch.setattr(cluster, "ClusterExecutor", Cluster)
     return Cluster
 
 
 def test_estimate_simulates_where_the_cluster_is(calls, capsys, cluster):
-    document(["estimate", SWEEP, "--unit", "adss", "--cluster", "tcp://here:8786"], capsys)
+    compute = replace(calls.compute, cluster=cluster)
+    words = ["estimate", SWEEP, "--unit", "adss", "--cluster", "tcp://here:8786"]
+    document(words, capsys, compute)
     assert calls[0][1]["executor"].address == "tcp://here:8786"
     assert cluster.left
 
 
-def test_diagnose_simulates_where_the_cluster_is(monkeypatch, capsys, cluster):
-    from analysis import diagnosis
-
+def test_diagnose_simulates_where_the_cluster_is(capsys, cluster):
     asked = []
 
     def known(response, unit, **options):
         asked.append(options)
         raise AnalysisError("no answer")
 
-    monkeypatch.setattr(diagnosis, "diagnose_response", known)
-    assert main(["diagnose", SWEEP, "--unit", "adss", "--cluster", "tcp://here:8786"]) == 1
+    compute = Computations(diagnose_response=known, cluster=cluster)
+    words = ["diagnose", SWEEP, "--unit", "adss", "--cluster", "tcp://here:8786"]
+    assert main(words, compute) == 1
     assert "no answer" in capsys.readouterr().err
     assert asked[0]["executor"].address == "tcp://here:8786"
     assert cluster.left

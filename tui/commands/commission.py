@@ -65,7 +65,7 @@ def commission(
     responses = read_files([file, *further], given, console)
     for text in check_inputs(responses, subject, as_is):
         console.note(f"warning: {text}")
-    with executor_at(cluster) as executor:
+    with executor_at(cluster, console.compute) as executor:
         found = commission_drive(
             responses, subject, total_backlash_unknown=total_backlash_unknown,
             executor=executor, progress=console.progress,

@@ -146,19 +146,17 @@ def _judge(
     """Estimate, diagnose, reveal and report."""
     from analysis.advice import advise
     from analysis.answer import accept_model
-    from analysis.diagnosis import diagnose_response
-    from analysis.estimate import estimate_response
     from tui.demonstration.hidden import compare, worded
     from tui.measurements.reports import report_measurement
 
     cache = cache_folder()
     tell("\n3. Its backlash by stage, as the plain model has it\n")
     progress = _progress("estimating", console)
-    estimate = estimate_response(response, unit, progress=progress, cache=cache)
+    estimate = console.compute.estimate_response(response, unit, progress=progress, cache=cache)
     tell("\n".join(estimate.summary()))
     tell("\n4. What the model lacks\n")
     progress = _progress("diagnosing", console)
-    diagnosis = diagnose_response(response, unit, cache=cache, progress=progress)
+    diagnosis = console.compute.diagnose_response(response, unit, cache=cache, progress=progress)
     tell("\n".join(diagnosis.summary()))
     document = diagnosis.to_json()
     advice = advise(accept_model(estimate.to_json(), document), unit)

@@ -105,7 +105,6 @@ def _diagnose_files(
     console: Console,
 ) -> int:
     response, *others = read_files(files, given, console)
-    from analysis.diagnosis import diagnose_response
     from analysis.observation.incomplete import state_doubt
     from analysis.observation.input_check import check_inputs
     from analysis.observation.joint import check_together, unit_doubts
@@ -119,11 +118,11 @@ def _diagnose_files(
     for doubt in doubts:
         # Now, as well as with the answer: it may be a slip, and the answer takes a minute.
         console.note(f"warning: {doubt}")
-    with executor_at(cluster) as executor:
+    with executor_at(cluster, console.compute) as executor:
         said += _settings((response, *others), subject, as_is, executor, console)
         incomplete = [state_doubt(one.provenance.get("state")) for one in (response, *others)]
         doubt = "; ".join(filter(None, dict.fromkeys([*said, *incomplete])))
-        result = diagnose_response(
+        result = console.compute.diagnose_response(
             response, subject, further=others, cache=cache_folder(), executor=executor,
             progress=console.progress,
         )  # fmt: skip
@@ -145,9 +144,7 @@ def _diagnose_files(
         lines = [*result.summary(), *(f"  {text}" for text in advice.lines())]
         code = tell_judged(judgement, document, lines, json, console)
     if plots is not None:
-        from analysis.diagnosis.figures import draw_diagnosis
-
-        for path in draw_diagnosis(result, plots):
+        for path in console.compute.draw_diagnosis(result, plots):
             console.note(f"wrote {path}")
     return code
 
@@ -180,9 +177,7 @@ def _settings(
 def _diagnose_paper(
     subject: Unit, unit: str, plots: Path | None, json: bool, console: Console
 ) -> None:
-    from analysis.paper_diagnosis import diagnose_paper
-
-    result = diagnose_paper(subject, progress=console.progress)
+    result = console.compute.diagnose_paper(subject, progress=console.progress)
     _tell(proposing(result, unit), json, console)
     if plots is not None:
         for path in result.plot(plots):

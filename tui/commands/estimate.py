@@ -72,16 +72,15 @@ def estimate(
                 "two frequencies cannot tell it"
             )
         subject = read_unit(unit, console, tolerance)
-        from analysis.estimate import estimate_features
-
-        result = estimate_features(arf_hz, rf_hz, subject, progress=console.progress)
+        result = console.compute.estimate_features(
+            arf_hz, rf_hz, subject, progress=console.progress
+        )
         warnings = []
     else:
         if arf_hz is not None or rf_hz is not None:
             raise InputError(f"{file}: give either a response or --arf-hz and --rf-hz, not both")
         subject = read_unit(unit, console, tolerance)
         responses = read_files([file, *further], given, console)
-        from analysis.estimate import estimate_response
         from analysis.observation.incomplete import state_doubt
         from analysis.observation.input_check import check_inputs
         from analysis.observation.joint import unit_doubts
@@ -91,8 +90,8 @@ def estimate(
         warnings = unit_doubts(responses, subject)
         for note in error_notes(responses):
             console.note(note)
-        with executor_at(cluster) as executor:
-            result = estimate_response(
+        with executor_at(cluster, console.compute) as executor:
+            result = console.compute.estimate_response(
                 responses[0], subject, total_backlash_unknown, progress=console.progress,
                 cache=cache_folder(), executor=executor, further=responses[1:],
             )  # fmt: skip

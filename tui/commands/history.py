@@ -110,7 +110,7 @@ def history(
         lacking = store.lacking(name, serial, last=shown, edition=edition, **which)
     loose: dict[int, Answer] = {}
     if estimate != "none" and lacking:
-        with executor_at(cluster) as executor:
+        with executor_at(cluster, console.compute) as executor:
             loose = _estimates(db, lacking, estimate == "all", executor, console)
     with Store(db, read_only=True) as store:
         making = _Rows(store, loose, limits)
@@ -270,7 +270,6 @@ def _estimates(
 
 def _estimate(db: Path, number: int, executor: Executor | None, console: Console) -> Answer | None:
     """Make an estimate and keep it; it is given back where it cannot be kept."""
-    from analysis.estimate import estimate_response
     from analysis.observation.input_check import check_inputs
     from daq.store import Store
     from tui.measurements.stored_answers import keep_estimate, loose_answer
@@ -282,7 +281,7 @@ def _estimate(db: Path, number: int, executor: Executor | None, console: Console
     try:
         unit = unit_as_measured(measured)
         check_inputs([response], unit, way_on="")
-        result = estimate_response(
+        result = console.compute.estimate_response(
             response, unit, progress=console.progress, cache=cache_folder(), executor=executor
         )
         content: dict[str, Any] = result.to_json()

@@ -50,7 +50,7 @@ def plan(
     from analysis.planning import plan_sweep
 
     subject = read_unit(unit, console, tolerance)
-    with executor_at(cluster) as executor:
+    with executor_at(cluster, console.compute) as executor:
         found = plan_sweep(subject, minutes, executor=executor, progress=console.progress)
     if out is not None:
         write_text(out, found.recipe())

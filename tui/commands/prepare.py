@@ -101,7 +101,7 @@ def prepare(
     from analysis.precompute import prepare_sweep
 
     began, folder = time.perf_counter(), cache_folder()
-    with executor_at(cluster) as executor:
+    with executor_at(cluster, console.compute) as executor:
         done = prepare_sweep(
             subject, observation, folder, executor=executor, progress=console.progress
         )
@@ -142,7 +142,7 @@ def _train(subject: Unit, machines: int, cluster: str | None, json: bool, consol
     from analysis.precompute import prepare_unit
 
     began, folder = time.perf_counter(), cache_folder()
-    with executor_at(cluster) as executor:
+    with executor_at(cluster, console.compute) as executor:
         made = prepare_unit(subject, machines, folder, executor=executor, told=console.note)
     elapsed_s = time.perf_counter() - began
     if json:

@@ -213,14 +213,15 @@ def _estimate(
     kept: _Kept | None,
     console: Console,
 ) -> dict[str, Any] | None:
-    from analysis.estimate import estimate_response
     from analysis.observation.input_check import doubted
     from tui.measurements.stored_answers import keep_estimate
 
     console.note("estimating")
     began_s = time.monotonic()
     try:
-        found = estimate_response(response, unit, cache=cache_folder(), progress=console.progress)
+        found = console.compute.estimate_response(
+            response, unit, cache=cache_folder(), progress=console.progress
+        )
         made = doubted(found.to_json(), [remarks["input"]] if "input" in remarks else [])
     except LashbenchError as error:
         remarks["estimate"] = f"No estimate could be made: {error}."
@@ -241,12 +242,13 @@ def _diagnose(
     kept: _Kept | None,
     console: Console,
 ) -> Diagnosis | None:
-    from analysis.diagnosis import diagnose_response
     from tui.measurements.stored_answers import keep_diagnosis
 
     console.note("diagnosing")
     try:
-        made = diagnose_response(response, unit, cache=cache_folder(), progress=console.progress)
+        made = console.compute.diagnose_response(
+            response, unit, cache=cache_folder(), progress=console.progress
+        )
     except LashbenchError as error:
         remarks["diagnosis"] = f"No diagnosis could be made: {error}."
         console.note(remarks["diagnosis"])

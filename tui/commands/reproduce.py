@@ -17,9 +17,7 @@ def reproduce(*, json: Json = False, plots: Plots = None, console: Injected) -> 
     The paper is Baek, Kwak and Kim, Int. J. Adv. Manuf. Technol. 21 (2003) 604.
     """
     with directory_to_fill(plots):
-        from analysis.paper import reproduce as computed
-
-        result = computed(progress=console.progress)
+        result = console.compute.reproduce(progress=console.progress)
         if plots is not None:
             result.plot(plots)
             console.note(f"wrote figures to {plots}")

@@ -23,6 +23,7 @@ from cyclopts import Parameter
 from analysis.execution.pace import Pace, duration
 from daq.errors import LashbenchError
 from daq.untrusted.visible_text import visible, visible_line
+from tui.computations import Computations
 from tui.text.narrator import Narrator
 
 __all__ = ["Console", "Injected", "as_json", "hush", "readers_may_leave"]
@@ -56,9 +57,12 @@ class Console:
     ----------
     quiet
         Leave out narration and progress; data and errors remain.
+    compute
+        What a verb that has this console computes with.
     """
 
     quiet: bool = False
+    compute: Computations = field(default_factory=Computations, repr=False, compare=False)
     _live: _Live = field(default_factory=_Live, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

@@ -17,6 +17,7 @@ from sim.drawn_effects import draw_effect
 from sim.unit import load_unit
 from tui.cli import main
 from tui.commands import demo as verb
+from tui.computations import Computations
 from tui.demonstration import hidden as secrets
 from tui.demonstration import sweep
 from tui.text.bode_text import bode_lines
@@ -60,7 +61,7 @@ class Diagnosed:
 @pytest.fixture
 def quick(monkeypatch):
     """Few points, an estimate and a diagnosis at once; what was judged is kept."""
-    from analysis import diagnosis, estimate
+    from analysis import estimate
 
     judged = []
     monkeypatch.setattr(sweep, "POINTS", 9)
@@ -73,23 +74,24 @@ def quick(monkeypatch):
         return estimate.Estimate("ADSS", uncertain, uncertain, uncertain, total, None, (), 1.0)
 
     def install(*causes):
+        """The same as `main`, with these causes found."""
+
         def diagnosed(response, unit, *, cache, progress):
             for share in np.linspace(0.0, 1.0, 11):
                 progress(share, "searching")
             judged.append(response)
             return Diagnosed(*causes)
 
-        monkeypatch.setattr(estimate, "estimate_response", estimated)
-        monkeypatch.setattr(diagnosis, "diagnose_response", diagnosed)
-        return judged
+        compute = Computations(estimate_response=estimated, diagnose_response=diagnosed)
+        return judged, lambda words: main(words, compute)
 
     return install
 
 
 def test_the_whole_way_over_a_socket(quick, tmp_path, capsys):
-    judged = quick("load-viscous-damping")
+    judged, demo = quick("load-viscous-damping")
     out = tmp_path / "here" / "demo"
-    assert main(["demo", "--out", str(out)]) == 0
+    assert demo(["demo", "--out", str(out)]) == 0
     text, told = capsys.readouterr()
     for number in range(1, 6):
         assert f"\n{number}. " in "\n" + text
@@ -111,9 +113,9 @@ def test_the_whole_way_over_a_socket(quick, tmp_path, capsys):
 
 
 def test_twice_the_same_points_and_one_json_document(quick, tmp_path, capsys):
-    judged = quick("load-inertia")
+    judged, demo = quick("load-inertia")
     for name in ("a", "b"):
-        assert main(["demo", "--json", "--out", str(tmp_path / name)]) == 0
+        assert demo(["demo", "--json", "--out", str(tmp_path / name)]) == 0
         result = json.loads(capsys.readouterr().out)
     assert np.array_equal(judged[0].gain, judged[1].gain)
     assert result["hidden"]["effect"] == secrets.standing().effect.id
@@ -123,11 +125,11 @@ def test_twice_the_same_points_and_one_json_document(quick, tmp_path, capsys):
 
 
 def test_a_surprise_is_another_one_and_the_same_for_its_seed(quick, tmp_path, capsys):
-    quick("load-inertia")
+    _, demo = quick("load-inertia")
     results = []
     for seed in ("4", "4", "5"):
         words = ["demo", "--surprise", "--seed", seed, "--json", "--out", str(tmp_path / "a b")]
-        assert main(words) == 0
+        assert demo(words) == 0
         text, told = capsys.readouterr()
         results.append(json.loads(text))
         (line,) = (one for one in told.splitlines() if one.startswith("The same once more: "))
@@ -146,7 +148,7 @@ def test_a_seed_goes_with_a_surprise(words, capsys):
 def test_interrupted_in_the_sweep_it_ends_safe(quick, tmp_path, capsys, monkeypatch):
     from daq.control import SessionControl
 
-    quick("load-inertia")
+    _, demo = quick("load-inertia")
     monkeypatch.setattr(
         sweep.Picture, "add", lambda self, *point: CONTROLS[-1].interrupt("interrupted by SIGINT")
     )
@@ -158,7 +160,7 @@ def test_interrupted_in_the_sweep_it_ends_safe(quick, tmp_path, capsys, monkeypa
         CONTROLS.append(self)
 
     monkeypatch.setattr(SessionControl, "__init__", kept)
-    assert main(["demo", "--out", str(tmp_path)]) == 130
+    assert demo(["demo", "--out", str(tmp_path)]) == 130
     out, err = capsys.readouterr()
     assert "source confirmed-off" in out
     assert "interrupted by SIGINT" in err

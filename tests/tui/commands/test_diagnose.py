@@ -21,6 +21,7 @@ from daq.frf import FrequencyResponse
 from daq.plan import SweepPlan
 from sim.engine.machine_code import code_folder
 from tui.cli import main
+from tui.computations import Computations
 from tui.text.shell_quote import proposing
 
 PRACTICE = Path(__file__).parents[2] / "data" / "practice"
@@ -67,11 +68,15 @@ class Told:
         return ["ADSS: consistent.", "  nothing"]
 
 
-@pytest.fixture
-def calls(monkeypatch):
-    import analysis.diagnosis
+class Calls(list):
+    """What was asked of a diagnosis that takes no time."""
 
-    made = []
+    compute = None
+
+
+@pytest.fixture
+def calls():
+    made = Calls()
 
     def known(response, unit, *, further, cache, executor, progress):
         assert executor is None
@@ -79,7 +84,7 @@ def calls(monkeypatch):
         made.extend((one, unit, cache) for one in further)
         return Told()
 
-    monkeypatch.setattr(analysis.diagnosis, "diagnose_response", known)
+    made.compute = Computations(diagnose_response=known)
     return made
 
 
@@ -87,11 +92,11 @@ def test_the_whole_response_is_handed_on_and_runs_are_kept_where_caches_are(
     calls, capsys, monkeypatch, tmp_path
 ):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert main(["diagnose", SWEEP, "--unit", "adss", "--json"]) == 0
+    assert main(["diagnose", SWEEP, "--unit", "adss", "--json"], calls.compute) == 0
     assert json.loads(capsys.readouterr().out) == {"verdict": "consistent"}
     ((response, unit, cache),) = calls
     assert (len(response), unit.name, cache) == (183, "ADSS", tmp_path / "lashbench")
-    assert main(["diagnose", SWEEP, "--unit", "adss"]) == 0
+    assert main(["diagnose", SWEEP, "--unit", "adss"], calls.compute) == 0
     said = capsys.readouterr().out
     assert said.startswith("ADSS: consistent.\n  nothing\n  No advice: the backlash by the models")
 
@@ -99,9 +104,9 @@ def test_the_whole_response_is_handed_on_and_runs_are_kept_where_caches_are(
 def test_a_response_of_another_unit_is_said_to_be_one(calls, capsys, tmp_path):
     few = tmp_path / "few.csv"
     write_response(read_response(Path(SWEEP)).take(np.arange(0, 183, 30)), few)
-    assert main(["diagnose", str(few), "--unit", "edss"]) == 0
+    assert main(["diagnose", str(few), "--unit", "edss"], calls.compute) == 0
     assert "warning: the response is of unit ADSS, not of EDSS\n" in capsys.readouterr().err
-    main(["diagnose", str(few), "--unit", "adss"])
+    main(["diagnose", str(few), "--unit", "adss"], calls.compute)
     assert "warning" not in capsys.readouterr().err
 
 
@@ -114,12 +119,12 @@ class Proposing(Told):
 
 
 @pytest.fixture
-def proposed(calls, monkeypatch):
+def proposed():
     """Whatever is diagnosed ends with a sweep that is proposed."""
     plan = SweepPlan((100.0, 120.0), (1.0,), settle_cycles=3, integrate_cycles=4)
     proposal = NextMeasurement("ADSS", plan, ("a", "b"), 3.0)
-    for diagnosing in ("diagnosis.diagnose_response", "paper_diagnosis.diagnose_paper"):
-        monkeypatch.setattr(f"analysis.{diagnosing}", lambda *_, **__: Proposing(proposal))
+    proposing = lambda *_, **__: Proposing(proposal)  # noqa: E731
+    return Computations(diagnose_response=proposing, diagnose_paper=proposing)
 
 
 @pytest.mark.parametrize("asked", ["response", "paper"])
@@ -127,7 +132,7 @@ def test_the_command_that_is_proposed_finds_a_unit_by_its_path(proposed, capsys,
     own = tmp_path / "my gimbal.toml"
     own.write_text(config_path("units", "adss").read_text(encoding="utf-8"), encoding="utf-8")
     measured = SWEEP if asked == "response" else "--paper"
-    assert main(["diagnose", measured, "--unit", str(own)]) == 0
+    assert main(["diagnose", measured, "--unit", str(own)], proposed) == 0
     words = shlex.split(capsys.readouterr().out)
     assert words[words.index("--unit") + 1] == str(own)
 
@@ -139,14 +144,14 @@ def test_the_command_that_is_proposed_runs_as_printed_on_the_bench_that_was_meas
     bench = "sim:?ratio=0.3&seed=1&effect=load-viscous-damping:B_L=0.05"
     plan = ["--level", "1", "--start", "100", "--stop", "140", "--points", "8"]
     there = ["--unit", "adss", "--instrument", bench, "--serial", "SN 7", "--db", "lab.db"]
-    assert main(["measure", *there, *plan, "--yes"]) == 0
-    assert main(["export", "1", "--db", "lab.db", "--out", "first.csv"]) == 0
+    assert main(["measure", *there, *plan, "--yes"], proposed) == 0
+    assert main(["export", "1", "--db", "lab.db", "--out", "first.csv"], proposed) == 0
     capsys.readouterr()
-    assert main(["diagnose", "first.csv", "--unit", "adss"]) == 0
+    assert main(["diagnose", "first.csv", "--unit", "adss"], proposed) == 0
     words = shlex.split(capsys.readouterr().out.splitlines()[0])
     assert words[words.index("--instrument") + 1] == bench
     assert words[words.index("--serial") + 1] == "SN 7"
-    assert main([*words[1:], "--db", "lab.db", "--yes", "--json"]) == 0
+    assert main([*words[1:], "--db", "lab.db", "--yes", "--json"], proposed) == 0
     assert json.loads(capsys.readouterr().out)["points"] == 2
 
 
@@ -178,66 +183,56 @@ def test_who_says_last_where_it_was_measured_is_believed(said, asked):
 def test_a_figure_that_cannot_be_made_does_not_cost_the_answer(
     calls, capsys, monkeypatch, tmp_path
 ):
-    import analysis.diagnosis.figures
-
     def full(result, folder):
         raise LashbenchError("a.png: could not be written (No space left on device)")
 
-    monkeypatch.setattr(analysis.diagnosis.figures, "draw_diagnosis", full)
+    calls.compute = replace(calls.compute, draw_diagnosis=full)
     words = ["diagnose", SWEEP, "--unit", "adss", "--json", "--plots", str(tmp_path / "out")]
-    assert main(words) == 1
+    assert main(words, calls.compute) == 1
     told = capsys.readouterr()
     assert json.loads(told.out) == {"verdict": "consistent"}
     assert told.err.splitlines()[-1].startswith("error: a.png: could not be written")
 
 
 def test_who_reads_no_answer_may_still_want_its_figures(calls, capfd, monkeypatch, tmp_path):
-    import analysis.diagnosis.figures
-
     reading, writing = os.pipe()
     os.close(reading)
-    monkeypatch.setattr(
-        analysis.diagnosis.figures, "draw_diagnosis", lambda result, folder: [folder / "a.png"]
-    )
+    calls.compute = replace(calls.compute, draw_diagnosis=lambda result, folder: [folder / "a.png"])
     with os.fdopen(writing, "w") as nobody, monkeypatch.context() as patch:
         patch.setattr(sys, "stdout", nobody)
         words = ["diagnose", SWEEP, "--unit", "adss", "--plots", str(tmp_path / "out")]
-        assert main(words) == 0
+        assert main(words, calls.compute) == 0
     assert "a.png" in capfd.readouterr().err
 
 
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="no folder that nobody may fill")
 def test_a_folder_that_cannot_be_filled_is_refused_before_the_work(calls, capsys):
-    assert main(["diagnose", SWEEP, "--unit", "adss", "--plots", "/proc"]) == 2
+    assert main(["diagnose", SWEEP, "--unit", "adss", "--plots", "/proc"], calls.compute) == 2
     assert not calls
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert line.startswith("error: /proc: cannot be used as a directory")
 
 
 def test_figures_go_where_they_are_asked_for(calls, capsys, monkeypatch, tmp_path):
-    import analysis.diagnosis.figures
-
-    monkeypatch.setattr(
-        analysis.diagnosis.figures, "draw_diagnosis", lambda result, folder: [folder / "a.png"]
+    calls.compute = replace(calls.compute, draw_diagnosis=lambda result, folder: [folder / "a.png"])
+    assert (
+        main(["diagnose", SWEEP, "--unit", "adss", "--plots", str(tmp_path / "out")], calls.compute)
+        == 0
     )
-    assert main(["diagnose", SWEEP, "--unit", "adss", "--plots", str(tmp_path / "out")]) == 0
     assert "a.png" in capsys.readouterr().err
 
 
-def test_the_papers_row_is_answered_with_json_and_a_picture(capsys, monkeypatch, tmp_path):
-    import analysis.paper_diagnosis
-
+def test_the_papers_row_is_answered_with_json_and_a_picture(capsys, tmp_path):
     class Drawn(Told):
         def plot(self, folder):
             return [folder / "adss.png"]
 
     asked = []
-    monkeypatch.setattr(
-        analysis.paper_diagnosis, "diagnose_paper",
-        lambda unit, *, progress: asked.append(unit.name) or Drawn(),
-    )  # fmt: skip
+    compute = Computations(
+        diagnose_paper=lambda unit, *, progress: asked.append(unit.name) or Drawn()
+    )
     words = ["diagnose", "--unit", "adss", "--paper", "--json", "--plots", str(tmp_path / "out")]
-    assert main(words) == 0
+    assert main(words, compute) == 0
     told = capsys.readouterr()
     assert json.loads(told.out) == {"verdict": "consistent"}
     assert "adss.png" in told.err
@@ -310,14 +305,14 @@ def diagnose_a_large_effect(capsys):
 
 def test_further_sweeps_are_handed_on_together_and_none_if_one_is_bad(calls, capsys, tmp_path):
     other = str(PRACTICE / "practice-05.csv")
-    assert main(["diagnose", SWEEP, other, "--unit", "adss"]) == 0
+    assert main(["diagnose", SWEEP, other, "--unit", "adss"], calls.compute) == 0
     assert [response.provenance for response, _, _ in calls] == [
         read_response(Path(file)).provenance for file in (SWEEP, other)
     ]
     calls.clear()
     spoilt = tmp_path / "spoilt.csv"
     spoilt.write_text(Path(other).read_text().replace("\n", ",\n", 1))
-    assert main(["diagnose", SWEEP, str(spoilt), "--unit", "adss"]) == 2
+    assert main(["diagnose", SWEEP, str(spoilt), "--unit", "adss"], calls.compute) == 2
     assert not calls
     assert "spoilt.csv" in capsys.readouterr().err
 

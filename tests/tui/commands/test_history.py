@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from instruments.measuring import measuring, stopped
 
-from analysis import estimate as estimating
 from daq.configs import config_path
 from daq.errors import AnalysisError, LinkError
 from daq.formats import read_response
 from daq.store import Store
+from tui.computations import Computations
 from tui.measurements.stored_answers import keep_estimate
 from tui.text.layout import columns_of
 
@@ -217,14 +217,14 @@ class Result:
         return {"contribution_ratio": number, "b1_deg": number, "b2_deg": number}
 
 
-def ratios(run, *words):
-    code, out, _ = run("history", "--json", *words)
+def ratios(run, *words, **options):
+    code, out, _ = run("history", "--json", *words, **options)
     assert code == 0
     ratios = [row["contribution_ratio"] for row in json.loads(out)["measurements"]]
     return [None if ratio is None else ratio["value"] for ratio in ratios]
 
 
-def test_missing_estimates_are_made_once_and_kept(run, db, monkeypatch):
+def test_missing_estimates_are_made_once_and_kept(run, db):
     run(*measuring())
     run(*measuring())
     calls = []
@@ -235,44 +235,44 @@ def test_missing_estimates_are_made_once_and_kept(run, db, monkeypatch):
             raise AnalysisError("no resonance in it")
         return Result()
 
-    monkeypatch.setattr(estimating, "estimate_response", estimate)
-    code, out, err = run("history", "--json")
+    compute = Computations(estimate_response=estimate)
+    code, out, err = run("history", "--json", compute=compute)
     rows = json.loads(out)["measurements"]
     assert code == 0
     assert rows[0]["contribution_ratio"]["value"] == 0.3
     assert rows[1]["contribution_ratio"] is None
     assert "measurement 2 gives no estimate: no resonance in it" in err
-    again = run("history", "--json")[1]
+    again = run("history", "--json", compute=compute)[1]
     assert json.loads(again) == json.loads(out)
     assert calls == [("ADSS", 5), ("ADSS", 5)]
     # What failed is tried once more where all is asked for.
-    assert ratios(run, "--estimate", "all") == [0.3, 0.3]
+    assert ratios(run, "--estimate", "all", compute=compute) == [0.3, 0.3]
     assert len(calls) == 3
 
 
-def test_an_estimate_of_points_that_were_measured_again_does_not_count(run, db, monkeypatch):
-    monkeypatch.setattr(estimating, "estimate_response", lambda *_, **__: Result())
+def test_an_estimate_of_points_that_were_measured_again_does_not_count(run, db):
+    compute = Computations(estimate_response=lambda *_, **__: Result())
     run(*measuring())
     with Store(db) as store:
         estimated(store, 1, 0.9)
-    assert ratios(run, "--estimate", "none") == [0.9]
+    assert ratios(run, "--estimate", "none", compute=compute) == [0.9]
     run(*measuring("--resume", 1, "--remeasure", "40:200"))
-    assert ratios(run, "--estimate", "none") == [None]
-    assert ratios(run) == [0.3]
+    assert ratios(run, "--estimate", "none", compute=compute) == [None]
+    assert ratios(run, compute=compute) == [0.3]
 
 
 @pytest.mark.parametrize("failed", [False, True])
 def test_what_was_said_of_half_a_measurement_is_not_said_of_all_of_it(run, db, monkeypatch, failed):
-    monkeypatch.setattr(estimating, "estimate_response", lambda *_, **__: Result())
+    compute = Computations(estimate_response=lambda *_, **__: Result())
     stopped(run, monkeypatch)
     with Store(db) as store:
         if failed:
             store.add_estimate(1, "t", {"failed": "too few points"})
         else:
             estimated(store, 1, 0.9)
-    assert ratios(run) == [None if failed else 0.9]
+    assert ratios(run, compute=compute) == [None if failed else 0.9]
     run(*measuring("--resume", 1))
-    assert ratios(run) == [0.3]
+    assert ratios(run, compute=compute) == [0.3]
 
 
 def test_an_estimate_is_not_kept_of_points_that_were_replaced_while_it_was_made(run, db):
@@ -288,13 +288,13 @@ def test_an_estimate_is_not_kept_of_points_that_were_replaced_while_it_was_made(
     assert ratios(run, "--estimate", "none") == [0.3]
 
 
-def test_a_lost_cluster_says_nothing_of_a_measurement(run, db, monkeypatch):
+def test_a_lost_cluster_says_nothing_of_a_measurement(run, db):
     def lost(*_, **__):
         raise LinkError("the Dask scheduler was lost")
 
     run(*measuring())
-    monkeypatch.setattr(estimating, "estimate_response", lost)
-    assert run("history")[0] == 3
+    compute = Computations(estimate_response=lost)
+    assert run("history", compute=compute)[0] == 3
     with Store(db, read_only=True) as store:
         assert store.latest_estimates() == {}
 

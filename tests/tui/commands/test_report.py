@@ -10,8 +10,6 @@ from dataclasses import replace
 import pytest
 from outputs import report_makings as makings
 
-import analysis.diagnosis
-import analysis.estimate
 from analysis.diagnosis.experiment_design import NextMeasurement
 from daq.configs import config_path, sample_path
 from daq.errors import AnalysisError
@@ -19,6 +17,7 @@ from daq.plan import SweepPlan
 from daq.store import Store
 from sim.unit import load_unit
 from tui import cli
+from tui.computations import Computations
 from tui.measurements.stored_answers import keep_estimate, kept_estimate
 
 SAMPLE = str(sample_path("adss-sweep"))
@@ -33,10 +32,16 @@ class Quick:
         return makings.ESTIMATE
 
 
+class Calls(dict):
+    """What was asked of computations that take no time."""
+
+    compute = None
+
+
 @pytest.fixture
-def calls(monkeypatch):
+def calls():
     """What was estimated and diagnosed, by doubles that take no time."""
-    made = {"estimate": [], "diagnose": []}
+    made = Calls(estimate=[], diagnose=[])
 
     def estimate(response, unit, *, cache, progress):
         made["estimate"].append((response, unit))
@@ -46,8 +51,7 @@ def calls(monkeypatch):
         made["diagnose"].append((response, unit))
         raise AnalysisError("this response is too short")
 
-    monkeypatch.setattr(analysis.estimate, "estimate_response", estimate)
-    monkeypatch.setattr(analysis.diagnosis, "diagnose_response", diagnose)
+    made.compute = Computations(estimate_response=estimate, diagnose_response=diagnose)
     return made
 
 
@@ -69,7 +73,12 @@ def data_of(path):
 
 def test_a_report_on_a_file(calls, tmp_path, capsys):
     out = tmp_path / "r.html"
-    assert cli.main(["report", SAMPLE, "--unit", "adss", "--out", str(out), "--no-diagnose"]) == 0
+    assert (
+        cli.main(
+            ["report", SAMPLE, "--unit", "adss", "--out", str(out), "--no-diagnose"], calls.compute
+        )
+        == 0
+    )
     shown, told = capsys.readouterr()
     assert shown == ""
     assert f"wrote {out}" in told
@@ -82,7 +91,7 @@ def test_a_report_on_a_file(calls, tmp_path, capsys):
 
 def test_a_diagnosis_that_cannot_be_made_is_no_reason_for_no_report(calls, tmp_path, capsys):
     out = tmp_path / "r.html"
-    assert cli.main(["report", SAMPLE, "--unit", "adss", "--out", str(out)]) == 0
+    assert cli.main(["report", SAMPLE, "--unit", "adss", "--out", str(out)], calls.compute) == 0
     assert len(calls["diagnose"]) == 1
     assert "No diagnosis could be made: this response is too short." in out.read_text()
 
@@ -93,39 +102,37 @@ def found():
         return makings.diagnosis(patch, ("load-inertia",), [("load-inertia",)])
 
 
-def test_a_diagnosis_stands_in_the_report(found, calls, monkeypatch, tmp_path):
-    monkeypatch.setattr(analysis.diagnosis, "diagnose_response", lambda *_, **__: found)
+def test_a_diagnosis_stands_in_the_report(found, calls, tmp_path):
+    calls.compute = replace(calls.compute, diagnose_response=lambda *_, **__: found)
     out = tmp_path / "r.html"
-    assert cli.main(["report", SAMPLE, "--unit", "adss", "--out", str(out)]) == 0
+    assert cli.main(["report", SAMPLE, "--unit", "adss", "--out", str(out)], calls.compute) == 0
     assert data_of(out)["diagnosis"]["verdict"] == "explained"
 
 
-def test_the_command_on_a_report_finds_a_unit_by_its_path(
-    found, calls, monkeypatch, tmp_path, capsys
-):
+def test_the_command_on_a_report_finds_a_unit_by_its_path(found, calls, tmp_path, capsys):
     plan = SweepPlan((100.0, 120.0), (1.0,), settle_cycles=3, integrate_cycles=4)
     # The name of the unit is that of one that comes with lashbench, and would pass for it.
     proposal = NextMeasurement("ADSS", plan, ("a", "b"), 3.0)
     proposing = replace(found, next_measurement=proposal)
-    monkeypatch.setattr(analysis.diagnosis, "diagnose_response", lambda *_, **__: proposing)
+    calls.compute = replace(calls.compute, diagnose_response=lambda *_, **__: proposing)
     own = tmp_path / "my gimbal's.toml"
     own.write_text(config_path("units", "adss").read_text(encoding="utf-8"), encoding="utf-8")
     out = tmp_path / "r.html"
-    assert cli.main(["report", SAMPLE, "--unit", str(own), "--out", str(out)]) == 0
+    assert cli.main(["report", SAMPLE, "--unit", str(own), "--out", str(out)], calls.compute) == 0
     command = data_of(out)["diagnosis"]["next_measurement"]["plan"]["command"]
     (shown,) = re.findall(r"<code>(lashbench .*?)</code>", out.read_text())
     assert html.unescape(shown) == command
     words = shlex.split(command)
     assert words[words.index("--unit") + 1] == str(own)
     words[words.index("URL")] = "sim:"
-    assert cli.main([*words[1:], "--dry-run"]) == 0
+    assert cli.main([*words[1:], "--dry-run"], calls.compute) == 0
     assert "2 points" in capsys.readouterr().out
 
 
 def test_a_report_on_a_stored_measurement(calls, bench, tmp_path):
     out = tmp_path / "r.html"
     words = ["report", "1", "--unit", "adss", "--out", str(out), "--no-diagnose"]
-    assert cli.main([*words, "--db", str(bench)]) == 0
+    assert cli.main([*words, "--db", str(bench)], calls.compute) == 0
     text, data = out.read_text(), data_of(out)
     assert data["origin"]["name"] == "measurement 1 of bench.db"
     assert data["origin"]["source_state"] == "confirmed-off"
@@ -140,7 +147,7 @@ def test_a_report_on_a_stored_measurement(calls, bench, tmp_path):
 
 def test_another_unit_than_was_measured_is_told_at_once(calls, bench, tmp_path, capsys):
     words = ["report", "1", "--db", str(bench), "--unit", "edss", "--no-diagnose"]
-    assert cli.main([*words, "--out", str(tmp_path / "r.html")]) == 0
+    assert cli.main([*words, "--out", str(tmp_path / "r.html")], calls.compute) == 0
     assert "warning: the response is of unit ADSS, not of EDSS" in capsys.readouterr().err
 
 
@@ -149,7 +156,12 @@ def test_the_history_is_the_users_own_if_none_is_named(calls, bench, tmp_path, m
     (tmp_path / "lashbench").mkdir()
     (tmp_path / "lashbench" / "lashbench.db").write_bytes(bench.read_bytes())
     out = tmp_path / "r.html"
-    assert cli.main(["report", "1", "--unit", "adss", "--out", str(out), "--no-diagnose"]) == 0
+    assert (
+        cli.main(
+            ["report", "1", "--unit", "adss", "--out", str(out), "--no-diagnose"], calls.compute
+        )
+        == 0
+    )
     assert data_of(out)["origin"]["name"] == "measurement 1 of lashbench.db"
 
 
@@ -165,10 +177,10 @@ def test_an_estimate_of_the_history_is_taken_while_it_holds(calls, bench, tmp_pa
         assert kept_estimate(store, 1, adss) == kept
         assert kept_estimate(store, 1, edss) is None
     words = ["report", "1", "--db", str(db), "--out", str(out), "--no-diagnose", "--unit"]
-    assert cli.main([*words, "adss"]) == 0
+    assert cli.main([*words, "adss"], calls.compute) == 0
     assert calls["estimate"] == []
     assert "from the history" in out.read_text()
-    assert cli.main([*words, "edss"]) == 0
+    assert cli.main([*words, "edss"], calls.compute) == 0
     assert len(calls["estimate"]) == 1
     assert "it was taken for EDSS" in out.read_text()
     with Store(db) as store:
@@ -193,7 +205,7 @@ def test_what_cannot_be_reported_on_ends_with_2_and_no_file(
 ):
     monkeypatch.chdir(tmp_path)
     words = [str(bench) if word == "BENCH" else word for word in words]
-    assert cli.main(["report", *words, "--unit", "adss", "--no-diagnose"]) == 2
+    assert cli.main(["report", *words, "--unit", "adss", "--no-diagnose"], calls.compute) == 2
     assert said in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
@@ -213,5 +225,5 @@ def test_the_bench_screen_writes_the_same_report(found, bench, tmp_path):
 def test_digits_that_are_a_file_here_are_that_file(calls, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "5").write_text("x")
-    assert cli.main(["report", "5", "--unit", "adss", "--out", "r.html"]) == 2
+    assert cli.main(["report", "5", "--unit", "adss", "--out", "r.html"], calls.compute) == 2
     assert "cannot read files" in capsys.readouterr().err
