@@ -22,6 +22,7 @@ from daq.configs import posterior_folder
 from daq.formats.atomic import replacing
 from daq.untrusted.trust import own_folder, read_own
 from sim.catalogue import BUILT_IN
+from sim.drive.sections import OPTIONAL_SECTIONS
 from sim.unit import Unit
 
 __all__ = [
@@ -35,6 +36,11 @@ __all__ = [
 
 EDITION = 2
 """Counted up whenever inputs, prior, network or engine change what weights mean."""
+
+
+_OF_DRIVES = 1
+"""The same for units with sections that the paper's do not have, whose posteriors are not shipped:
+their datasheet values that deviate, and ranges beside couplings."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +68,10 @@ class Checkpoint:
 def posterior_name(unit: Unit) -> str:
     """File name of a unit's posterior, another for everything that it depends on."""
     effects = {e.id: [p.name for p in e.parameters] for e in BUILT_IN.values()}
-    text = json.dumps([EDITION, effects, unit.physics], sort_keys=True)
+    known: list[Any] = [EDITION, effects, unit.physics]
+    if any(section in unit.physics for section in OPTIONAL_SECTIONS):
+        known.append(_OF_DRIVES)
+    text = json.dumps(known, sort_keys=True)
     return f"posterior-{hashlib.sha256(text.encode()).hexdigest()[:24]}.npz"
 
 
