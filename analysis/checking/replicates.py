@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from analysis.emulation.emulator import Emulator
 from analysis.emulation.fitted_model import FittedModel
+from analysis.observation.observation import Observation, estimate_noise
 
 __all__ = ["FEWEST_RUNS", "MOST_RUNS", "Replicate", "replicates_of"]
 
@@ -23,6 +24,9 @@ MOST_RUNS = 48
 
 FEWEST_RUNS = 2
 """Own runs below which nothing is known of how they scatter."""
+
+_LOUDEST = 1.5
+"""By how much a noise may be louder than its estimate, at most."""
 
 _LOST = 0.02
 """Share of rows at which a run may do what no other does, if the observation has no more."""
@@ -55,22 +59,42 @@ def replicates_of(candidate: FittedModel, rng: np.random.Generator) -> Iterator[
     """
     surface, best = candidate.surface, candidate.best
     most_lost = max(surface.lost(best.place), _LOST * len(surface.observation))
-    noise = surface.observation.noise
     distance = surface.distance(best.place)
     # Half of the runs deviate as a run does in the first datasheet value; the other half fits it.
     # The limits of what is doubted were settled so.
-    halves = candidate.population.deviations[:, 0]
+    folds = candidate.population.fold
     taken = 0
     for i in np.argsort(distance, kind="stable"):
         if taken == MOST_RUNS:
             return
-        others = halves != halves[i]
+        others = folds != folds[i]
         if not np.any(others):
             continue
-        as_read = surface.difference[i].copy()
-        as_read[:2] += rng.standard_normal((2, len(noise))) * noise
+        read = _reading_errors(surface.observation, candidate.population.variance[i], rng)
+        as_read = surface.difference[i] + read
         quiet = surface.motions.quiet[i]
         alone = surface.of(others).against(as_read, quiet)
         if alone.lost(surface.places[i]) <= most_lost:
             taken += 1
             yield Replicate(surface.places[i], alone, as_read, quiet)
+
+
+def _reading_errors(
+    observation: Observation, variance: NDArray[np.float64], rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """What a bench adds (3, rows) to the channels of a run with a relative variance (rows,).
+
+    Its noise is such that its quietest points show that of the observation: a standard error of few
+    cycles scatters itself, and the least of many is less than the noise.
+    """
+    sampling = observation.scatter_sampling
+    scatter = np.exp(sampling * rng.standard_normal(len(observation)))
+    volts = observation.noise_v / np.where(observation.noise > 0.0, observation.noise, np.inf)
+    shown = estimate_noise(np.sqrt(variance + 2.0 * observation.noise**2) * scatter * volts)
+    noise = observation.noise * np.clip(observation.noise_v / shown, 1.0, _LOUDEST)
+    total = variance + 2.0 * noise**2
+    share = 2.0 * noise**2 / total
+    log_scatter = 0.5 * np.log(total / (variance + 2.0 * observation.noise**2))
+    return np.vstack(
+        [rng.standard_normal((2, len(noise))) * noise, log_scatter + share * np.log(scatter)]
+    )

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from analysis.emulation.datasheet_range import datasheet_range
 from analysis.emulation.fitted_model import FittedModel
 from analysis.emulation.model_parameters import estimate_parameters, widen_if_open
 from analysis.emulation.parameter_posterior import ParameterPosterior
@@ -64,6 +65,7 @@ def refine_parameters(
         If a motion grew without bound.
     """
     key = candidate.hypothesis.effects
+    about = {key: datasheet_range(candidate)}
     found = estimate_parameters(candidate, observation, rng, _ENOUGH)
     widest: list[float] = []
     most_s = max(_SWEEPS * sum(plan.duration_s for plan, _ in observation.plans), _LEAST_S)
@@ -79,7 +81,7 @@ def refine_parameters(
             if learned and np.all(candidate.population.places.std(axis=0) > _APART * std):
                 break
             groups = list(runs_around_estimate(candidate.hypothesis, found, _GROUPS, rng))
-            made = simulate_groups(unit, groups, observation, rng, executor)[key]
+            made = simulate_groups(unit, groups, observation, rng, executor, about=about)[key]
             # The surface stays as it was judged; sizing asks it for its widths alone.
             candidate = replace(candidate, population=candidate.population.joined(made))
             found = estimate_parameters(candidate, observation, rng, _ENOUGH)

@@ -81,7 +81,9 @@ def calibrate(
         that may be the answer count among the nearest, as one that is hardly known would seem to
         be known as well as those lie close together.
     """
-    readings = _readings(observation, runs, gain, rng, _sampling(observation) if cautious else 0.0)
+    readings = _readings(
+        observation, runs, gain, rng, observation.scatter_sampling if cautious else 0.0
+    )
     kin = _kin(runs.deviations)
     first = _regress(observation, readings, runs.places, kin)
     distance = np.abs((runs.places - first.mean) / width).max(axis=1)
@@ -103,12 +105,6 @@ def _kin(deviations: NDArray[np.float64]) -> NDArray[np.int64]:
     alone = ~np.any(deviations != 0.0, axis=1)
     label[alone] = label.max(initial=0) + 1 + np.arange(np.count_nonzero(alone))
     return label
-
-
-def _sampling(observation: Observation) -> float:
-    """Relative standard deviation of a standard error along one component, by its cycles."""
-    cycles = min(plan.integrate_cycles for plan, _ in observation.plans)
-    return float(1.0 / np.sqrt(2.0 * max(cycles - 1, 1)))
 
 
 def _readings(

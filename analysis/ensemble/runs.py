@@ -8,7 +8,7 @@ judges nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +22,7 @@ from analysis.execution.executor import Executor
 from analysis.observation.observation import Observation, channels_of_readings
 from sim.unit import Unit
 
-__all__ = ["Group", "Population", "simulate_groups"]
+__all__ = ["DatasheetRange", "Group", "Population", "simulate_groups"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,18 +43,28 @@ class Group:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class DatasheetRange:
+    """Departures along the ways of a unit: `centre` (k,), and `reach` (k,) to either side."""
+
+    centre: NDArray[np.float64]
+    reach: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Population:
     """Runs of one hypothesis.
 
     `places` (n, d); `deviations` (n, k) along the ways in which the unit spreads
     (`analysis.ensemble.datasheet_spread`); `mean`, `variance` (n, rows): the reading of each run,
-    see `analysis.observation.observation.readings_of_cycles`.
+    see `analysis.observation.observation.readings_of_cycles`. `fold` (n,): 0 or 1 by how a run
+    deviates along the first way; runs of one are held against those of the other.
     """
 
     places: NDArray[np.float64]
     deviations: NDArray[np.float64]
     mean: NDArray[np.complex128]
     variance: NDArray[np.float64]
+    fold: NDArray[np.int64]
 
     def __len__(self) -> int:
         return len(self.places)
@@ -70,6 +80,7 @@ class Population:
             np.concatenate([self.deviations, other.deviations]),
             np.concatenate([self.mean, other.mean]),
             np.concatenate([self.variance, other.variance]),
+            np.concatenate([self.fold, other.fold]),
         )
 
 
@@ -80,10 +91,12 @@ def simulate_groups(
     rng: np.random.Generator,
     executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
+    about: Mapping[tuple[str, ...], DatasheetRange] | None = None,
 ) -> dict[tuple[str, ...], Population]:
     """Populations by the effects of their hypothesis.
 
-    `executor` says where they are simulated, this machine's cores if not given.
+    `executor` says where they are simulated, this machine's cores if not given. `about`: where
+    their datasheet values lie, of hypotheses of which that is known better than by the datasheet.
 
     Raises
     ------
@@ -94,9 +107,11 @@ def simulate_groups(
         return {}
     families: list[Family] = []
     deviations: list[NDArray[np.float64]] = []
+    folds: list[NDArray[np.int64]] = []
     spread = spread_of(unit)
     for group, signs in zip(groups, list(_signs(groups, spread, rng)), strict=True):
-        off = signs * spread.sigmas
+        known = about.get(group.hypothesis.effects) if about else None
+        off = signs * spread.sigmas if known is None else known.centre + signs * known.reach
         named = spread.deviations(off)
         seeds = rng.integers(2**30, size=len(group.ratios))
         machines = tuple(
@@ -105,10 +120,11 @@ def simulate_groups(
         )
         families.append(Family(unit, machines, observation.plans))
         deviations.append(np.tile(off, (len(group.ratios), 1)))
+        folds.append(np.full(len(group.ratios), int(signs[0] > 0.0)))
     readings = read_families(families, executor, progress)
     found: dict[tuple[str, ...], Population] = {}
-    for group, off, (mean, variance) in zip(groups, deviations, readings, strict=True):
-        made = Population(group.places, off, mean, variance)
+    for group, off, fold, read in zip(groups, deviations, folds, readings, strict=True):
+        made = Population(group.places, off, *read, fold)
         key = group.hypothesis.effects
         found[key] = found[key].joined(made) if key in found else made
     return found

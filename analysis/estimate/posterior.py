@@ -139,7 +139,9 @@ def _population(axes: Sequence[Axis], draws: Draws, spread: Spread) -> Populatio
     """Runs with the places of their machines along the axes."""
     places = np.array([[_value(axis, m) for axis in axes] for m in draws.machines])
     deviations = np.array([spread.along(m.deviations) for m in draws.machines])
-    return Population(places, deviations, draws.mean, draws.variance)
+    return Population(
+        places, deviations, draws.mean, draws.variance, (deviations[:, 0] > 0.0).astype(int)
+    )
 
 
 def _emulator(

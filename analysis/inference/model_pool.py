@@ -7,16 +7,17 @@ does not decide what to look at.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.emulation.datasheet_range import datasheet_range
 from analysis.emulation.fitted_model import Effects, FittedModel, fit_models
 from analysis.emulation.model_parameters import estimate_parameters
 from analysis.emulation.noise_level import likeliest_noise, possible_noises
 from analysis.ensemble.model import Hypothesis
-from analysis.ensemble.runs import Group, Population, simulate_groups
+from analysis.ensemble.runs import DatasheetRange, Group, Population, simulate_groups
 from analysis.execution.executor import Executor
 from analysis.inference.run_design import Reach, runs_about, runs_along_ridge, runs_around_estimate
 from analysis.observation.observation import Observation
@@ -61,16 +62,32 @@ class ModelPool:
         """The most likely candidate."""
         return max(self.found.values(), key=lambda c: c.best.log_likelihood)
 
-    def simulate_about(self, starts: Mapping[Effects, tuple[Place, Reach]], groups: int) -> None:
-        """Simulate hypotheses about places, each within its reach, in so many groups each."""
+    def simulate_about(
+        self,
+        starts: Mapping[Effects, tuple[Place, Reach]],
+        groups: int,
+        about: Mapping[Effects, DatasheetRange] | None = None,
+    ) -> None:
+        """Simulate hypotheses about places, each within its reach, in so many groups each.
+
+        `about`: where their datasheet values lie, if that is known better than by the datasheet.
+        """
         wanted: list[Group] = []
         for key, (place, reach) in starts.items():
             wanted += runs_about(Hypothesis(self.unit, key), place, groups, self._rng, reach)
-        self._simulate(wanted)
+        self._simulate(wanted, about)
         self._form({key: place for key, (place, _) in starts.items()})
 
-    def simulate_around_estimate(self, chosen: Sequence[Effects], groups: int) -> None:
-        """Simulate more of some candidates, about what their runs tell of their parameters."""
+    def simulate_around_estimate(
+        self,
+        chosen: Sequence[Effects],
+        groups: int,
+        about: Mapping[Effects, DatasheetRange] | None = None,
+    ) -> None:
+        """Simulate more of some candidates, about what their runs tell of their parameters.
+
+        `about`: see `simulate_about`.
+        """
         more: list[Group] = []
         for c in (self.found[key] for key in chosen):
             # What is learned of many parameters is far wider than a resonance is sharp. Of one
@@ -80,7 +97,7 @@ class ModelPool:
             learned = estimate_parameters(c, self.observation, self._rng)
             more += runs_around_estimate(c.hypothesis, learned, groups - along, self._rng)
             more += runs_along_ridge(c, along, self._rng)
-        self._simulate(more)
+        self._simulate(more, about)
         self._form({key: self.found[key].best.place for key in chosen})
 
     def re_estimate_noise(self) -> None:
@@ -98,9 +115,15 @@ class ModelPool:
             self.observation = heard
             self._form({effects: c.best.place for effects, c in self.found.items()})
 
-    def _simulate(self, groups: Sequence[Group]) -> None:
+    def ranges(self, chosen: Iterable[Effects]) -> dict[Effects, DatasheetRange]:
+        """Where the datasheet values of some candidates lie, as far as their runs tell."""
+        return {key: datasheet_range(self.found[key]) for key in chosen}
+
+    def _simulate(
+        self, groups: Sequence[Group], about: Mapping[Effects, DatasheetRange] | None
+    ) -> None:
         made = simulate_groups(
-            self.unit, groups, self.observation, self._rng, self._executor, self._report()
+            self.unit, groups, self.observation, self._rng, self._executor, self._report(), about
         )
         for key, population in made.items():
             known = self._runs.get(key)

@@ -122,11 +122,14 @@ def refine(
     fine = ModelPool(unit, observation, rng, executor, report)
     places = dict.fromkeys([*_leading(odds(coarse), most, behind), ()])
     fine.simulate_about(
-        {k: (coarse.found[k].best.place, _nearer(reaches[k])) for k in places}, groups
+        {k: (coarse.found[k].best.place, _nearer(reaches[k])) for k in places},
+        groups,
+        coarse.ranges(places),
     )
     fine.re_estimate_noise()
     for most, behind, groups in rounds:
-        fine.simulate_around_estimate(_leading(odds(fine), most, behind), groups)
+        chosen = _leading(odds(fine), most, behind)
+        fine.simulate_around_estimate(chosen, groups, fine.ranges(chosen))
     fine.re_estimate_noise()
     ranked = odds(fine)
     candidates = sorted(fine.found.values(), key=lambda c: -ranked[c.hypothesis.effects])

@@ -27,6 +27,7 @@ __all__ = [
     "USUAL_NOISE_V",
     "Observation",
     "channels_of_readings",
+    "estimate_noise",
     "noise_and_floor",
     "observe",
     "readings_of_cycles",
@@ -113,6 +114,12 @@ class Observation:
             known.append((asdict(replace(plan, frequencies_hz=grid)), rows.tolist()))
         return known
 
+    @property
+    def scatter_sampling(self) -> float:
+        """Relative standard deviation of a standard error along one component, by its cycles."""
+        cycles = min(plan.integrate_cycles for plan, _ in self.plans)
+        return float(1.0 / np.sqrt(2.0 * max(cycles - 1, 1)))
+
     def with_noise(self, noise_v: float) -> Observation:
         """The same reading with another noise of its own, V."""
         return replace(self, noise_v=noise_v, noise=self.noise * (noise_v / self.noise_v))
@@ -169,7 +176,7 @@ def observe(*responses: FrequencyResponse) -> Observation:
     scatter = np.concatenate([one.scatter for one in swept])
     volts = np.abs(gain) * level
     _refuse_unbelievable(level, volts)
-    noise_v = _reading_noise(scatter * volts)
+    noise_v = estimate_noise(scatter * volts)
     noise, floor = noise_and_floor(np.abs(gain), level, noise_v)
     drowned = floor > 0.0
     log_gain = np.log(gain)
@@ -261,8 +268,8 @@ def _refuse_repeated(frequency_hz: NDArray[np.float64], source_vpk: float) -> No
         )
 
 
-def _reading_noise(volts: NDArray[np.float64]) -> float:
-    """Noise per component: what the quietest points show, as there the motion repeats.
+def estimate_noise(volts: NDArray[np.float64]) -> float:
+    """Noise of each component, V: what the quietest points show, as there the motion repeats.
 
     Where it repeats nowhere that is too much (see `analysis.emulation.noise_level`). `volts`
     counts both components, as the scatter of a reading does.

@@ -43,11 +43,12 @@ def _best_part(verdict: Verdict) -> tuple[Judged, ...]:
 
 def _who_shares(verdict: Verdict) -> tuple[Judged, ...]:
     """Others that hold what is lacking to be sure, the likeliest first."""
-    others = [
-        one
-        for one in verdict.judged
-        if one is not verdict.best and not (verdict.holds(one) or verdict.is_equivalent(one))
-    ]
+    best, others = verdict.best.probability, []
+    for one in verdict.judged:
+        if verdict.counts_for_best(one):
+            best += one.probability
+        elif one is not verdict.best:
+            others.append(one)
     others.sort(key=lambda one: -one.probability)
-    held = verdict.probability + np.cumsum([0.0, *(one.probability for one in others)])
+    held = best + np.cumsum([0.0, *(one.probability for one in others)])
     return tuple(others[: int(np.searchsorted(held, _SURE * held[-1]))])

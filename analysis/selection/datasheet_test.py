@@ -66,7 +66,7 @@ def compare_with_datasheet(verdict: Verdict, found: ParameterPosterior) -> Verdi
     if any(one.effects and one.score > least for one in verdict.rivals):
         # It may be what is missing.
         return verdict
-    judged = rank_behind(verdict.judged, best, baseline, AS_THE_DATASHEET)
+    judged = rank_behind(verdict.judged, [best], baseline, AS_THE_DATASHEET)
     baseline = _among(judged, ())
     word: Word = "consistent" if baseline.adequate else "unexplained"
     return Verdict(word, baseline, judged, baseline)
@@ -84,7 +84,7 @@ def _with_part(verdict: Verdict, rest: Effects) -> Verdict:
         return verdict
     others = [one for one in judged if one.adequate and not set(one.effects) > set(rest)]
     if part.adequate and part.score >= max(one.score for one in others):
-        judged = rank_behind(judged, best, part, AS_THE_DATASHEET)
+        judged = rank_behind(judged, [best], part, AS_THE_DATASHEET)
         baseline = _among(judged, ())
         apart = (one for one in verdict.also if not set(one.effects) > set(rest))
         also = tuple(_among(judged, one.effects) for one in apart)

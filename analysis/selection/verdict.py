@@ -22,6 +22,7 @@ from analysis.emulation.likelihood import TEMPERATURE
 from analysis.observation.observation import Observation
 
 __all__ = [
+    "BY_CHANCE",
     "FALSE_ALARM",
     "WITHIN_TOLERANCE",
     "Judged",
@@ -65,6 +66,7 @@ are believed in its place, are rivals: of 142 sets drawn and named so two had le
 _JUDGED = 6
 
 WITHIN_TOLERANCE = "within the tolerance of the datasheet"
+BY_CHANCE = "gains no more than by chance where nothing is hidden"
 _NOT_ASKED = "too improbable to be checked"
 
 
@@ -141,13 +143,18 @@ class Verdict:
         more.
         """
         return self.best.probability + sum(
-            one.probability for one in self.judged if self.holds(one) or self.is_equivalent(one)
+            one.probability for one in self.judged if self._has(one) or self.is_equivalent(one)
         )
 
-    def holds(self, one: Judged) -> bool:
-        """Whether a set has all the causes of the best set, and more, and does no better."""
-        more = bool(self.best.effects) and set(one.effects) > set(self.best.effects)
-        return more and one.score <= self.best.score
+    def counts_for_best(self, one: Judged) -> bool:
+        """Whether what is believed of a set is believed of the best one, and of no further cause.
+
+        Of one that says the same, or has more causes and does no better.
+        """
+        return self._has(one) and one.score <= self.best.score or self.is_equivalent(one)
+
+    def _has(self, one: Judged) -> bool:
+        return bool(self.best.effects) and set(one.effects) > set(self.best.effects)
 
     def remark(self, one: Judged) -> str:
         """What speaks against a set, or makes it no rival; empty where nothing does."""
@@ -222,11 +229,12 @@ def judge_candidates(
     judged = _ask(judged, rng)
     best = _leader(judged)
     (baseline,) = (one for one in judged if not one.effects)
-    if (
-        not best.effects
-        or best.score < baseline.score + FALSE_ALARM
-        or _may_be_chance(baseline.candidate, best.candidate, baseline.misfit, rng)
-    ):
+    little = best.score < baseline.score + FALSE_ALARM
+    if little or _may_be_chance(baseline.candidate, best.candidate, baseline.misfit, rng):
+        if baseline.adequate and not little:
+            ahead = [one for one in judged if one.score > baseline.score]
+            judged = rank_behind(judged, ahead, baseline, BY_CHANCE)
+            (baseline,) = (one for one in judged if not one.effects)
         if baseline.adequate:
             return Verdict("consistent", baseline, judged, baseline)
         tie = Verdict("ambiguous", best, judged, baseline)
@@ -302,12 +310,16 @@ def _leader(judged: Sequence[Judged]) -> Judged:
 
 
 def rank_behind(
-    judged: Sequence[Judged], one: Judged, part: Judged, objection: str
+    judged: Sequence[Judged], ahead: Sequence[Judged], part: Judged, objection: str
 ) -> tuple[Judged, ...]:
-    """Put a set that owes its lead to chance far behind the part that does as well."""
-    score = min(one.score, part.score - FALSE_ALARM)
-    behind = replace(one, score=score, objection=objection)
-    return _ranked([behind if other is one else other for other in judged])
+    """Put sets that owe their lead to chance far behind the part that does as well."""
+    least = part.score - _SURE
+    return _ranked(
+        [
+            replace(one, score=min(one.score, least), objection=objection) if one in ahead else one
+            for one in judged
+        ]
+    )
 
 
 def _ranked(judged: Sequence[Judged]) -> tuple[Judged, ...]:

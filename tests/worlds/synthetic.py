@@ -62,7 +62,7 @@ def population(places, runs) -> Population:
     """Runs (m, 3, rows) at places (m, d) of units as their datasheet says."""
     mean = np.exp(runs[:, 0] + 1j * runs[:, 1])
     none = np.zeros((len(runs), len(SPREAD)))
-    return Population(places, none, mean, np.exp(2.0 * runs[:, 2]))
+    return Population(places, none, mean, np.exp(2.0 * runs[:, 2]), np.zeros(len(runs), int))
 
 
 def payload_runs(places):
@@ -131,5 +131,5 @@ def candidate(
     motions = Regimes.unknown(*difference.shape[::2])
     surface = Emulator(seen, places, difference, width, slopes, SIGMAS, motions, SPREAD.gain, 9.0)
     mean, variance = np.exp(runs[:, 0] + 1j * runs[:, 1]), np.exp(2.0 * runs[:, 2])
-    population = Population(places, deviations, mean, variance)
+    population = Population(places, deviations, mean, variance, np.repeat(np.arange(groups), 10))
     return FittedModel(hypothesis, population, surface, surface.climb(places.mean(axis=0)))

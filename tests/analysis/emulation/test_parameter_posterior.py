@@ -57,7 +57,9 @@ def observed(measured, step=1):
 def runs(places, drawn):
     """Runs (m, 3, rows) at places (m, d) of units as their datasheet says."""
     mean, variance = np.exp(drawn[:, 0] + 1j * drawn[:, 1]), np.exp(2.0 * drawn[:, 2])
-    return Population(places, np.zeros((len(places), 5)), mean, variance)
+    return Population(
+        places, np.zeros((len(places), 5)), mean, variance, np.zeros(len(places), int)
+    )
 
 
 @pytest.mark.parametrize("branch", [False, True])

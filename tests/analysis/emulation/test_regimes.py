@@ -30,7 +30,11 @@ def test_a_state_is_told_by_the_scatter_above_the_reading_s_noise():
     variance = np.zeros((2, ROWS))
     variance[1] = 100.0 * seen.noise**2
     runs = Population(
-        np.zeros((2, 1)), np.zeros((2, 5)), np.ones((2, ROWS), dtype=complex), variance
+        np.zeros((2, 1)),
+        np.zeros((2, 5)),
+        np.ones((2, ROWS), dtype=complex),
+        variance,
+        np.array([0, 1]),
     )
     found = find_regimes(seen, runs)
     assert found.quiet.tolist() == [[True] * ROWS, [False] * ROWS]

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from analysis.ensemble.model import Hypothesis
-from analysis.ensemble.runs import Group, simulate_groups
+from analysis.ensemble.runs import DatasheetRange, Group, simulate_groups
 from analysis.observation.observation import unread
 from daq.errors import AnalysisError
 from daq.plan import SweepPlan
@@ -13,8 +13,12 @@ SHORT = SweepPlan((120.0, 140.0), (2.0,), settle_cycles=1, integrate_cycles=2)
 RATIOS = np.linspace(0.2, 0.8, 3)
 
 
-def runs(groups, seed=0):
-    return simulate_groups(ADSS, groups, unread(SHORT, 1e-4), np.random.default_rng(seed))
+LOAD = ("load-inertia",)
+
+
+def runs(groups, seed=0, about=None):
+    rng = np.random.default_rng(seed)
+    return simulate_groups(ADSS, groups, unread(SHORT, 1e-4), rng, about=about)
 
 
 def test_runs_are_kept_by_hypothesis_with_their_places():
@@ -39,6 +43,17 @@ def test_neighbouring_groups_deviate_in_opposite_ways_by_one_tolerance():
     np.testing.assert_allclose(np.abs(off), np.full((14, 5), 0.005))
     # Seven pairs tell five slopes apart.
     assert np.linalg.cond(off) < 3.0
+
+
+def test_groups_deviate_about_where_the_datasheet_values_are_known_to_lie():
+    known = DatasheetRange(np.array([0.01, -0.01, 0.0, 0.0, 0.02]), np.full(5, 0.001))
+    groups = [Group(Hypothesis(ADSS, key), RATIOS, np.full(len(key), 0.5)) for key in ((), LOAD)]
+    found = runs(groups * 4, about={(): known})
+    off = found[()].deviations - known.centre
+    np.testing.assert_allclose(np.abs(off), np.full((12, 5), 0.001))
+    np.testing.assert_array_equal(found[()].fold, off[:, 0] > 0.0)
+    np.testing.assert_allclose(np.abs(found[LOAD].deviations), np.full((12, 5), 0.005))
+    assert np.count_nonzero(found[LOAD].fold) == 6
 
 
 def test_the_same_seed_gives_the_same_runs():

@@ -28,18 +28,6 @@ def alike(monkeypatch):
     """Likeness is not asked of what has no surface, nor who is near: that has tests of its own."""
     same = set()
     monkeypatch.setattr(Verdict, "is_equivalent", lambda _, one: one.effects in same)
-    monkeypatch.setattr(
-        Verdict,
-        "probability",
-        property(
-            lambda self: (
-                self.best.probability
-                + sum(
-                    one.probability for one in self.judged if one.effects in same or self.holds(one)
-                )
-            )
-        ),
-    )
     monkeypatch.setattr(Verdict, "_is_rival", lambda *_: False)
     return same
 
@@ -68,8 +56,10 @@ def test_a_further_cause_that_does_no_better_is_no_rival():
 
 def test_a_further_cause_that_does_better_is_a_rival():
     better = told(standing((LOAD,), 0.1), standing((LOAD, SHAFT), 0.9))
-    assert better.probability == pytest.approx(0.1)
-    assert require_credible_set(better).word == "ambiguous"
+    # The load is there in either; whether the shaft is, too, is open.
+    assert better.probability == pytest.approx(1.0)
+    held = require_credible_set(better)
+    assert (held.word, rivals(held)) == ("ambiguous", [(LOAD, SHAFT)])
 
 
 def test_what_leads_though_it_is_refused_is_a_rival():

@@ -7,7 +7,7 @@ from worlds.synthetic import BASE, candidate, observation, read, shape
 
 import analysis.selection.verdict as rules
 from analysis.emulation.likelihood import TEMPERATURE
-from analysis.selection.verdict import judge_candidates
+from analysis.selection.verdict import BY_CHANCE, judge_candidates
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -62,6 +62,10 @@ def test_a_cause_that_imitates_one_branch_of_the_plain_motion_is_not_blamed(seed
     assert with_it > without + 50.0, "the imitation does not tempt"
     verdict = judge_candidates(sets[::-1], observed, np.random.default_rng(seed))
     assert (verdict.word, verdict.best.effects) == ("consistent", ())
+    # What leads by chance is no evidence, and its probability says so.
+    assert verdict.probability > 0.9
+    (imitation,) = (one for one in verdict.judged if one.effects)
+    assert verdict.remark(imitation) == BY_CHANCE
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -1,0 +1,46 @@
+"""Where the datasheet values of a hypothesis lie, as far as its runs tell.
+
+Owns the range in which the next runs of it depart from the datasheet. Over a wide tolerance a sharp
+resonance does not follow a departure in proportion; over what the measurement leaves open it does.
+It simulates nothing and judges nothing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from analysis.emulation.fitted_model import FittedModel
+from analysis.emulation.likelihood import TEMPERATURE
+from analysis.ensemble.runs import DatasheetRange
+
+__all__ = ["datasheet_range"]
+
+_FARTHEST = 2.5
+"""Standard deviations of the tolerance beyond which no range is centred."""
+
+_WIDE = 2.0
+"""Reach in standard deviations of what is left open: what is learned of a size from runs that lie
+closer together than that is too sure."""
+
+_TRIES = 2
+"""Random steps of a walk per coordinate and reach."""
+
+
+def datasheet_range(candidate: FittedModel) -> DatasheetRange:
+    """The range about the best fit that is left open; no wider than the tolerance.
+
+    The covariance at the best place (Gauss-Newton, likelihood to the power 1 / `TEMPERATURE`), and
+    how far the best departures differ between the places that agree about as well.
+    """
+    surface, best = candidate.surface, candidate.best
+    sigmas = surface.sigmas
+    slopes = np.where(np.isfinite(best.std), surface.slopes / best.std, 0.0)
+    flat = slopes.reshape(len(sigmas), -1)
+    precision = np.diag(1.0 / sigmas**2) + flat @ flat.T / TEMPERATURE
+    fits = surface.walk(best.place, tries=_TRIES)
+    share = surface.shares(fits)
+    found = np.array([fit.deviations[: len(sigmas)] for fit in fits])
+    across = share @ (found - share @ found) ** 2
+    std = np.sqrt(np.diag(np.linalg.inv(precision)) + across)
+    centre = np.clip(best.deviations[: len(sigmas)], -_FARTHEST * sigmas, _FARTHEST * sigmas)
+    return DatasheetRange(centre, np.minimum(_WIDE * std, sigmas))
