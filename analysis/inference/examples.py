@@ -181,7 +181,11 @@ def read_batch(
     added = rng.standard_normal((2, *mean.shape), dtype=np.float32) * noise
     gain = mean + added[0] + 1j * added[1]
     size = np.maximum(np.abs(gain), 1e-9)
-    scatter = np.sqrt(variance * (np.abs(mean) / size) ** 2 + 2.0 * (noise / size) ** 2)
+    # The noise of so many cycles scatters, too; that of the motion was simulated.
+    sampling = rng.standard_normal(mean.shape, dtype=np.float32)
+    sampling /= np.sqrt(np.float32(2 * max(batch.plan.integrate_cycles - 1, 1)))
+    shown = np.exp(sampling) * noise / size
+    scatter = np.sqrt(variance * (np.abs(mean) / size) ** 2 + 2.0 * shown**2)
     scatter_known = rng.random(count) < (0.85 if degrade else 1.0)
     phase_known = rng.random(count) < (0.92 if degrade else 1.0)
     scatter = np.where(scatter_known[:, None, None], scatter, np.nan).astype(np.float32)

@@ -203,27 +203,21 @@ def judge_candidates(
     candidates: Sequence[FittedModel],
     observation: Observation,
     rng: np.random.Generator,
-    log_odds: Mapping[Effects, float] | None = None,
+    log_odds: Mapping[Effects, float],
 ) -> Verdict:
     """Judge the leading candidates and the baseline.
 
     Parameters
     ----------
     log_odds
-        Of each candidate; see `analysis.inference.odds`. Those of the tempered likelihood alone
-        if not given.
+        Of each candidate; see `analysis.inference.odds`.
 
     Notes
     -----
     The score is the logarithm of the posterior odds, in units of 1 / `TEMPERATURE`. The network
     pays for further causes, as it has learned how many there are.
     """
-    scores = {
-        c.hypothesis.effects: c.best.log_likelihood
-        if log_odds is None
-        else TEMPERATURE * log_odds[c.hypothesis.effects]
-        for c in candidates
-    }
+    scores = {effects: TEMPERATURE * odds for effects, odds in log_odds.items()}
     chosen = _worth_judging(candidates, scores)
     judged = _ranked([_unasked(c, observation, scores[c.hypothesis.effects]) for c in chosen])
     judged = _ask(judged, rng)

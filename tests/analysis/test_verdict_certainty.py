@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from worlds.judging import likelihoods, odds
 from worlds.synthetic import candidate, observation, read, thinned
 
 from analysis.selection.verdict import judge_candidates
@@ -21,7 +22,7 @@ def judge(seed, step=1, scatter=1.0):
         candidate(seen, effects, 10 * seed + number, scatter=scatter)
         for number, effects in enumerate(((), TRUE, WRONG))
     ]
-    verdict = judge_candidates(found, seen, np.random.default_rng(seed))
+    verdict = judge_candidates(found, seen, np.random.default_rng(seed), odds(likelihoods(found)))
     (true,) = (one for one in verdict.judged if one.effects == TRUE)
     return SimpleNamespace(
         ahead=true.score - verdict.baseline.score, probability=true.probability, word=verdict.word

@@ -104,8 +104,9 @@ def is_named(effect: str, setting: EffectSetting, rng: np.random.Generator) -> b
     seed = int(rng.integers(2**31))
     swept = simulate(machine, ratio, PLAN, effects=(setting,), seed=seed)
     seen = observe(reading(swept, rng))
-    candidates = refine(Posterior.find(UNIT, CACHE), seen, seed=seed).candidates
-    verdict = judge_candidates(candidates, candidates[0].surface.observation, rng)
+    found = refine(Posterior.find(UNIT, CACHE), seen, seed=seed)
+    observation = found.candidates[0].surface.observation
+    verdict = judge_candidates(found.candidates, observation, rng, found.log_odds)
     return verdict.word in ("explained", "ambiguous") and verdict.best.effects == (effect,)
 
 

@@ -20,8 +20,16 @@ def judge(observed, sets=SETS, seed=0, scores=None):
     """What is judged of sets; `scores` in place of those that their runs would give them."""
     found = [candidate(observed, effects, seed + i) for i, effects in enumerate(sets)]
     found.sort(key=lambda c: -c.best.log_likelihood)
-    return judge_candidates(found, observed, np.random.default_rng(seed), odds(scores))
+    return judge_candidates(
+        found, observed, np.random.default_rng(seed), odds(scores or likelihoods(found))
+    )
 
 
 def odds(scores):
-    return scores and {key: score / TEMPERATURE for key, score in scores.items()}
+    """Log odds of scores."""
+    return {key: score / TEMPERATURE for key, score in scores.items()}
+
+
+def likelihoods(found):
+    """Scores by the likelihood alone, as if no network had been asked."""
+    return {one.hypothesis.effects: one.best.log_likelihood for one in found}

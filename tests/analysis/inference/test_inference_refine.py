@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from worlds import synthetic_runs
+from worlds.judging import likelihoods, odds
 from worlds.untrained import Untrained
 
 from analysis.inference.refine import refine
@@ -22,7 +23,10 @@ def test_what_is_hidden_is_found_among_what_is_proposed(world, seed):
         Untrained((LAG, LOAD, MESH)), observed((LOAD,), [0.8], seed), seed=seed, executor=world
     )
     verdict = judge_candidates(
-        found.candidates, found.candidates[0].surface.observation, np.random.default_rng(seed)
+        found.candidates,
+        found.candidates[0].surface.observation,
+        np.random.default_rng(seed),
+        odds(likelihoods(found.candidates)),
     )
     assert (verdict.word, verdict.best.effects) == ("explained", (LOAD,))
     assert verdict.best.candidate.best.place == pytest.approx([0.4, 0.8], abs=0.1)

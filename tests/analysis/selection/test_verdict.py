@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from worlds.judging import FITS, TRUE, WRONG, judge, seen
+from worlds.judging import FITS, TRUE, WRONG, judge, likelihoods, odds, seen
 from worlds.synthetic import BASE, candidate, observation, read, shape
 
 import analysis.selection.verdict as rules
@@ -60,7 +60,9 @@ def test_a_cause_that_imitates_one_branch_of_the_plain_motion_is_not_blamed(seed
     sets = [candidate(observed, effects, seed) for effects in ((), WRONG)]
     without, with_it = (one.best.log_likelihood for one in sets)
     assert with_it > without + 50.0, "the imitation does not tempt"
-    verdict = judge_candidates(sets[::-1], observed, np.random.default_rng(seed))
+    verdict = judge_candidates(
+        sets[::-1], observed, np.random.default_rng(seed), odds(likelihoods(sets))
+    )
     assert (verdict.word, verdict.best.effects) == ("consistent", ())
     # What leads by chance is no evidence, and its probability says so.
     assert verdict.probability > 0.9
