@@ -3,12 +3,15 @@ from shutil import copytree
 
 import numpy as np
 import pytest
+from studies.calibration import calibration_error, coverage, ranks_of
+from worlds.untrained import SIZE, SIZE_STD, Untrained
 
 from analysis.inference.checkpoint import read_checkpoint
 from analysis.inference.examples import Scales, read_batch
 from analysis.inference.network import first_weights, set_logits, summarise
 from analysis.inference.plans import Landmarks
 from analysis.inference.prior import Prior
+from analysis.inference.runs import load_batch
 from sim.unit import load_unit
 
 pytest.importorskip("jax", reason="training needs the extra `train`")
@@ -125,3 +128,26 @@ def test_training_that_makes_it_worse_changes_nothing(runs, tmp_path):
     assert "which is kept" in told[-1]
     for name, values in first.weights.items():
         np.testing.assert_allclose(again.weights[name], values, rtol=2e-3, atol=1e-4)
+
+
+def test_ranks_of_the_truth_are_those_of_its_density(simulated):
+    """Untrained, the ratio has a flat density, of which the truth's rank is the ratio itself."""
+    from scipy.stats import norm
+
+    posterior, batch = Untrained(), load_batch(min(simulated.glob("[0-9]*.npz")))
+    rng = np.random.default_rng(3)
+    found = ranks_of(posterior.scales, posterior.checkpoint, batch, rng)
+    np.testing.assert_allclose(found.ratio, batch.ratio, atol=1e-6)
+    low, high = posterior.scales.size_ends.T
+    place = ((np.log(np.abs(batch.sizes)) - low) / (high - low)).ravel()
+    there = norm.cdf((place[np.isfinite(place)] - SIZE) / SIZE_STD)
+    np.testing.assert_allclose(found.size, there, atol=1e-4)
+
+
+def test_intervals_that_are_too_narrow_are_seen():
+    ranks = np.random.default_rng(1).uniform(size=20_000)
+    assert coverage(ranks) == pytest.approx(0.95, abs=0.006)
+    assert coverage(np.round(ranks)) == 0.0
+    right = ranks < 0.6
+    assert calibration_error(np.full(20_000, 0.6), right) < 0.02
+    assert calibration_error(np.full(20_000, 0.9), right) == pytest.approx(0.3, abs=0.02)
