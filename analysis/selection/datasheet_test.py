@@ -17,7 +17,14 @@ from numpy.typing import NDArray
 from analysis.emulation.fitted_model import Effects
 from analysis.emulation.parameter_posterior import ParameterPosterior
 from analysis.ensemble.model import Hypothesis
-from analysis.selection.verdict import FALSE_ALARM, Judged, Verdict, Word, rank_behind
+from analysis.selection.verdict import (
+    FALSE_ALARM,
+    WITHIN_TOLERANCE,
+    Judged,
+    Verdict,
+    Word,
+    rank_behind,
+)
 from sim.catalogue import CATALOGUE
 
 Vector = NDArray[np.float64]
@@ -54,7 +61,9 @@ def compare_with_datasheet(verdict: Verdict, found: ParameterPosterior) -> Verdi
     best = verdict.best
     named = verdict.word in ("explained", "ambiguous")
     if named and best.candidate.hypothesis.is_tolerance(found.mean):
-        return Verdict("consistent", verdict.baseline, verdict.judged, verdict.baseline)
+        judged = rank_behind(verdict.judged, [best], verdict.baseline, WITHIN_TOLERANCE)
+        baseline = _among(judged, ())
+        return Verdict("consistent", baseline, judged, baseline)
     unsure = _unsure(best.candidate.hypothesis, found)
     rest = tuple(effect for effect in best.effects if effect not in unsure)
     if not named or not unsure:
