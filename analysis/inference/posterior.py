@@ -22,7 +22,7 @@ from analysis.inference.examples import Scales, conditions
 from analysis.inference.exclusion import ExclusionLimit
 from analysis.inference.inputs import SweptLevels
 from analysis.inference.network import Densities, densities, set_logits, summarise
-from analysis.inference.nominal import Nominal, nominal_of, relative
+from analysis.inference.nominal import Nominal, nominal_of, relative, remembering
 from analysis.inference.prior import Prior
 from analysis.observation.observation import Observation
 from sim.catalogue import CATALOGUE, not_of_unit
@@ -82,7 +82,7 @@ class Posterior:
         Where there is none, that of another unit: it reads an observation relative to the
         datasheet, so that much of what it learned holds.
         """
-        nominal = partial(nominal_of, unit, cache=cache, executor=executor)
+        nominal = remembering(partial(nominal_of, unit, cache=cache, executor=executor))
         found = find_checkpoint(unit, cache)
         if found is not None:
             return cls(Scales.from_facts(unit, found), found, nominal)
