@@ -33,7 +33,7 @@ def test_every_other_cause_changes_what_is_read_by_more_than_the_noise(cause):
     assert words(drawn.size) != words(2.0 * drawn.size)
 
 
-def test_its_table_says_what_is_named_and_by_how_much_a_datasheet_value_is_off(tmp_path):
+def test_its_table_lists_named_causes_and_datasheet_errors(tmp_path):
     kept = Kept(str(tmp_path / "lines.jsonl"))
     common = {
         "seed": 1,

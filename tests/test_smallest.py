@@ -34,7 +34,7 @@ def test_thresholds_of_many_staircases_are_found_within_their_errors(seed):
     assert np.all(std < 0.2)
 
 
-def test_a_staircase_goes_down_where_a_cause_is_named_and_up_where_it_is_not():
+def test_a_staircase_goes_down_where_a_cause_is_named():
     assert next_strength([]) == 0.5
     assert next_strength([(0.5, True)]) == 0.25
     assert next_strength([(0.5, True), (0.25, False)]) == pytest.approx(0.4)

@@ -173,7 +173,7 @@ def test_advice_and_judgement_decide_one_limit_alike(spans, limit, k, doubt):
     assert not doubt or set(decided.values()) == {"UNDECIDED"}
 
 
-def test_a_stage_without_a_limit_in_the_judgement_is_held_to_that_of_the_unit():
+def test_a_stage_is_held_to_the_limit_of_its_unit():
     unit, estimate = with_limits(b1_deg=0.03), estimated(0.1, 0.2)
     other = LimitSet("other", Acceptance.model_validate({"b2_deg": {"upper": 1.0}}))
     judgement = judge(other, estimate=estimate)

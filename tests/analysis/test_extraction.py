@@ -44,7 +44,7 @@ def held(name, draws=25):
     return np.mean(hz), np.mean(zeta)
 
 
-def test_every_pair_in_the_band_is_listed_and_the_lowest_strong_one_is_the_level_s():
+def test_every_resonance_pair_in_the_band_is_listed():
     level = read("second pair at 140 / 200 Hz")
     assert [(pair.arf is None, pair.rf is None) for pair in level.pairs] == [(False, False)] * 2
     for pair, (arf, rf) in zip(level.pairs, ((35, 62.5), (140, 200)), strict=True):

@@ -181,7 +181,7 @@ def test_vxi11_abort_ends_a_read_and_only_that(wires):
         assert caller.read(link) == (0, 4, b'"1D2"\n')
 
 
-def test_vxi11_locks_keep_others_out_until_they_are_given_back_or_their_owner_is_gone(wires):
+def test_a_vxi11_lock_ends_with_its_owner(wires):
     with served(box(), "vxi11") as url:
         one, two = Caller(wires(place(url))), Caller(wires(place(url)))
         first, _ = one.linked()

@@ -130,7 +130,7 @@ def test_a_cause_that_is_not_tolerated_fails_where_every_model_has_it():
         assert judge(asked, diagnosis=document).verdict == verdict
 
 
-def test_a_limit_without_a_level_is_of_every_level_and_one_with_of_that_alone():
+def test_a_limit_holds_at_its_level_or_at_all():
     seen = to_json([*extract(swept(130.0, 0.003, 1)), *extract(swept(140.0, 0.003, 2, 4.0))])
     every = judge(limits(arf_hz={"upper": 135.0}), features=seen)
     assert [item.verdict for item in every.items] == ["PASS", "FAIL"]

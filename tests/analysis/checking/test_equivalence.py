@@ -46,7 +46,7 @@ def test_a_payload_is_another_cause_far_from_what_was_measured_alone(payload, ot
     assert is_equivalent_at_load(believed(SWINGING, payload), believed(other)) is alike
 
 
-def test_a_load_that_is_heavier_and_braked_is_what_a_payload_above_a_brake_is():
+def test_a_damped_heavier_load_equals_a_damped_payload():
     heavy = believed(tuple(sorted(HEAVY + BRAKED)))
     swinging = Hypothesis(ADSS, tuple(sorted(SWINGING + BRAKED)))
     values = {"B_L": 0.2, "J_p": 0.2 * J_L, "f_p": 5.0 * HIGH, "zeta_p": 0.02}

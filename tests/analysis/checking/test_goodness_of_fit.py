@@ -45,7 +45,7 @@ def test_an_observation_like_own_runs_is_adequate_and_another_is_not(seed):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_misfit_at_the_lowest_level_has_a_credit_and_at_a_higher_one_has_none(seed, monkeypatch):
+def test_only_misfit_at_the_lowest_level_is_credited(seed, monkeypatch):
     """What is asked is the misfit at all levels, and that at all but the lowest."""
     asked = []
     monkeypatch.setattr(adequacy, "credited", lambda *both: asked.append(both) or -7.0)

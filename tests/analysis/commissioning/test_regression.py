@@ -105,7 +105,7 @@ def test_a_reading_that_was_not_taken_counts_for_nothing():
     np.testing.assert_allclose(found.posterior.mean, same.posterior.mean)
 
 
-def test_the_next_draw_is_wider_than_the_posterior_and_not_far_narrower_than_the_last():
+def test_the_next_proposal_is_wider_than_the_posterior():
     last = Gaussian(np.zeros(2), np.diag([1.0, 4.0]))
     found = Gaussian(np.ones(2), np.diag([1e-6, 1.0])).proposal(last)
     np.testing.assert_allclose(found.mean, 1.0)

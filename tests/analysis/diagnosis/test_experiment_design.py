@@ -143,7 +143,7 @@ def test_the_unit_is_printed_as_a_shell_reads_it(unit, given):
     assert words[words.index("--unit") + 2] == "--instrument"
 
 
-def test_two_models_that_differ_are_parted_by_a_real_simulation_and_one_not_from_itself():
+def test_simulation_separates_models_that_differ():
     groups = [list(runs_along_ridge(c, 4, np.random.default_rng(0))) for c in (FIRST, SECOND)]
     plan = SweepPlan(
         tuple(np.linspace(110.0, 150.0, 4)), (2.0,), settle_cycles=3, integrate_cycles=4

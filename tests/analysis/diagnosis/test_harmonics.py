@@ -55,7 +55,7 @@ def test_an_amplifier_that_gives_more_one_way_shows_in_even_ones():
     assert said.endswith(": something acts more one way than the other")
 
 
-def test_an_amplifier_that_clips_shows_in_odd_ones_at_the_level_at_which_it_does():
+def test_clipping_shows_in_odd_harmonics_at_its_level():
     found = compared(measured("amplifier-saturation:V_sat=8"))
     odd = {one.source_vpk: one for one in found if one.parity == "odd"}
     assert odd[4.0].differs

@@ -46,7 +46,7 @@ def test_departures_are_found_where_they_are_and_nowhere_else():
 
 
 @pytest.mark.parametrize(("unread", "told"), [(1, True), (2, False), (3, False)])
-def test_a_band_is_told_by_what_was_read_of_it_if_that_is_half_of_it(unread, told):
+def test_a_band_read_by_half_is_reported(unread, told):
     """Bands are of three rows here."""
     values = read((), np.array([0.5]), np.random.default_rng(4)).copy()
     band = slice(ROWS - 6, ROWS - 3)

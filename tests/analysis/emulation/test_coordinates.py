@@ -62,7 +62,7 @@ def test_what_is_reflected_of_known_loads():
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_regression_over_what_is_reflected_foretells_a_resonance_and_one_over_sizes_does_not(
+def test_reflected_impedance_predicts_a_resonance_sizes_do_not(
     seed,
 ):
     """The middle error was 3.5 to 5.1 times smaller in twelve draws.

@@ -10,7 +10,7 @@ def seen(seed=3, **given):
     return observation(read(EFFECT, PLACE, np.random.default_rng(seed), **given))
 
 
-def test_between_runs_of_a_linear_world_the_mean_is_exact_and_the_scatter_as_made():
+def test_the_emulator_is_exact_between_linear_runs():
     surface = candidate(observation(np.zeros((3, ROWS))), EFFECT, groups=40).surface
     mean, std = surface.expected(PLACE)
     truth = read(EFFECT, PLACE, np.random.default_rng(0), scatter=0.0)

@@ -49,7 +49,7 @@ def test_few_runs_give_widths_all_the_same():
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_coordinates_of_every_row_give_the_widths_of_shared_ones_where_they_are_the_same(seed):
+def test_equal_coordinates_of_rows_give_shared_widths(seed):
     places, difference = world([2.0, 1.0, 0.8], np.random.default_rng(seed))
     shared = learn_width(places[None], difference, WIDTH, np.full((1, 1, 3), 0.5))
     every = np.repeat(places[None], ROWS, axis=0)
@@ -57,7 +57,7 @@ def test_coordinates_of_every_row_give_the_widths_of_shared_ones_where_they_are_
     np.testing.assert_allclose(apart, shared, rtol=1e-9)
 
 
-def test_a_coordinate_that_turns_from_row_to_row_is_seen_as_what_it_does_at_each():
+def test_a_coordinate_may_change_from_row_to_row():
     """Of two coordinates that change places half-way along the rows each does the same."""
     rng = np.random.default_rng(4)
     places = rng.uniform(0.0, 1.0, (200, 2))

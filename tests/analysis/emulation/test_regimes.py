@@ -108,7 +108,7 @@ def test_a_machine_with_two_motions_is_believed_before_one_that_imitates_one_of_
     assert blurred.fit(MIDDLE).log_likelihood < false.fit(MIDDLE).log_likelihood - 20.0
 
 
-def test_with_no_run_in_its_state_an_observation_is_compared_with_all_and_that_is_paid_for():
+def test_an_unseen_regime_is_compared_at_a_cost():
     rng = np.random.default_rng(1)
     seen = observation(np.zeros((3, ROWS)))
     values = 0.01 * rng.standard_normal((RUNS, 3, ROWS))

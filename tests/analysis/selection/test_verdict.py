@@ -17,7 +17,7 @@ def test_a_cause_that_is_there_is_named(seed):
     assert verdict.best.probability > 0.95
 
 
-def test_sets_far_behind_are_not_held_against_runs_of_their_own_but_the_baseline_is():
+def test_replicates_judge_the_baseline_not_sets_far_behind():
     verdict = judge(seen(TRUE, 1, size=0.9), seed=10)
     far = [one for one in verdict.judged if one.score < verdict.best.score - rules._SURE]
     asked = [one for one in verdict.judged if not np.isnan(one.misfit)]
@@ -104,7 +104,7 @@ def test_two_causes_that_look_the_same_are_both_named(monkeypatch):
 
 
 @pytest.mark.parametrize("chance", [-2.0, 2.0])
-def test_of_two_that_look_the_same_the_rare_one_is_a_rival_and_not_named_first(monkeypatch, chance):
+def test_of_equivalent_sets_the_rare_one_is_rival(monkeypatch, chance):
     """The network holds it for ten times less likely, and scores differ by chance by about 2."""
     from worlds import synthetic
 
@@ -128,7 +128,7 @@ def test_of_two_that_look_the_same_the_rare_one_is_a_rival_and_not_named_first(m
         ("it leaves structure", -5.0, -40.0, "unexplained", (), []),
     ],
 )
-def test_a_little_that_is_missing_is_a_tie_of_what_does_and_with_nothing_where_one_alone_does(
+def test_a_small_cause_ties_with_the_baseline(
     monkeypatch, against, lead, second, word, named, rivals
 ):
     """The leader is less ahead of the plain model than looking at many makes."""

@@ -185,7 +185,7 @@ def test_an_overload_on_the_box_flags_the_points_around_it_and_not_all():
 # Fixed ranges, offset
 
 
-def test_a_fixed_range_that_is_too_small_is_flagged_and_one_too_large_as_well():
+def test_an_unsuitable_fixed_range_is_flagged():
     analyser = HP35670A(Loopback(Analyser35670A(LinearPlant(gain))))
     analyser.identify()
     analyser.prepare(50.0, 200.0, PointSettings(2.5, 5, 30, input_range_vpk=(3.0, 0.5)))

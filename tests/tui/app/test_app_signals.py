@@ -256,7 +256,7 @@ def test_a_terminal_that_goes_away_without_a_signal_ends_session_and_screen(tmp_
     replay.ends_by_signal()
 
 
-def test_a_source_that_is_not_off_when_the_terminal_is_gone_is_an_exit_code(tmp_path, on_terminal):
+def test_a_lost_terminal_with_the_source_on_exits_1(tmp_path, on_terminal):
     db = tmp_path / "bench.db"
     terminal = on_terminal(str(db), "sim:?fault=silence:point=5")
     driving(db)

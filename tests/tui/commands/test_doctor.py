@@ -87,7 +87,7 @@ def test_json_is_one_document_with_every_remedy(spoilt, capsys):
     assert [c["name"] for c in document["checks"] if c["state"] == "failed"] == ["history"]
 
 
-def test_what_is_to_be_installed_can_be_pasted_where_python_lies_in_a_folder_with_a_space(
+def test_install_commands_survive_a_space_in_the_path(
     monkeypatch,
 ):
     python = "/home/a b/.venv/bin/python"

@@ -153,9 +153,7 @@ def test_resume_needs_no_plan_and_refuses_another_one(run, monkeypatch):
     assert run(*bare)[0] == 0
 
 
-def test_going_on_with_other_values_of_the_unit_is_refused_and_with_other_limits_is_not(
-    run, db, monkeypatch, tmp_path
-):
+def test_resuming_with_other_unit_values_is_refused(run, db, monkeypatch, tmp_path):
     stopped(run, monkeypatch)
     text = config_path("units", "adss").read_text()
     own = tmp_path / "own.toml"
@@ -174,9 +172,7 @@ def test_going_on_with_other_values_of_the_unit_is_refused_and_with_other_limits
 
 
 @pytest.mark.parametrize("kept", [{"unit": "["}, {"unit": "schema = 1"}, {}])
-def test_a_unit_file_of_before_that_cannot_be_read_keeps_no_sweep_from_being_finished(
-    run, db, monkeypatch, kept
-):
+def test_an_unreadable_old_unit_file_stops_no_resumption(run, db, monkeypatch, kept):
     stopped(run, monkeypatch)
     with sqlite3.connect(db) as history:
         history.execute("UPDATE measurements SET configurations = ?", (json.dumps(kept),))

@@ -86,7 +86,7 @@ def test_who_reads_no_result_does_not_keep_the_error_back(tmp_path, words):
     assert "SOURCE OFF UNKNOWN: switch it off by hand" in said.splitlines()[-1]
 
 
-def test_what_is_said_is_written_in_order_and_what_is_fleeting_may_be_left_out(stalled):
+def test_narration_is_in_order_and_progress_may_be_dropped(stalled):
     reading, writing = os.pipe()
     with os.fdopen(writing, "w") as stream:
         before = set(threading.enumerate())

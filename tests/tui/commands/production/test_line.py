@@ -189,7 +189,7 @@ def test_a_line_goes_on_with_its_own_unit(here, tmp_path):
     assert (serials(first), bench.points(1)) == (["A"], 21)
 
 
-def test_a_unit_that_does_not_answer_is_told_and_a_bench_that_fails_stops_the_line(tmp_path):
+def test_a_silent_unit_is_reported_a_failed_bench_stops(tmp_path):
     with line_bench(tmp_path) as bench:
         process = bench.start()
         bench.unit.is_dead = True
