@@ -59,6 +59,12 @@ def test_the_numbers_that_are_told_hold_the_truth(name):
 
 
 def test_where_nothing_is_hidden_the_words_follow_the_probability():
-    nine = " ".join(verdict_words(SAID["practice-09"]["diagnosis"]))
+    said = SAID["practice-09"]["diagnosis"]
+    assert "probability 0.95: extremely likely." in " ".join(verdict_words(said))
+    near = [
+        {"causes": ["load-coulomb-friction"], "probability": 0.57, "remark": ""},
+        {"causes": [], "probability": 0.36, "remark": ""},
+    ]
+    nine = " ".join(verdict_words(said | {"rivals": near}))
     assert "probability 0.36: about as likely as not. Still open: load-coulomb-friction" in nine
     assert "nothing else" not in nine
