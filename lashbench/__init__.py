@@ -10,6 +10,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from daq.servers.place import HistoryPlace, parse_place
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -115,7 +117,7 @@ def measure(
     *,
     serial: str = "",
     bench: str = "default",
-    db: str | Path | None = None,
+    db: str | HistoryPlace | None = None,
     yes: bool = False,
 ) -> Result:
     """Measure a unit and keep every point in a history; the source is off at every end.
@@ -156,7 +158,7 @@ def measure(
         raise InputError(f"{instrument}: drives hardware; see that it is safe, and give yes=True")
     console = Console()
     subject = read_unit(unit, console)
-    history = history_path(None if db is None else Path(db), create=True)
+    history = history_path(parse_place(db) if isinstance(db, str) else db, create=True)
     request = session_request(
         PlanOptions(), unit, subject, instrument, history,
         recipe=None, bench=bench, resume=None, remeasure=None, run_in=None,

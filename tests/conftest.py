@@ -51,3 +51,23 @@ def small_disk(tmp_path):
         yield place
     finally:
         subprocess.run(["umount", "--lazy", str(place)], check=True)
+
+
+@pytest.fixture(scope="session")
+def postgres():
+    """A PostgreSQL server with an empty database `bench`."""
+    from worlds.postgres_server import programs, running
+
+    pytest.importorskip("psycopg")
+    if programs() is None:
+        pytest.skip("no PostgreSQL: neither initdb nor the package pgserver is there")
+    with running() as found:
+        found.sql("postgres", "CREATE DATABASE bench")
+        yield found
+
+
+@pytest.fixture
+def postgres_url(postgres):
+    """Address of that database, emptied."""
+    postgres.sql("bench", "DROP SCHEMA IF EXISTS lashbench CASCADE")
+    return postgres.url("bench")

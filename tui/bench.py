@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Self, TypeVar
 
 from daq.errors import Interrupted, LashbenchError, MeasurementError
+from daq.servers.place import HistoryPlace
 
 if TYPE_CHECKING:
     from daq.analyser import Analyser
@@ -122,7 +123,7 @@ def connect_wire(url: str, unit: Unit, transcript: Path | None = None) -> tuple[
 def bench_session(
     url: str,
     unit: Unit,
-    history: Path,
+    history: HistoryPlace,
     request: SessionRequest,
     control: SessionControl,
     transcript: Path | None = None,
@@ -199,7 +200,7 @@ class _Place:
     """History and lock of a session, had and let go of in bounded time."""
 
     def __init__(
-        self, aside: Aside, history: Path, control: SessionControl, stack: ExitStack
+        self, aside: Aside, history: HistoryPlace, control: SessionControl, stack: ExitStack
     ) -> None:
         self._aside = aside
         self._history = history
@@ -265,7 +266,7 @@ class _Alone:
 class _Watched(_Alone):
     """A watchdog for the length of a session, and what becomes of it at the end."""
 
-    def __init__(self, url: str, history: Path, lock: BenchLock, place: _Place) -> None:
+    def __init__(self, url: str, history: HistoryPlace, lock: BenchLock, place: _Place) -> None:
         from daq.session.watchdog import Watchdog
 
         super().__init__()

@@ -13,10 +13,10 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import partial
 from importlib.metadata import version
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from daq.errors import ConfigurationError, InputError
+from daq.servers.place import HistoryPlace
 from tui.options import real_number
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def session_request(
     unit_name: str,
     unit: Unit,
     instrument: str,
-    db: Path,
+    db: HistoryPlace,
     *,
     recipe: str | None,
     bench: str,
@@ -195,7 +195,7 @@ def check_printable(remarks: Mapping[str, str]) -> None:
             raise InputError(f"{name} {text!r} is not one line of text; leave out what is not")
 
 
-def plan_of(request: SessionRequest, db: Path) -> SweepPlan:
+def plan_of(request: SessionRequest, db: HistoryPlace) -> SweepPlan:
     """The plan that a session will follow."""
     from daq.store import Store
 
@@ -275,7 +275,7 @@ def _longest_s(plan: SweepPlan, refinement: Refinement | None) -> float | None:
     return cost.most_s * len(plan.levels_vpk)
 
 
-def _resumed(db: Path, resume: int, remeasure: tuple[float, float] | None) -> Measurement:
+def _resumed(db: HistoryPlace, resume: int, remeasure: tuple[float, float] | None) -> Measurement:
     """The measurement to go on with.
 
     Raises

@@ -17,9 +17,11 @@ from typing import Annotated
 from cyclopts import Parameter, Token
 
 from daq.errors import InputError
+from daq.servers.place import HistoryPlace, parse_place
 
 __all__ = [
     "Cluster",
+    "HistoryOption",
     "Json",
     "JudgeBy",
     "Plots",
@@ -74,6 +76,17 @@ Whole = Annotated[int, Parameter(converter=_whole, n_tokens=1)]
 
 Real = Annotated[float, Parameter(converter=_real, n_tokens=1)]
 """A finite number."""
+
+
+def _place(_type: object, tokens: Sequence[Token]) -> HistoryPlace:
+    try:
+        return parse_place(tokens[0].value)
+    except InputError as error:
+        raise ValueError(str(error)) from error
+
+
+HistoryOption = Annotated[HistoryPlace | None, Parameter(name="--db", converter=_place, n_tokens=1)]
+"""The history: a file, or a database on a server."""
 
 UnitName = Annotated[str, Parameter(name="--unit", help="adss, edss or the path of a unit file.")]
 """The unit under test."""

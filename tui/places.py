@@ -11,10 +11,12 @@ import os
 from pathlib import Path
 
 from daq.errors import InputError
+from daq.servers.place import HistoryPlace, HistoryServer
 
 __all__ = [
     "cache_folder",
     "history_path",
+    "line_path",
     "log_path",
     "look_at_caches",
     "measurement_number",
@@ -25,7 +27,7 @@ _MOST_DIGITS = 18
 """What an identifier in a history can have."""
 
 
-def history_path(given: Path | None, *, create: bool = False) -> Path:
+def history_path(given: HistoryPlace | None, *, create: bool = False) -> HistoryPlace:
     """The history that is meant: the one given, else the user's own.
 
     Parameters
@@ -40,6 +42,10 @@ def history_path(given: Path | None, *, create: bool = False) -> Path:
     """
     from platformdirs import user_data_path
 
+    if isinstance(given, HistoryServer):
+        return given
+    if isinstance(given, HistoryServer):
+        return given
     if given is not None:
         if create and not os.path.isdir(given.parent):
             raise InputError(f"{given}: there is no directory {given.parent}; make it first")
@@ -55,7 +61,16 @@ def history_path(given: Path | None, *, create: bool = False) -> Path:
     return folder / "lashbench.db"
 
 
-def measurement_number(source: str, db: Path | None) -> int | None:
+def line_path(history: HistoryPlace) -> Path:
+    """Where the results of a production line go unless told otherwise: beside the history."""
+    from platformdirs import user_data_path
+
+    if isinstance(history, HistoryServer):
+        return user_data_path("lashbench", appauthor=False, ensure_exists=True) / "line.jsonl"
+    return history.with_suffix(".line.jsonl")
+
+
+def measurement_number(source: str, db: HistoryPlace | None) -> int | None:
     """The identifier of a measurement that is meant by FILE_OR_ID; None if it names a file.
 
     Digits are an identifier, unless no history is named and there is such a file.

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.errors import InputError, Interrupted, LashbenchError, MeasurementError
+from daq.servers.place import HistoryPlace
 from tui.text.output import Console
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["complete_error", "confirm_driving", "contract_state", "exit_code", "tell_event"]
 
 
-def confirm_driving(instrument: str, request: SessionRequest, db: Path, yes: bool) -> None:
+def confirm_driving(instrument: str, request: SessionRequest, db: HistoryPlace, yes: bool) -> None:
     """Insist on a word before hardware is driven.
 
     Raises

@@ -151,7 +151,7 @@ def stored_origin(store: Store, measurement: int) -> Origin:
     """
     found = store.measurement(measurement)
     return Origin(
-        f"measurement {measurement} of {store.path.name}",
+        f"measurement {measurement} of {store.name}",
         facts={
             "measurement": measurement,
             "ended": found.ended,

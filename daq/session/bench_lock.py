@@ -18,7 +18,8 @@ from types import TracebackType
 from typing import Self
 
 from daq.errors import InputError, MeasurementError
-from daq.session.instrument_claim import claim, is_alive, is_held
+from daq.servers.place import HistoryPlace, HistoryServer
+from daq.session.instrument_claim import claim, is_alive, is_held, own_lock
 
 __all__ = ["BenchLock"]
 
@@ -50,11 +51,10 @@ class BenchLock:
     """
 
     def __init__(
-        self, history: Path, patience_s: float = 45.0, instrument: str | None = None
+        self, history: HistoryPlace, patience_s: float = 45.0, instrument: str | None = None
     ) -> None:
         # Beside the file itself: all the links to it lead to one bench.
-        file = Path(os.path.realpath(history))
-        self._path = file.with_name(file.name + "-lock")
+        self._path = _lock_of(history)
         self._file = -1
         deadline_s = time.monotonic() + patience_s
         while not self._taken():
@@ -168,6 +168,14 @@ class BenchLock:
             return int(self._path.read_text(encoding="ascii"))
         except (OSError, ValueError):
             return None
+
+
+def _lock_of(history: HistoryPlace) -> Path:
+    if isinstance(history, HistoryServer):
+        # Other machines are kept from the same instrument and measurement, not from the server.
+        return own_lock(str(history))
+    file = Path(os.path.realpath(history))
+    return file.with_name(file.name + "-lock")
 
 
 def _lock(file: int) -> bool:

@@ -24,7 +24,7 @@ from daq.transports.address import (
 )
 from daq.untrusted.trust import distrust, open_own
 
-__all__ = ["claim", "wire_name"]
+__all__ = ["claim", "own_lock", "wire_name"]
 
 _LOOK_S = 0.1
 _NOTING_S = 5.0
@@ -165,6 +165,12 @@ def _hold(handle: int) -> None:
             if time.monotonic() > until_s:
                 raise
             time.sleep(_LOOK_S / 10)
+
+
+def own_lock(name: str) -> Path:
+    """Where the lock lies of a history that is no file here."""
+    digest = hashlib.sha256(name.encode("utf-8")).hexdigest()[:16]
+    return _folder() / f"server-{digest}-lock"
 
 
 def _folder() -> Path:

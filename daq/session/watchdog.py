@@ -11,11 +11,12 @@ import os
 import subprocess
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
 from daq.errors import InputError, MeasurementError
+from daq.servers.place import HistoryPlace
 from daq.session.watch import Watch
 from daq.untrusted.child import child_command, child_environment
 
@@ -59,14 +60,19 @@ class Watchdog(Watch):
         If no process can be started.
     """
 
-    def __init__(self, url: str, history: Path, lock: int | None) -> None:
-        self._words = (url, os.path.abspath(history))
+    def __init__(self, url: str, history: HistoryPlace, lock: int | None) -> None:
+        self._words, self._secrets = (url, str(history)), dict[str, str]()
+        if isinstance(history, Path):
+            self._words = (url, os.path.abspath(history))
+        elif history.password is not None:
+            # Command lines are seen by everybody on the machine.
+            self._secrets = {"PGPASSWORD": history.password}
         self._lock = lock
         self._measurement = 0
         self._remarks: list[str] = []
         self._until_s: float | None = None
         self._starts = 1
-        self._child: _Child | None = _Child(self._words, lock)
+        self._child: _Child | None = _Child(self._words, lock, self._secrets)
 
     # ------------------------------------------------------------ for the session
 
@@ -201,7 +207,7 @@ class Watchdog(Watch):
 
     def _replace(self) -> None:
         self._present().end(0.0)
-        self._child = _Child(self._words, self._lock)
+        self._child = _Child(self._words, self._lock, self._secrets)
         self._starts += 1
         if self._measurement:
             self._say(f"of {self._measurement}")
@@ -224,7 +230,9 @@ class Watchdog(Watch):
 class _Child:
     """One process, and what it said."""
 
-    def __init__(self, words: tuple[str, str], lock: int | None) -> None:
+    def __init__(
+        self, words: tuple[str, str], lock: int | None, secrets: Mapping[str, str]
+    ) -> None:
         arguments = [*words, str(os.getpid()), "" if lock is None else str(lock)]
         command = child_command("daq.session.watchdog_child", *arguments)
         try:
@@ -236,7 +244,7 @@ class _Child:
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
-                env=child_environment(OPENBLAS_NUM_THREADS="1"),
+                env=child_environment(OPENBLAS_NUM_THREADS="1", **secrets),
                 pass_fds=() if lock is None else (lock,),
                 start_new_session=True,
             )

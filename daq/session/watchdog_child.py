@@ -16,10 +16,10 @@ import signal
 import sys
 import threading
 import time
-from pathlib import Path
 
 from daq.analyser import SourceState
 from daq.errors import LashbenchError, LinkError, MeasurementError
+from daq.servers.place import HistoryPlace, HistoryServer, parse_place
 
 __all__ = ["load", "main", "make_safe", "write_down"]
 
@@ -50,9 +50,9 @@ def main(words: list[str]) -> int:
             # The session is told to end by the same signal and will say so; only
             # its silence counts here.
             signal.signal(getattr(signal, name), signal.SIG_IGN)
-    stand = _Stand(url, Path(history), int(session), int(lock) if lock else None)
+    stand = _Stand(url, parse_place(history), int(session), int(lock) if lock else None)
     try:
-        load(url)
+        load(url, history)
     except Exception as error:
         stand.say(f"failed {type(error).__name__}: {' '.join(str(error).split())}")
         stand.leave(1)
@@ -62,7 +62,7 @@ def main(words: list[str]) -> int:
     return 0
 
 
-def load(url: str) -> None:
+def load(url: str, history: str = "") -> None:
     """Import everything that will be needed: later there may be no file system to load it from."""
     import sqlalchemy as sa
 
@@ -74,6 +74,13 @@ def load(url: str) -> None:
     # What a stored plan is checked with is loaded with the first plan.
     SweepPlan((1.0,), (1.0,))
     # Its dialect, and its first statement, are loaded with the first use.
+    place = parse_place(history)
+    if isinstance(place, HistoryServer):
+        from daq.store import Store
+
+        with Store(place) as store:
+            store.count()
+        return
     engine = sa.create_engine("sqlite://")
     with engine.begin() as connection:
         connection.execute(sa.select(sa.literal(1)))
@@ -102,7 +109,7 @@ def make_safe(url: str, tries: int = _TRIES) -> tuple[SourceState, str]:
         time.sleep(_BETWEEN_S)
 
 
-def write_down(history: Path, measurement: int, text: str, state: SourceState) -> None:
+def write_down(history: HistoryPlace, measurement: int, text: str, state: SourceState) -> None:
     """Write into the history, again and again where it is full or held by another program."""
     from daq.store import Store
 
@@ -127,7 +134,7 @@ def write_down(history: Path, measurement: int, text: str, state: SourceState) -
 class _Stand:
     """One session, as it is seen from here."""
 
-    def __init__(self, url: str, history: Path, session: int, lock: int | None) -> None:
+    def __init__(self, url: str, history: HistoryPlace, session: int, lock: int | None) -> None:
         self._url = url
         self._history = history
         self._session = session

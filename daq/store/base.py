@@ -7,16 +7,17 @@ the disk asked for what was committed. It knows no record of the program.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 import sqlalchemy as sa
-from sqlalchemy.dialects.sqlite import insert
+from sqlalchemy.dialects import postgresql, sqlite
 
 from daq.errors import FileFormatError, InputError
+from daq.servers.place import HistoryPlace, HistoryServer, parse_place
 from daq.store import tables as table
 from daq.store.file import WRITES, log_of, open_engine, telling_faults
 from daq.store.flush import Flusher
@@ -29,8 +30,19 @@ __all__ = ["StoreFile", "check_length", "inserted", "now", "shared"]
 class StoreFile:
     """An open history, as `daq.store.store.Store` describes it."""
 
-    def __init__(self, path: str | Path, *, create: bool = False, read_only: bool = False) -> None:
-        self.path = Path(path)
+    def __init__(
+        self, path: str | HistoryPlace, *, create: bool = False, read_only: bool = False
+    ) -> None:
+        self.path = parse_place(path) if isinstance(path, str) else path
+        self._flusher: Flusher | None = None
+        self._claims: dict[int, sa.Connection] = {}
+        if isinstance(self.path, HistoryServer):
+            from daq.servers.postgres import open_server
+
+            # A server has what it committed on its disk.
+            self._engine = open_server(self.path, create=create, read_only=read_only)
+            self._writer = self._engine
+            return
         self._engine = open_engine(self.path, create=create, read_only=read_only)
         self._writer = self._engine.execution_options(**{WRITES: True})
         self._flusher = Flusher(log_of(self.path))
@@ -46,20 +58,45 @@ class StoreFile:
     ) -> None:
         self.close()
 
+    @property
+    def name(self) -> str:
+        """Name of the file, or address of the server."""
+        return self.path.name if isinstance(self.path, Path) else str(self.path)
+
     def close(self) -> None:
         """Let go of the file, which is on the disk then; may be called twice."""
-        self._flusher.close()
+        if self._flusher is not None:
+            self._flusher.close()
+        while self._claims:
+            with suppress(sa.exc.DBAPIError):
+                self._claims.popitem()[1].invalidate()
         self._engine.dispose()
+
+    def _claim(self, measurement: int) -> None:
+        """Keep other benches from going on with a measurement, where they share the history."""
+        if isinstance(self.path, HistoryServer) and measurement not in self._claims:
+            from daq.servers.postgres import claim_measurement
+
+            claim = claim_measurement(self.path, self._engine, measurement)
+            self._claims[measurement] = claim
+
+    def _faults(self) -> AbstractContextManager[None]:
+        if isinstance(self.path, HistoryServer):
+            from daq.servers.postgres import telling_server_faults
+
+            return telling_server_faults(self.path)
+        return telling_faults(self.path)
 
     @contextmanager
     def _writing(self) -> Iterator[sa.Connection]:
-        with telling_faults(self.path), self._writer.begin() as connection:
+        with self._faults(), self._writer.begin() as connection:
             yield connection
-        self._flusher.soon()
+        if self._flusher is not None:
+            self._flusher.soon()
 
     @contextmanager
     def _reading(self) -> Iterator[sa.Connection]:
-        with telling_faults(self.path), self._engine.begin() as connection, self._legible():
+        with self._faults(), self._engine.begin() as connection, self._legible():
             yield connection
 
     @contextmanager
@@ -101,8 +138,9 @@ def now() -> str:
 
 def inserted(connection: sa.Connection, where: sa.Table, row: Mapping[str, Any]) -> int:
     """Add a row; its key."""
-    key = connection.execute(sa.insert(where).values(row)).lastrowid
-    return int(key)
+    key = connection.execute(sa.insert(where).values(row)).inserted_primary_key
+    assert key is not None
+    return int(key[0])
 
 
 def shared(
@@ -117,7 +155,8 @@ def shared(
     """
     # Written before it is read: a transaction that reads first could lose the
     # race for the write lock to another program.
-    connection.execute(insert(where).values(row).on_conflict_do_nothing())
+    dialect = postgresql if connection.dialect.name == "postgresql" else sqlite
+    connection.execute(dialect.insert(where).values(row).on_conflict_do_nothing())
     names = row if by is None else (by,)
     same = [where.c[name] == row[name] for name in names]
     return int(connection.execute(sa.select(where.c.id).where(*same)).scalar_one())

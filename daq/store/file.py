@@ -23,7 +23,6 @@ from daq.errors import FileFormatError, InputError, LashbenchError, MeasurementE
 from daq.store.open_histories import OPENING, closed, is_open, opened
 from daq.store.schema import SCHEMA_VERSION, lay_over, migrate, schema_version
 from daq.store.sqlite_files import check_beside
-from daq.untrusted.bounded_text import parse_json
 
 __all__ = ["engine_of", "log_of", "open_engine", "telling_faults"]
 
@@ -87,9 +86,7 @@ def engine_of(path: Path, mode: str, older: int | None = None) -> sa.Engine:
             opened(str(file))
         return connection
 
-    engine = sa.create_engine(
-        "sqlite://", creator=connect, poolclass=QueuePool, pool_size=4, json_deserializer=parse_json
-    )
+    engine = sa.create_engine("sqlite://", creator=connect, poolclass=QueuePool, pool_size=4)
 
     @event.listens_for(engine, "connect")
     def _settle(connection: sqlite3.Connection, _record: object) -> None:
@@ -105,8 +102,6 @@ def engine_of(path: Path, mode: str, older: int | None = None) -> sa.Engine:
         connection.execute("PRAGMA foreign_keys = ON")
         if older is not None:
             lay_over(connection, older)
-        # SQLite's own lower() knows the letters of ASCII only.
-        connection.create_function("casefold", 1, str.casefold, deterministic=True)
 
     @event.listens_for(engine, "close")
     def _leave(_connection: sqlite3.Connection, _record: object) -> None:

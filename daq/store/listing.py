@@ -61,11 +61,12 @@ _ANSWERED = """(EXISTS (SELECT 1 FROM estimates AS x WHERE x.measurement_id = m.
     OR EXISTS (SELECT 1 FROM diagnoses AS x WHERE x.measurement_id = m.id))"""
 _COUNT = "SELECT count(*) FROM measurements AS m {where}"
 _LACKING = f"""
-SELECT m.id FROM (SELECT m.* FROM measurements AS m {{where}} ORDER BY m.id DESC LIMIT :last) AS m
+SELECT m.id, e.id AS estimate, e.edition, e.summary
+FROM (SELECT m.* FROM measurements AS m {{where}} ORDER BY m.id DESC LIMIT :last) AS m
 LEFT JOIN estimates AS e ON e.id = {ESTIMATE_IN_FORCE}
-WHERE m.state = 'complete' AND (e.id IS NULL OR (:edition IS NOT NULL AND (e.edition <> :edition
-    OR (json_valid(e.summary) AND json_extract(e.summary, '$.failed') IS NOT NULL))))
+WHERE m.state = 'complete'{{which}}
 ORDER BY m.id"""
+_ALL = (1 << 63) - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,10 +102,10 @@ class Choice:
     since: str | None = None
     state: MeasurementState | None = None
 
-    def asked(self, connection: sa.Connection, query: str, **more: Any) -> sa.CursorResult[Any]:
+    def asked(self, connection: sa.Connection, query: str, which: str = "") -> sa.CursorResult[Any]:
         """Ask a query that has a place for the conditions; they are such as an index serves."""
-        values: dict[str, Any] = {"last": -1 if self.last is None else self.last, **more}
-        kinds, which = [], []
+        values: dict[str, Any] = {"last": _ALL if self.last is None else self.last}
+        kinds, conditions = [], []
         if self.unit is not None:
             names = [self.unit]
             if not self.exact:
@@ -112,25 +113,25 @@ class Choice:
                 names = [name for name in unit_names(connection) if name.casefold() == folded]
             values |= {f"name{place}": name for place, name in enumerate(names)}
             places = ", ".join(f":name{place}" for place in range(len(names)))
-            kinds.append(f"name IN ({places})")
+            kinds.append(f"name IN ({places})" if names else "1 = 0")
         if self.serial is not None:
             values["serial"] = self.serial
             kinds.append("serial = :serial")
         if kinds:
-            which.append(f"m.unit_id IN (SELECT id FROM units WHERE {' AND '.join(kinds)})")
+            conditions.append(f"m.unit_id IN (SELECT id FROM units WHERE {' AND '.join(kinds)})")
         if self.with_points:
-            which.append("m.points > 0")
+            conditions.append("m.points > 0")
         if self.answered:
-            which.append(_ANSWERED)
+            conditions.append(_ANSWERED)
         for column, condition, value in (
             ("started", ">=", self.since),
             ("state", "=", self.state),
         ):
             if value is not None:
                 values[column] = value
-                which.append(f"m.{column} {condition} :{column}")
-        where = f"WHERE {' AND '.join(which)}" if which else ""
-        return connection.execute(sa.text(query.format(where=where)), values)
+                conditions.append(f"m.{column} {condition} :{column}")
+        where = f"WHERE {' AND '.join(conditions)}" if conditions else ""
+        return connection.execute(sa.text(query.format(where=where, which=which)), values)
 
 
 def read_lines(connection: sa.Connection, choice: Choice) -> Iterator[HistoryLine]:
@@ -183,7 +184,22 @@ def read_lacking(
     edition
         Count what failed, or is of another edition than this, as none.
     """
-    return [whole(row.id) for row in choice.asked(connection, _LACKING, edition=edition)]
+    if edition is None:
+        rows = choice.asked(connection, _LACKING, " AND e.id IS NULL")
+        return [whole(row.id) for row in rows]
+    found = []
+    for row in choice.asked(connection, _LACKING):
+        if row.estimate is None or row.edition != edition or _failed(row.summary):
+            found.append(whole(row.id))
+    return found
+
+
+def _failed(summary: object) -> bool:
+    try:
+        found = parse_json(text(summary, _LONGEST_SUMMARY))
+    except ValueError:
+        return False
+    return isinstance(found, dict) and found.get("failed") is not None
 
 
 def unit_names(connection: sa.Connection) -> list[str]:

@@ -1,6 +1,6 @@
 """The history of a bench: every measurement, committed point by point.
 
-Owns reading and writing of one SQLite file. A method that writes returns once
+Owns reading and writing of one history, a file or on a server. A method that writes returns once
 the record is committed: no death of the program undoes it, and the disk is
 asked for it at once. Nothing is ever deleted: a point that is measured again
 supersedes the old one, which stays, and what is corrected stays in an audit
@@ -22,6 +22,7 @@ from daq.store import tables as table
 from daq.store.answers import AnswerStore
 from daq.store.base import check_length, inserted, now, shared
 from daq.store.corrections import CorrectionStore
+from daq.store.listing import unit_names
 from daq.store.rows import (
     event_of,
     measurement_of,
@@ -47,6 +48,15 @@ _MOST_ROWS = 300_000
 
 class Store(AnswerStore, CorrectionStore):
     """An open history. Use it as a context manager; it may be used from several threads.
+
+    Parameters
+    ----------
+    path
+        The file, or the server (`daq.servers.place`).
+    create
+        Make it if it is not there.
+    read_only
+        Nothing can be written.
 
     Raises
     ------
@@ -95,7 +105,9 @@ class Store(AnswerStore, CorrectionStore):
                 "configurations": dict(header.configurations),
                 "readback": {},
             }
-            return inserted(connection, table.measurements, row)
+            measurement = inserted(connection, table.measurements, row)
+        self._claim(measurement)
+        return measurement
 
     def set_instrument(self, measurement: int, identity: Identity) -> None:
         """Record who measures."""
@@ -153,7 +165,7 @@ class Store(AnswerStore, CorrectionStore):
             self._update(
                 connection,
                 measurement,
-                points=count.points + (old is None),
+                points=count.points + int(old is None),
                 flagged=count.flagged + change,
                 points_version=count.points_version + 1,
             )
@@ -176,7 +188,14 @@ class Store(AnswerStore, CorrectionStore):
         return entry
 
     def reopen(self, measurement: int) -> None:
-        """Take up a measurement again: it is "interrupted" until `finish` says otherwise."""
+        """Take up a measurement again: it is "interrupted" until `finish` says otherwise.
+
+        Raises
+        ------
+        MeasurementError
+            If another bench has it under way, on a server.
+        """
+        self._claim(measurement)
         with self._writing() as connection:
             self._update(connection, measurement, state="interrupted", ended=None)
 
@@ -190,7 +209,8 @@ class Store(AnswerStore, CorrectionStore):
                 source_state=source_state.value,
                 ended=now(),
             )
-        self._flusher.now()
+        if self._flusher is not None:
+            self._flusher.now()
 
     # ------------------------------------------------------------ reading
 
@@ -211,9 +231,11 @@ class Store(AnswerStore, CorrectionStore):
         With all that is known of them; `lines` is what a long history is looked through by.
         """
         where: sa.ColumnElement[bool] = sa.true()
-        if unit is not None:
-            where = sa.func.casefold(table.units.c.name) == unit.casefold()
         with self._reading() as connection:
+            if unit is not None:
+                folded = unit.casefold()
+                names = [name for name in unit_names(connection) if name.casefold() == folded]
+                where = table.units.c.name.in_(names)
             return list(self._measurements(connection, where))
 
     def points(self, measurement: int, *, superseded: bool = False) -> list[StoredPoint]:
@@ -318,6 +340,6 @@ class Store(AnswerStore, CorrectionStore):
             raise ValueError(f"measurement {measurement} has more than {_MOST_ROWS} {words}")
 
 
-def _counts(flags: int) -> bool:
+def _counts(flags: int) -> int:
     # A point that was merely taken a second time is as good as any.
-    return bool(int(flags) & ~int(PointFlag.RETAKEN))
+    return int(bool(int(flags) & ~int(PointFlag.RETAKEN)))

@@ -20,6 +20,7 @@ from textual.screen import ModalScreen, Screen
 
 from daq.analyser import SourceState
 from daq.errors import LashbenchError
+from daq.servers.place import HistoryPlace
 from daq.session_events import Finished, PointStored, RunIn
 from daq.untrusted.visible_text import visible, visible_line
 from tui.app import messages
@@ -86,7 +87,7 @@ class BenchApp(TerminalApp):
 
     def __init__(
         self,
-        db: Path = Path("lashbench.db"),
+        db: HistoryPlace = Path("lashbench.db"),
         analyses: Analyses | None = None,
         find: Callable[[bench_owner.Post], None] = bench_owner.find_instruments,
         log: Path | None = None,

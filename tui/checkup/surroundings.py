@@ -42,6 +42,7 @@ def check_terminal() -> Iterator[Finding]:
 def check_folders() -> Iterator[Finding]:
     """Whether history, cache and log can be written where they belong."""
     history = history_path(None)
+    assert isinstance(history, Path)
     if (fault := _fault(history)) is None:
         yield passed("history", str(history))
     else:

@@ -6,22 +6,22 @@ Owns the options of the screen and what is said when it cannot be opened.
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
 from daq.errors import InputError
+from tui.options import HistoryOption
 from tui.places import history_path, look_at_caches
 from tui.text.output import Injected
 
 __all__ = ["bench", "is_terminal", "require_terminal"]
 
 
-def bench(*, db: Path | None = None, bench: str = "default", console: Injected) -> int:
+def bench(*, db: HistoryOption = None, bench: str = "default", console: Injected) -> int:
     """Open the bench screen: from a unit to a report, guided, by keyboard or mouse.
 
     Parameters
     ----------
     db
-        File of the bench's history, made by the first session; yours, if left out.
+        The bench's history, a file or postgresql://USER@HOST/DATABASE; yours, if left out.
     bench
         Bench file, by name or path: limits, slew, input ranges.
     """

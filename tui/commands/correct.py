@@ -7,14 +7,13 @@ is the history's part.
 from __future__ import annotations
 
 from dataclasses import asdict
-from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
 from daq.errors import InputError
 from tui.measurements.history_rows import correction_words
-from tui.options import Json, Whole
+from tui.options import HistoryOption, Json, Whole
 from tui.places import history_path
 from tui.text.output import Injected
 
@@ -25,7 +24,7 @@ def correct(
     measurement: Annotated[Whole, Parameter(help="Identifier, as `history` lists it.")],
     /,
     *,
-    db: Path | None = None,
+    db: HistoryOption = None,
     serial: str | None = None,
     operator: str | None = None,
     notes: Annotated[str | None, Parameter(name=["--notes", "--note"])] = None,
@@ -42,7 +41,7 @@ def correct(
     Parameters
     ----------
     db
-        File of the bench's history; yours, if left out.
+        The bench's history, a file or postgresql://USER@HOST/DATABASE; yours, if left out.
     serial
         Serial number as it should be.
     operator

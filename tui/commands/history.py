@@ -13,13 +13,13 @@ from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
-from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
 from daq.errors import AnalysisError, ConfigurationError, InputError, LashbenchError
+from daq.servers.place import HistoryPlace
 from tui.executors import executor_at
 from tui.judging import limits_to_judge_by
 from tui.measurements.history_rows import (
@@ -32,7 +32,7 @@ from tui.measurements.history_rows import (
     trend_lines,
 )
 from tui.measurements.measured_unit import unit_as_measured
-from tui.options import Cluster, Json, JudgeBy, Whole
+from tui.options import Cluster, HistoryOption, Json, JudgeBy, Whole
 from tui.places import cache_folder, history_path
 from tui.text.layout import WIDTH, table_lines, wrapped
 from tui.text.output import Console, Injected, as_json, readers_may_leave
@@ -56,7 +56,7 @@ _BAR, _LEAST_BAR = 41, 11
 
 def history(
     *,
-    db: Path | None = None,
+    db: HistoryOption = None,
     unit: Annotated[str | None, Parameter(name="--unit")] = None,
     serial: str | None = None,
     last: Whole | None = None,
@@ -78,7 +78,7 @@ def history(
     Parameters
     ----------
     db
-        File of the bench's history; yours, if left out.
+        The bench's history, a file or postgresql://USER@HOST/DATABASE; yours, if left out.
     unit
         Only measurements of this unit: adss, edss, the path of a unit file, or a name.
     serial
@@ -250,7 +250,11 @@ def _whole_trends(
 
 
 def _estimates(
-    db: Path, lacking: Sequence[int], every: bool, executor: Executor | None, console: Console
+    db: HistoryPlace,
+    lacking: Sequence[int],
+    every: bool,
+    executor: Executor | None,
+    console: Console,
 ) -> dict[int, Answer]:
     """Make estimates and keep them; those that cannot be kept, by measurement."""
     began_s, loose = time.monotonic(), {}
@@ -268,7 +272,9 @@ def _estimates(
     return loose
 
 
-def _estimate(db: Path, number: int, executor: Executor | None, console: Console) -> Answer | None:
+def _estimate(
+    db: HistoryPlace, number: int, executor: Executor | None, console: Console
+) -> Answer | None:
     """Make an estimate and keep it; it is given back where it cannot be kept."""
     from analysis.observation.input_check import check_inputs
     from daq.store import Store

@@ -9,8 +9,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from daq.errors import InputError
+from daq.servers.place import files_of
 from tui.judging import limits_to_judge_by
-from tui.options import JudgeBy, Whole
+from tui.options import HistoryOption, JudgeBy, Whole
 from tui.places import history_path
 from tui.text.output import Injected
 
@@ -22,7 +23,7 @@ _SHOWN = 1000
 def index(
     *,
     out: Path,
-    db: Path | None = None,
+    db: HistoryOption = None,
     reports: Path | None = None,
     last: Whole = _SHOWN,
     judge: JudgeBy = None,
@@ -35,7 +36,7 @@ def index(
     out
         HTML file to write.
     db
-        File of the bench's history; yours, if left out.
+        The bench's history, a file or postgresql://USER@HOST/DATABASE; yours, if left out.
     reports
         Folder with reports on its measurements, that of the page if left out.
     last
@@ -52,7 +53,7 @@ def index(
     if last < 1:
         raise InputError(f"--last {last}: give 1 or more")
     history = history_path(db)
-    target = checked_target(out, history, *([judge] if judge else []))
+    target = checked_target(out, *files_of(history), *([judge] if judge else []))
     folder = target.parent if reports is None else reports
     if not folder.is_dir():
         raise InputError(f"--reports {folder}: there is no such directory")
@@ -64,8 +65,8 @@ def index(
             if limits is not None:
                 row["judgement"] = judge_line(store, line, limits).to_json()
             rows.append(row)
-        whole = store.count()
+        whole, name = store.count(), store.name
     begun = {row["id"]: row["started"] for row in rows}
-    links = reports_in(folder, history.name, begun, target.parent)
-    write_index(out, history.name, rows, links, whole)
+    links = reports_in(folder, name, begun, target.parent)
+    write_index(out, name, rows, links, whole)
     console.note(f"wrote {out}: {len(rows)} measurements, {len(links)} with a report")

@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from daq.errors import InputError, LashbenchError, MeasurementError
+from daq.servers.place import files_of, is_there, whole_name
 from tui.exit_codes import INTERRUPTED
 from tui.judging import limits_to_judge_by
-from tui.options import JudgeBy
-from tui.places import history_path
+from tui.options import HistoryOption, JudgeBy
+from tui.places import history_path, line_path
 from tui.session_words import confirm_driving
 from tui.text.layout import wrapped
 from tui.text.output import Console, Injected, readers_may_leave
@@ -47,7 +48,7 @@ def line(
     judge: JudgeBy = None,
     diagnose: Annotated[bool, Parameter(negative=())] = False,
     adaptive: Annotated[bool, Parameter(negative=())] = False,
-    db: Path | None = None,
+    db: HistoryOption = None,
     out: Path | None = None,
     csv: Path | None = None,
     on_result: str | None = None,
@@ -80,7 +81,7 @@ def line(
     adaptive
         Go on around anti-resonance and resonance until they are known well.
     db
-        File of the bench's history, made if it is not there; yours, if left out.
+        The bench's history, a file or postgresql://USER@HOST/DATABASE; yours, if left out.
     out
         File of results, one line of JSON a unit; beside the history, if left out.
     csv
@@ -109,7 +110,7 @@ def line(
     hook = None if on_result is None else Hook(on_result)
     history = history_path(db, create=True)
     named = [one for one in (recipe, unit, bench, judge) if one is not None]
-    results = Results(out or history.with_suffix(".line.jsonl"), csv, [history, *named])
+    results = Results(out or line_path(history), csv, [*files_of(history), *named])
     belt = Line(
         name, read_unit(name, console), instrument or _address(place), recipe, bench, adaptive,
         operator, history, limits, diagnose, results.path, console,
@@ -197,7 +198,7 @@ class _Dialogue:
         if self._hook is None or not self._results.all:
             return
         last = self._results.all[-1]
-        if last.history != str(self._belt.db.resolve()) or not self._belt.db.exists():
+        if last.history != whole_name(self._belt.db) or not is_there(self._belt.db):
             return
         if not self._belt.noted(last.measurement, "hook"):
             self._tell_hook(last)

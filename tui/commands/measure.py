@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
+from daq.servers.place import HistoryPlace
 from tui.judging import judgement_lines, limits_to_judge_by
 from tui.measure_options import PlanOptions, read_band, session_request
 from tui.measurements.running import run_session
-from tui.options import Json, JudgeBy, Real, UnitName, Whole
+from tui.options import HistoryOption, Json, JudgeBy, Real, UnitName, Whole
 from tui.places import history_path
 from tui.session_words import confirm_driving, contract_state, exit_code, tell_event
 from tui.text.output import Console, Injected, readers_may_leave
@@ -47,7 +48,7 @@ def measure(
     recipe: str | None = None,
     bench: str = "default",
     adaptive: bool = False,
-    db: Path | None = None,
+    db: HistoryOption = None,
     resume: Whole | None = None,
     remeasure: str | None = None,
     run_in: Whole | None = None,
@@ -94,7 +95,7 @@ def measure(
     adaptive
         Go on around anti-resonance and resonance until they are known well.
     db
-        File of the bench's history, made if it is not there; yours, if left out.
+        The bench's history, a file or postgresql://USER@HOST/DATABASE; yours, if left out.
     resume
         Measurement to go on with, by its identifier.
     remeasure
@@ -145,14 +146,14 @@ def measure(
 class _Told:
     """Where a measurement is kept, what it is judged by, and how its end is told."""
 
-    db: Path
+    db: HistoryPlace
     limits: LimitSet | None
     json: bool
     console: Console
     again: str
 
 
-def _show_plan(request: SessionRequest, db: Path, json: bool, console: Console) -> None:
+def _show_plan(request: SessionRequest, db: HistoryPlace, json: bool, console: Console) -> None:
     from daq.limits import tightest
     from tui.measure_options import plan_of
 

@@ -17,9 +17,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from daq.errors import InputError, LashbenchError
+from daq.servers.place import HistoryPlace, files_of
 from tui.certificate_options import NO_CERTIFICATE, CertificateOptions, is_pdf
 from tui.judging import features_for, judgement_lines, limits_to_judge_by
-from tui.options import JudgeBy, Tolerance, UnitName
+from tui.options import HistoryOption, JudgeBy, Tolerance, UnitName
 from tui.places import cache_folder, history_path, measurement_number
 from tui.reading_options import NO_OPTIONS, ReadingOptions, read_file
 from tui.text.output import Console, Injected, readers_may_leave
@@ -46,7 +47,7 @@ def report(
     *,
     unit: UnitName,
     out: Path,
-    db: Path | None = None,
+    db: HistoryOption = None,
     tolerance: Tolerance = None,
     diagnose: Annotated[bool | None, Parameter(negative="--no-diagnose")] = None,
     as_is: bool = False,
@@ -68,7 +69,7 @@ def report(
     out
         HTML file to write, or a PDF, which Chromium or WeasyPrint prints.
     db
-        File of the bench's history that the identifier is looked up in; yours, if left out.
+        The bench's history, a file or postgresql://USER@HOST/DATABASE; yours, if left out.
     diagnose
         Diagnose too, which takes a minute or two, even where the history holds a diagnosis of
         these points; --no-diagnose makes none, and shows the one of the history if there is one.
@@ -82,7 +83,7 @@ def report(
 
     if out.suffix.lower() not in (".html", ".htm", ".pdf"):
         raise InputError(f"{out}: a report is HTML or PDF; give a name that ends in .html or .pdf")
-    checked_target(out, source, unit, history_path(db), *([judge] if judge else []))
+    checked_target(out, source, unit, *files_of(history_path(db)), *([judge] if judge else []))
     if is_pdf(out):
         from analysis.report.pdf import find_printer
 
@@ -182,7 +183,7 @@ def _doubt(remarks: Mapping[str, str], response: FrequencyResponse) -> str:
 class _Kept:
     """A measurement as its history holds it, with the answers of today's inference."""
 
-    db: Path
+    db: HistoryPlace
     measured: Measurement
     response: FrequencyResponse
     origin: Origin
@@ -190,7 +191,7 @@ class _Kept:
     diagnosis: StoredDiagnosis | None
 
 
-def _stored(db: Path, number: int, unit: Unit) -> _Kept:
+def _stored(db: HistoryPlace, number: int, unit: Unit) -> _Kept:
     from analysis.report import stored_origin
     from daq.store import Store
     from tui.measurements.stored_answers import kept_diagnosis, kept_estimate

@@ -18,6 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from analysis.acceptance.decision import reasons
 from daq.errors import FileFormatError
 from daq.formats.atomic import append_line, checked_target, write_text
+from daq.servers.place import HistoryPlace, whole_name
 
 __all__ = ["Result", "Results", "Word"]
 
@@ -114,9 +115,9 @@ class Results:
         """The results of one serial number, first to last."""
         return [one for one in self.all if one.serial == serial]
 
-    def of_measurement(self, history: Path, measurement: int) -> Result | None:
+    def of_measurement(self, history: HistoryPlace, measurement: int) -> Result | None:
         """The result of a stored measurement."""
-        name = str(history.resolve())
+        name = whole_name(history)
         for one in reversed(self.all):
             if (one.history, one.measurement) == (name, measurement):
                 return one

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from daq.errors import LashbenchError
+from daq.servers.place import HistoryPlace, is_there, whole_name
 from tui.line.results import Result, Results, Word
 from tui.measure_options import PlanOptions, session_request
 from tui.measurements.running import run_session
@@ -78,7 +79,7 @@ class Line:
     bench: str
     adaptive: bool
     operator: str
-    db: Path
+    db: HistoryPlace
     limits: LimitSet | None
     diagnose: bool
     out: Path
@@ -109,7 +110,7 @@ class Line:
         """The newest measurement of the line with these results, if it has none there."""
         from daq.store import Store
 
-        if not self.db.exists():
+        if not is_there(self.db):
             return None
         with Store(self.db, read_only=True) as store:
             lines = list(store.lines(last=_LOOKED_AT))
@@ -194,7 +195,7 @@ class Line:
             verdict=judgement.verdict if judgement is not None else word,
             unit=self.unit.name,
             measurement=measurement,
-            history=str(self.db.resolve()),
+            history=whole_name(self.db),
             started=measured.started,
             ended=measured.ended,
             operator=measured.header.operator,

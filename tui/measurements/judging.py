@@ -9,10 +9,10 @@ from __future__ import annotations
 import time
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from daq.errors import AnalysisError, ConfigurationError, InputError, LashbenchError
+from daq.servers.place import HistoryPlace
 from tui.judging import features_for
 from tui.measurements.measured_unit import unit_as_measured
 from tui.places import cache_folder
@@ -29,7 +29,7 @@ __all__ = ["judge_line", "judge_measurement"]
 
 
 def judge_measurement(
-    db: Path,
+    db: HistoryPlace,
     measurement: int,
     limits: LimitSet,
     *,
@@ -125,7 +125,7 @@ def judge_line(store: Store, line: HistoryLine, limits: LimitSet) -> Judgement:
 class _Case:
     """A measurement and how answers of it are made and kept."""
 
-    db: Path
+    db: HistoryPlace
     measured: Measurement
     response: FrequencyResponse
     unit: Unit

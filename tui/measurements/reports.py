@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from daq.servers.place import HistoryPlace
+
 if TYPE_CHECKING:
     from analysis.report import Diagnosed
     from sim.unit import Unit
@@ -19,7 +21,7 @@ __all__ = ["report_measurement"]
 
 def report_measurement(
     path: Path,
-    db: Path,
+    db: HistoryPlace,
     measurement: int,
     unit: Unit,
     *,

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.errors import LashbenchError, MeasurementError
+from daq.servers.place import HistoryPlace
 from tui.session_words import complete_error
 from tui.text.output import Console
 
@@ -26,7 +27,7 @@ __all__ = ["run_session"]
 def run_session(
     instrument: str,
     unit: Unit,
-    db: Path,
+    db: HistoryPlace,
     request: SessionRequest,
     console: Console,
     tell: Callable[[SessionEvent, Console], None],

@@ -10,10 +10,10 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from daq.errors import ConfigurationError, FileFormatError
+from daq.servers.place import HistoryPlace
 from tui.measurements.measured_unit import unit_as_measured
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ def kept_estimate(store: Store, measurement: int, unit: Unit) -> Mapping[str, An
 
 
 def keep_estimate(
-    db: Path,
+    db: HistoryPlace,
     measured: Measurement,
     document: Mapping[str, Any],
     *,
@@ -164,7 +164,7 @@ def kept_diagnosis(store: Store, measurement: int, unit: Unit) -> StoredDiagnosi
 
 
 def keep_diagnosis(
-    db: Path,
+    db: HistoryPlace,
     measurement: int,
     responses: Sequence[FrequencyResponse],
     unit: Unit,

@@ -44,25 +44,25 @@ def the_clock_was(path, when, table):
 
 
 @pytest.mark.parametrize("when", ["1999-01-01T00:00:00+00:00", "2099-01-01T00:00:00+00:00"])
-def test_what_is_in_force_does_not_depend_on_the_clock(store, when):
-    number = measured(store)
-    store.add_estimate(number, "t", ESTIMATE)
-    store.add_diagnosis(number, "t", DIAGNOSIS, {number: 2})
+def test_what_is_in_force_does_not_depend_on_the_clock(file_store, when):
+    number = measured(file_store)
+    file_store.add_estimate(number, "t", ESTIMATE)
+    file_store.add_diagnosis(number, "t", DIAGNOSIS, {number: 2})
     for table in ("estimates", "diagnoses"):
-        the_clock_was(store.path, when, table)
-    (line,) = store.lines()
+        the_clock_was(file_store.path, when, table)
+    (line,) = file_store.lines()
     assert line.estimate.made == line.diagnosis.made == when
     assert line.estimate.summary == {k: ESTIMATE[k] for k in ESTIMATE if k != "error_index"}
     assert line.diagnosis.summary["causes"] == DIAGNOSIS["causes"]
-    assert store.estimate_in_force(number).document == ESTIMATE
-    assert [one.document for one in store.diagnoses_in_force(number)] == [DIAGNOSIS]
-    store.reopen(number)
-    store.add_point(number, 1.5, 110.0, SweepPoint(110.0, 0.2j))
-    store.finish(number, "complete", SourceState.CONFIRMED_OFF)
-    (line,) = store.lines()
+    assert file_store.estimate_in_force(number).document == ESTIMATE
+    assert [one.document for one in file_store.diagnoses_in_force(number)] == [DIAGNOSIS]
+    file_store.reopen(number)
+    file_store.add_point(number, 1.5, 110.0, SweepPoint(110.0, 0.2j))
+    file_store.finish(number, "complete", SourceState.CONFIRMED_OFF)
+    (line,) = file_store.lines()
     assert (line.points, line.estimate, line.diagnosis) == (2, None, None)
-    assert store.estimate_in_force(number) is None
-    assert store.diagnoses_in_force(number) == []
+    assert file_store.estimate_in_force(number) is None
+    assert file_store.diagnoses_in_force(number) == []
 
 
 def test_an_answer_is_of_the_points_that_it_was_made_of(store):

@@ -159,23 +159,23 @@ def test_a_unit_is_found_in_any_case_of_any_alphabet(store, asked):
     assert [m.id for m in store.measurements(asked)] == [ids[0], ids[2]]
 
 
-def test_a_link_to_a_history_shows_what_its_log_holds(store, tmp_path):
+def test_a_link_to_a_history_shows_what_its_log_holds(file_store, tmp_path):
     (tmp_path / "elsewhere").mkdir()
     link = tmp_path / "elsewhere" / "link.db"
-    link.symlink_to(store.path)
-    measurement = store.begin(header())
+    link.symlink_to(file_store.path)
+    measurement = file_store.begin(header())
     with Store(link, read_only=True) as reader:
         assert [m.id for m in reader.measurements()] == [measurement]
 
 
-def test_through_a_link_the_disk_is_asked_for_every_commit(store, tmp_path, monkeypatch):
+def test_through_a_link_the_disk_is_asked_for_every_commit(file_store, tmp_path, monkeypatch):
     link = tmp_path / "link.db"
-    link.symlink_to(store.path)
+    link.symlink_to(file_store.path)
     flushed = []
     monkeypatch.setattr(os, "fsync", lambda handle: flushed.append(os.fstat(handle).st_ino))
     with Store(link) as linked:
         linked.finish(linked.begin(header()), "complete", SourceState.CONFIRMED_OFF)
-    assert os.stat(f"{store.path}-wal").st_ino in flushed
+    assert os.stat(f"{file_store.path}-wal").st_ino in flushed
 
 
 def test_journal_keeps_order_and_data(store):
@@ -208,13 +208,13 @@ def test_a_plan_survives_as_text():
     assert plan_from_text(plan_text(PLAN)) == PLAN
 
 
-def test_commits_survive_a_killed_program_and_a_cut_leaves_a_whole_file(store):
-    with closing(sqlite3.connect(store.path)) as raw:
+def test_commits_survive_a_killed_program_and_a_cut_leaves_a_whole_file(file_store):
+    with closing(sqlite3.connect(file_store.path)) as raw:
         assert raw.execute("PRAGMA journal_mode").fetchone() == ("wal",)
 
 
-def test_the_disk_is_asked_for_every_commit_without_waiting_for_it(store, monkeypatch):
-    measurement = store.begin(header())
+def test_the_disk_is_asked_for_every_commit_without_waiting_for_it(file_store, monkeypatch):
+    measurement = file_store.begin(header())
     flushed, go = [], threading.Event()
 
     def slow(handle):
@@ -222,40 +222,40 @@ def test_the_disk_is_asked_for_every_commit_without_waiting_for_it(store, monkey
         go.wait(5.0)
 
     monkeypatch.setattr(os, "fsync", slow)
-    log = os.stat(f"{store.path}-wal").st_ino
+    log = os.stat(f"{file_store.path}-wal").st_ino
     began = time.monotonic()
-    store.add_point(measurement, 1.5, 100.1, point(100.1))
+    file_store.add_point(measurement, 1.5, 100.1, point(100.1))
     assert time.monotonic() - began < 1.0
     deadline = time.monotonic() + 5.0
     while not flushed and time.monotonic() < deadline:
         time.sleep(0.001)
     assert flushed == [log]
     # What comes while the disk is busy is asked for once more afterwards.
-    store.add_point(measurement, 1.5, 110.5, point(110.5))
+    file_store.add_point(measurement, 1.5, 110.5, point(110.5))
     go.set()
-    store.close()
+    file_store.close()
     assert flushed == [log, log]
 
 
-def test_the_end_of_a_measurement_waits_for_the_disk(store, monkeypatch):
-    measurement = store.begin(header())
+def test_the_end_of_a_measurement_waits_for_the_disk(file_store, monkeypatch):
+    measurement = file_store.begin(header())
     done = []
     monkeypatch.setattr(os, "fsync", lambda handle: (time.sleep(0.05), done.append(1)))
-    store.finish(measurement, "complete", SourceState.CONFIRMED_OFF)
+    file_store.finish(measurement, "complete", SourceState.CONFIRMED_OFF)
     assert done
 
 
-def test_a_disk_that_refuses_a_flush_is_told_with_the_next_record(store, monkeypatch):
-    measurement = store.begin(header())
+def test_a_disk_that_refuses_a_flush_is_told_with_the_next_record(file_store, monkeypatch):
+    measurement = file_store.begin(header())
 
     def refuse(_handle):
         raise OSError(5, "Input/output error")
 
     monkeypatch.setattr(os, "fsync", refuse)
     with pytest.raises(MeasurementError, match="Input/output error"):
-        store.finish(measurement, "complete", SourceState.CONFIRMED_OFF)
+        file_store.finish(measurement, "complete", SourceState.CONFIRMED_OFF)
     with pytest.raises(MeasurementError, match="the disk refused the data"):
-        store.add_point(measurement, 1.5, 100.1, point(100.1))
+        file_store.add_point(measurement, 1.5, 100.1, point(100.1))
 
 
 def test_a_failed_write_leaves_nothing_half_done(store):

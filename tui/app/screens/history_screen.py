@@ -6,7 +6,6 @@ here: a session gets one when its result is opened.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
@@ -16,6 +15,7 @@ from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
 
+from daq.servers.place import HistoryPlace, is_there
 from tui.app.dialogs.correction import CorrectionDialog
 from tui.app.plot.bode import BodePlot
 from tui.app.plot.chart import Chart
@@ -361,11 +361,11 @@ def _short(text: str) -> str:
     return text if len(text) <= _SHORT else f"{text[: _SHORT - 1]}\u2026"
 
 
-def _read_rows(db: Path, unit: str | None) -> tuple[list[dict[str, Any]], list[str]]:
+def _read_rows(db: HistoryPlace, unit: str | None) -> tuple[list[dict[str, Any]], list[str]]:
     """The latest sessions with points as rows, of one unit or of all, and the trends in words."""
     from daq.store import Store
 
-    if not os.path.exists(db):
+    if not is_there(db):
         return [], []
     with Store(db, read_only=True) as store:
         lines = store.lines(unit, last=_SHOWN, with_points=True)

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from textual.message import Message
 
 from daq.errors import LashbenchError
+from daq.servers.place import HistoryPlace
 from tui.app.messages import AnalysisDone, AnalysisFailed, AnalysisProgressed, Job
 
 if TYPE_CHECKING:
@@ -97,7 +98,7 @@ class Task:
     """
 
     post: Post
-    db: Path
+    db: HistoryPlace
     measurement: int
     unit: Unit
     given_up: threading.Event

@@ -9,13 +9,13 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from contextlib import closing, suppress
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from textual.message import Message
 
 from daq.analyser import SourceState
 from daq.errors import LashbenchError
+from daq.servers.place import HistoryPlace
 from tui.app.messages import (
     InstrumentFailed,
     InstrumentFound,
@@ -74,7 +74,7 @@ def run_session(
     post: Post,
     url: str,
     unit: Unit,
-    history: Path,
+    history: HistoryPlace,
     asked: Callable[[], SessionRequest],
     control: SessionControl,
 ) -> None:
@@ -120,7 +120,7 @@ def find_instruments(post: Post) -> None:
     post(InstrumentsListed(found, notes))
 
 
-def _stored_points(history: Path, measurement: int) -> list[StoredPoint]:
+def _stored_points(history: HistoryPlace, measurement: int) -> list[StoredPoint]:
     from daq.store import Store
 
     with Store(history, read_only=True) as store:

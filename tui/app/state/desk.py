@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from daq.drivers import is_simulated
 from daq.errors import InputError
+from daq.servers.place import HistoryPlace
 from tui.app.run_view import RunView
 from tui.app.state.proposed_sweep import propose
 from tui.measure_options import PlanOptions
@@ -73,7 +74,7 @@ class Desk:
         File of the bench's history; made by the first session if it is not there.
     """
 
-    db: Path
+    db: HistoryPlace
     unit_name: str = ""
     """Name or path that `unit` was chosen by, or of which measurement it is."""
     unit: Unit | None = None

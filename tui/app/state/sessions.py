@@ -6,10 +6,10 @@ nothing.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING
+
+from daq.servers.place import HistoryPlace, is_there
 
 if TYPE_CHECKING:
     from daq.frf import FrequencyResponse
@@ -27,7 +27,7 @@ __all__ = [
 _RECENT = 20
 
 
-def recent_sessions(db: Path) -> list[HistoryLine]:
+def recent_sessions(db: HistoryPlace) -> list[HistoryLine]:
     """The latest sessions with points, interrupted ones first; none where there is no history.
 
     One more than a screen lists, which may leave out the one that is under way.
@@ -39,14 +39,14 @@ def recent_sessions(db: Path) -> list[HistoryLine]:
     """
     from daq.store import Store
 
-    if not os.path.exists(db):
+    if not is_there(db):
         return []
     with Store(db, read_only=True) as store:
         lines = store.lines(last=_RECENT + 1, with_points=True)
     return sorted(lines, key=lambda line: (line.state != "interrupted", -line.id))
 
 
-def one_session(db: Path, measurement: int) -> Measurement:
+def one_session(db: HistoryPlace, measurement: int) -> Measurement:
     """A stored measurement; raises as `daq.store.Store`."""
     from daq.store import Store
 
@@ -55,7 +55,7 @@ def one_session(db: Path, measurement: int) -> Measurement:
 
 
 def latest_complete(
-    db: Path, unit: str, serial: str, but: int | None
+    db: HistoryPlace, unit: str, serial: str, but: int | None
 ) -> tuple[int, FrequencyResponse] | None:
     """The latest complete session of a unit, of the same serial number before others.
 
@@ -66,7 +66,7 @@ def latest_complete(
     """
     from daq.store import Store
 
-    if not os.path.exists(db):
+    if not is_there(db):
         return None
     with Store(db, read_only=True) as store:
         for of in (serial, None):
@@ -77,7 +77,7 @@ def latest_complete(
     return None
 
 
-def responses_of(db: Path, measurements: list[int]) -> list[FrequencyResponse]:
+def responses_of(db: HistoryPlace, measurements: list[int]) -> list[FrequencyResponse]:
     """The responses of stored measurements, in that order; raises as `daq.store.Store`."""
     from daq.store import Store
 
@@ -85,7 +85,7 @@ def responses_of(db: Path, measurements: list[int]) -> list[FrequencyResponse]:
         return [store.response(measurement) for measurement in measurements]
 
 
-def audit_trail(db: Path, measurement: int) -> list[str]:
+def audit_trail(db: HistoryPlace, measurement: int) -> list[str]:
     """What was corrected of a measurement, a line each; raises as `daq.store.Store`."""
     from daq.store import Store
     from tui.measurements.history_rows import correction_words
@@ -96,7 +96,7 @@ def audit_trail(db: Path, measurement: int) -> list[str]:
 
 
 def correct_session(
-    db: Path, measurement: int, person: str, changes: Mapping[str, str]
+    db: HistoryPlace, measurement: int, person: str, changes: Mapping[str, str]
 ) -> list[str]:
     """Correct serial number, operator or notes; names of what was, once it is committed.
 

@@ -10,7 +10,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from tui.options import Whole
+from daq.servers.place import files_of
+from tui.options import HistoryOption, Whole
 from tui.places import history_path
 from tui.text.output import Injected
 
@@ -21,7 +22,7 @@ def export(
     measurement: Annotated[Whole, Parameter(help="Identifier, as `history` lists it.")],
     /,
     *,
-    db: Path | None = None,
+    db: HistoryOption = None,
     out: Path,
     console: Injected,
 ) -> None:
@@ -32,14 +33,14 @@ def export(
     Parameters
     ----------
     db
-        File of the bench's history; yours, if left out.
+        The bench's history, a file or postgresql://USER@HOST/DATABASE; yours, if left out.
     out
         File to write: csv, h5, uff or mat by its suffix.
     """
     from daq.formats import check_writable, write_response
     from daq.store import Store
 
-    check_writable(out, history_path(db))
+    check_writable(out, *files_of(history_path(db)))
     with Store(history_path(db), read_only=True) as store:
         response = store.response(measurement)
     write_response(response, out)

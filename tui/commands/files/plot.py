@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from daq.errors import ConfigurationError, InputError
-from tui.options import Real
+from daq.servers.place import HistoryPlace, files_of
+from tui.options import HistoryOption, Real
 from tui.places import history_path, measurement_number
 from tui.reading_options import NO_OPTIONS, ReadingOptions, read_file
 from tui.text.output import Console, Injected
@@ -49,7 +50,7 @@ class _Wanted:
 def plot(
     *sources: Annotated[str, Parameter(name="FILE_OR_ID")],
     out: Path,
-    db: Path | None = None,
+    db: HistoryOption = None,
     only_level: list[Real] | None = None,
     model: bool = False,
     unit: Annotated[
@@ -73,7 +74,7 @@ def plot(
     out
         Picture to write: png, svg or pdf by its suffix.
     db
-        File of the bench's history that identifiers are looked up in; yours, if left out.
+        The bench's history, a file or postgresql://USER@HOST/DATABASE; yours, if left out.
     only_level
         Draw this source level only, in V peak; repeat it for several.
     model
@@ -92,7 +93,7 @@ def plot(
     numbers = [measurement_number(source, db) for source in sources]
     files = [Path(one) for one, number in zip(sources, numbers, strict=True) if number is None]
     history = None if len(files) == len(sources) else history_path(db)
-    checked_picture(out, [*files, *([history] if history else [])])
+    checked_picture(out, [*files, *files_of(history)])
     if given != NO_OPTIONS and not files:
         raise InputError(
             "measurements are in a history, which says everything; leave out the options that "
@@ -155,7 +156,7 @@ def _at_levels(
 
 
 def _stored(
-    db: Path, number: int, wanted: _Wanted, model: bool
+    db: HistoryPlace, number: int, wanted: _Wanted, model: bool
 ) -> tuple[FrequencyResponse, _Model | None]:
     """A stored measurement, and the model that was accepted for it unless one is given."""
     from daq.store import Store
