@@ -16,21 +16,31 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from instruments.bench_server import linear_analyser, served  # noqa: E402
+from instruments.bench_server import served, simulated  # noqa: E402
 
 from daq.control import SessionControl
 from daq.errors import LashbenchError
 from daq.hp35670a.setup import Timing
 from daq.session_events import Finished
 from sim.faults import CATALOGUE
+from sim.instrument.plant import LinearPlant
+from sim.models import model_of
 from sim.unit import load_unit
 from tui.bench import bench_session
 from tui.measure_options import PlanOptions, session_request
 
 PAGE = Path(__file__).parents[1] / "docs" / "faults.md"
-BEGIN, END = "<!-- table begins -->", "<!-- table ends -->"
+MARKS = {
+    "": ("<!-- table begins -->", "<!-- table ends -->"),
+    "sr785": ("<!-- sr785 begins -->", "<!-- sr785 ends -->"),
+}
+"""Where the table of a driver's instrument stands."""
 WIRES = ("tcp", "prologix_tcp")
+WIRES_OF = {"": WIRES, "sr785": ("prologix_tcp", "serial_pty")}
 POINTS = 6
+POINTS_OF = {"": POINTS, "sr785": 11}
+OWN = tuple(name for name in model_of("sr785").faults if name not in CATALOGUE)
+"""Faults that the SR785 has alone."""
 
 DEADLINES_S = {"silence": 75, "stuck-measuring-bit": 60, "stuck-parser": 45}
 """Bound of the whole session with the driver's own limits, s; 30 s for all others."""
@@ -48,6 +58,8 @@ def ordered(name: str) -> str:
     """The fault as it is ordered: all that can do so strike in the sweep, not in the checks."""
     if name in IN_MID_SWEEP:
         return f"{name}:point=4,phase=read-out"
+    if name in OWN:
+        return f"{name}:point=16"  # behind the points of the trial
     return f"{name}:point=3,seconds=0.3" if name in FOR_A_MOMENT else name
 
 
@@ -62,18 +74,21 @@ class Outcome:
     source: str
     elapsed_s: float
     said: str
+    planned: int = POINTS
 
     def __str__(self) -> str:
         flagged = f", {self.flagged} flagged" if self.flagged else ""
-        return f"{self.code}, {self.points}/{POINTS}{flagged}, {self.source}"
+        return f"{self.code}, {self.points}/{self.planned}{flagged}, {self.source}"
 
 
-def provoke(fault: str, wire: str, folder: Path) -> Outcome:
+def provoke(fault: str, wire: str, folder: Path, driver: str = "") -> Outcome:
     """Measure on a simulated analyser with one fault."""
     unit, history = load_unit("adss"), folder / f"{fault.partition(':')[0]}-{wire}.db"
-    options = PlanOptions((2.5,), 130.0, 170.0, POINTS, settle_cycles=3, integrate_cycles=4)
+    points = POINTS_OF[driver]
+    options = PlanOptions((2.5,), 130.0, 170.0, points, settle_cycles=3, integrate_cycles=4)
     began, finished, error = time.monotonic(), None, None
-    with served(linear_analyser(lambda hz: 0.3, [fault]), wire) as url:
+    instrument = simulated(driver, LinearPlant(lambda hz: 0.3), [fault])
+    with served(instrument, wire, driver) as url:
         remarks = {"serial": "", "operator": "", "notes": ""}
         request = session_request(
             options, "adss", unit, url, history,
@@ -95,14 +110,17 @@ def provoke(fault: str, wire: str, folder: Path) -> Outcome:
         finished.source_state.value,
         time.monotonic() - began,
         "" if error is None else str(error),
+        points,
     )
 
 
-def provoke_all(folder: Path, faults: dict[str, str]) -> dict[tuple[str, str], Outcome]:
+def provoke_all(
+    folder: Path, faults: dict[str, str], driver: str = ""
+) -> dict[tuple[str, str], Outcome]:
     """Every fault on every wire, side by side: most of the time is waiting."""
-    jobs = [(name, wire) for name in faults for wire in WIRES]
+    jobs = [(name, wire) for name in faults for wire in WIRES_OF[driver]]
     with ThreadPoolExecutor(8) as pool:
-        outcomes = pool.map(lambda job: provoke(faults[job[0]], job[1], folder), jobs)
+        outcomes = pool.map(lambda job: provoke(faults[job[0]], job[1], folder, driver), jobs)
         return dict(zip(jobs, outcomes, strict=True))
 
 
@@ -111,40 +129,47 @@ def short_timing() -> Timing:
     return Timing(reply_s=1.5, block_s=2.0, overhead_s=3.0)
 
 
-def rows(outcomes: dict[tuple[str, str], Outcome]) -> list[str]:
+def rows(outcomes: dict[tuple[str, str], Outcome], driver: str = "") -> list[str]:
     """The table, one row a fault."""
-    lines = [
-        "| fault | what it is | on raw TCP | through an adapter | ends within |",
-        "| --- | --- | --- | --- | --- |",
-    ]
-    return [*lines, *(row_of(name, outcomes) for name in CATALOGUE)]
+    heads = {
+        "": "on raw TCP | through an adapter | ends within",
+        "sr785": "through an adapter | RS-232",
+    }[driver]
+    lines = [f"| fault | what it is | {heads} |", "| --- " * (3 + heads.count("|")) + "|"]
+    return [*lines, *(row_of(name, outcomes, driver) for name in (OWN if driver else CATALOGUE))]
 
 
-def row_of(name: str, outcomes: dict[tuple[str, str], Outcome]) -> str:
+def row_of(name: str, outcomes: dict[tuple[str, str], Outcome], driver: str = "") -> str:
     """The row of one fault."""
-    cells = [str(outcomes[name, wire]) for wire in WIRES]
-    bound = DEADLINES_S.get(name, DEADLINE_S)
-    return f"| `{name}` | {CATALOGUE[name].does} | {' | '.join(cells)} | {bound} s |"
+    cells = [str(outcomes[name, wire]) for wire in WIRES_OF[driver]]
+    if not driver:
+        cells.append(f"{DEADLINES_S.get(name, DEADLINE_S)} s")
+    return f"| `{name}` | {model_of(driver).faults[name].does} | {' | '.join(cells)} |"
 
 
-def written_rows() -> list[str]:
+def written_rows(driver: str = "") -> list[str]:
     """The table as the page has it."""
-    text = PAGE.read_text(encoding="utf-8")
-    return text[text.index(BEGIN) + len(BEGIN) : text.index(END)].strip().splitlines()
+    text, (begin, end) = PAGE.read_text(encoding="utf-8"), MARKS[driver]
+    return text[text.index(begin) + len(begin) : text.index(end)].strip().splitlines()
+
+
+def write(lines: list[str], driver: str) -> None:
+    """Put a table between its marks."""
+    text, (begin, end) = PAGE.read_text(encoding="utf-8"), MARKS[driver]
+    before, after = text[: text.index(begin)], text[text.index(end) :]
+    PAGE.write_text(f"{before}{begin}\n\n" + "\n".join(lines) + f"\n\n{after}", encoding="utf-8")
 
 
 def main() -> None:
-    """Provoke all, check the deadlines, write the table."""
-    with tempfile.TemporaryDirectory() as folder:
-        outcomes = provoke_all(Path(folder), {name: ordered(name) for name in CATALOGUE})
-    for (name, wire), outcome in outcomes.items():
-        line = f"{name:22} {wire:13} {outcome.elapsed_s:5.1f} s  {outcome}  {outcome.said[:90]}"
-        print(line)  # noqa: T201
-        assert outcome.elapsed_s < DEADLINES_S.get(name, DEADLINE_S)
-    text = PAGE.read_text(encoding="utf-8")
-    before, after = text[: text.index(BEGIN)], text[text.index(END) :]
-    table = "\n".join(rows(outcomes))
-    PAGE.write_text(f"{before}{BEGIN}\n\n{table}\n\n{after}", encoding="utf-8")
+    """Provoke all, check the deadlines, write the tables."""
+    for driver, names in (("", tuple(CATALOGUE)), ("sr785", OWN)):
+        with tempfile.TemporaryDirectory() as folder:
+            outcomes = provoke_all(Path(folder), {name: ordered(name) for name in names}, driver)
+        for (name, wire), outcome in outcomes.items():
+            line = f"{name:22} {wire:13} {outcome.elapsed_s:5.1f} s  {outcome}  {outcome.said[:90]}"
+            print(line)  # noqa: T201
+            assert outcome.elapsed_s < DEADLINES_S.get(name, DEADLINE_S)
+        write(rows(outcomes, driver), driver)
 
 
 if __name__ == "__main__":

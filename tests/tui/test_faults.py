@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from fault_table import (
     CATALOGUE,
+    OWN,
     WIRES,
     ordered,
     provoke,
@@ -42,6 +43,13 @@ def outcomes(tmp_path_factory):
 
 def test_the_page_says_what_happens(outcomes):
     assert rows(outcomes) == written_rows()
+
+
+@pytest.mark.slow
+def test_the_page_says_what_happens_to_an_sr785(tmp_path):
+    made = provoke_all(tmp_path, {name: ordered(name) for name in OWN}, "sr785")
+    assert rows(made, "sr785") == written_rows("sr785")
+    assert {outcome.source for outcome in made.values()} == {"confirmed-off"}
 
 
 def test_every_end_is_one_of_those_that_are_documented(outcomes):

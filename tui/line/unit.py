@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from daq.errors import LashbenchError
 from daq.servers.place import HistoryPlace, is_there, whole_name
@@ -24,6 +24,7 @@ from tui.text.output import Console
 
 if TYPE_CHECKING:
     from analysis.acceptance import LimitSet
+    from daq.control import SessionControl
     from daq.session_events import Finished, SessionEvent
     from daq.session_request import SessionRequest
     from daq.store import Store
@@ -51,6 +52,18 @@ class Pending:
     """Whether nothing was measured after it, so that its unit may still be on the bench."""
 
 
+class Watcher(Protocol):
+    """Who follows the sessions of a line on a screen."""
+
+    def control(self) -> SessionControl:
+        """What the session that begins now is ended by."""
+        ...
+
+    def take(self, event: SessionEvent) -> None:
+        """A session told something."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class Line:
     """What every unit of a line has in common.
@@ -70,6 +83,8 @@ class Line:
     out
         The file of results. It is kept with each measurement: what another file's line measured
         is that line's.
+    watcher
+        Follows the sessions in place of the console, and can end them.
     """
 
     unit_name: str
@@ -84,6 +99,7 @@ class Line:
     diagnose: bool
     out: Path
     console: Console
+    watcher: Watcher | None = None
 
     def request(self, serial: str, attempt: int, resume: int | None = None) -> SessionRequest:
         """What a session is asked to do for a unit.
@@ -160,10 +176,14 @@ class Line:
             nonlocal why
             if isinstance(event, CheckLine) and event.name == "trial point":
                 why = event.text if event.verdict == "fail" else ""
-            tell_event(event, console)
+            if self.watcher is None:
+                tell_event(event, console)
+            else:
+                self.watcher.take(event)
 
+        control = None if self.watcher is None else self.watcher.control()
         finished, fault = run_session(
-            self.instrument, self.unit, self.db, request, self.console, tell
+            self.instrument, self.unit, self.db, request, self.console, tell, control=control
         )
         if fault is not None and (not why or contract_state(finished) != "confirmed-off"):
             raise fault

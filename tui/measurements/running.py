@@ -17,6 +17,7 @@ from tui.session_words import complete_error
 from tui.text.output import Console
 
 if TYPE_CHECKING:
+    from daq.control import SessionControl
     from daq.session_events import Finished, SessionEvent
     from daq.session_request import SessionRequest
     from sim.unit import Unit
@@ -32,6 +33,7 @@ def run_session(
     console: Console,
     tell: Callable[[SessionEvent, Console], None],
     transcript: Path | None = None,
+    control: SessionControl | None = None,
 ) -> tuple[Finished, LashbenchError | None]:
     """Run a session to its end.
 
@@ -39,6 +41,8 @@ def run_session(
     ----------
     tell
         Called with each record; that nobody reads any more ends no session.
+    control
+        What the session is ended by beside signals; one of its own, if left out.
 
     Returns
     -------
@@ -52,12 +56,13 @@ def run_session(
     LashbenchError
         If it failed before anything was kept.
     """
-    from daq.control import SessionControl
+    from daq.control import SessionControl as Control
     from daq.session_events import Finished
     from tui.bench import bench_session
     from tui.signals import listening
 
-    control, finished = SessionControl(), None
+    finished = None
+    control = control or Control()
     with (
         listening(control, console.note),
         closing(bench_session(instrument, unit, db, request, control, transcript)) as events,
