@@ -66,8 +66,8 @@ _LINE_STYLE = """
 #verdict.-fail { background: #7a0000; color: #ffffff; }
 #unit { height: auto; max-height: 5; }
 #work { height: 1fr; }
-#counts { width: 1fr; overflow-y: auto; }
-#notes { width: 1fr; overflow-y: auto; }
+#counts { width: 1fr; height: 100%; overflow-y: auto; }
+#notes { width: 1fr; height: 100%; overflow-y: auto; }
 #asked { height: auto; }
 #question { height: auto; max-height: 3; text-style: bold; }
 .-narrow #work { layout: vertical; }
