@@ -351,6 +351,7 @@ class LineApp(TerminalApp):
             return
         self._word = word
         self._lines = [said or "not finished; scan it again, or press Enter, to go on"]
+        self._show()
         self.ask("Enter goes on, Ctrl+Q leaves")
 
     def _leave(self, code: int, said: str = "") -> None:
