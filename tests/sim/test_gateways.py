@@ -113,7 +113,7 @@ def test_pyvisa_asks_polls_and_clears(name):
 
 
 @pytest.mark.parametrize("wire", GATEWAYS)
-def test_a_gateway_that_starts_anew_is_met_again_and_the_source_switched_off(wire):
+def test_a_gateway_that_starts_anew_is_met_again_and_made_safe(wire):
     instrument = box("", "link-away:point=3,seconds=0.3")
     with served(instrument, wire) as url:
         analyser = open_analyser(url)

@@ -91,7 +91,7 @@ for hz in range(100, 200):
 """
 
 
-def test_no_told_point_is_lost_to_kill_9_nor_to_a_server_that_falls(postgres, postgres_url):
+def test_no_told_point_is_lost_to_kill_9_nor_to_a_fallen_server(postgres, postgres_url):
     done = subprocess.run(
         [sys.executable, "-c", KILLED, postgres_url], capture_output=True, text=True
     )
@@ -219,7 +219,7 @@ def test_one_session_at_a_time_on_this_machine():
 
 
 @given(st.text(max_size=30), st.sampled_from(["postgresql://", "postgres://", "", "mysql://"]))
-def test_any_text_is_a_file_or_a_server_or_refused_without_being_repeated(text, scheme):
+def test_any_text_is_a_file_or_a_server_or_refused(text, scheme):
     words = f"{scheme}u:s3cr%65t!@{text}" if scheme else text
     said = ""
     try:

@@ -71,7 +71,7 @@ def test_what_is_wrong_with_the_server_is_one_line_and_its_exit_code(verb, postg
         assert "guess4" not in err
 
 
-def test_a_session_that_loses_the_server_ends_with_the_source_off_and_goes_on(verb, postgres):
+def test_a_session_that_loses_the_server_ends_with_the_source_off(verb, postgres):
     with serving("--unit", "adss", "--ratio", "0.3", "--tcp", "0", "--speed", "fast") as places:
         words = [*LASHBENCH, "measure", "--unit", "adss", "--instrument", places["tcp"], "--yes",
                  "--level", "2", "--start", "100", "--stop", "200", "--points", "400",
