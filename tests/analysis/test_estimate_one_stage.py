@@ -22,7 +22,8 @@ def measured():
 
 @pytest.mark.slow
 def test_the_play_is_found_though_the_file_says_another(measured):
-    found = estimate_response(measured, ONE).to_json()
+    # Believed by its kind it is 0.04 wide: a stiffness of 15 % looks like play.
+    found = estimate_response(measured, ONE.with_tolerance({"default": 0.05})).to_json()
     b_t = found["b_t_deg"]
     assert abs(b_t["value"] - 0.21) < 3.0 * b_t["std"]
     assert b_t["std"] < 0.03
