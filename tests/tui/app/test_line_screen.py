@@ -79,6 +79,30 @@ def test_units_are_judged_in_large_letters_and_counted(bench):
     assert not bench.drives
 
 
+def test_a_stopped_unit_is_not_judged_and_gone_on_with(bench):
+    async def way():
+        async with at_the_line(bench, (140, 40)) as op:
+            bench.unit.wait_s = 0.1
+            await scans(op, "SN 1")
+            await op.sees("SOURCE ON", "of 21 points", within_s=120.0)
+            while not 2 < bench.points(1) < 18:
+                await op.pilot.pause(0.02)
+            await op.press("ctrl+x")
+            screen = await op.sees("Enter goes on", "SOURCE OFF (confirmed)", within_s=60.0)
+            assert large("STOPPED", 136).splitlines()[2].strip() in screen
+            assert not bench.drives
+            bench.unit.wait_s = 0.0
+            await scans(op, "")
+            await op.sees("If it is on the bench")
+            await scans(op, "")
+            await op.sees("1 PASS", within_s=120.0)
+
+    asyncio.run(way())
+    (result,) = bench.results()
+    assert (result["serial"], result["measurement"]) == ("SN 1", 1)
+    assert bench.points(1) == 21
+
+
 def test_a_killed_screen_loses_no_unit_and_judges_none_twice(bench):
     words = [*bench.words("--out", bench.out, "--screen")]
     near, far = pty.openpty()
