@@ -16,6 +16,7 @@ import numpy as np
 from fault_bench.fault_child import drives
 from instruments.bench_server import linear_analyser, served
 
+from daq.errors import FileFormatError, InputError
 from daq.store import Store
 from sim.effects import drivetrain_with
 from sim.unit import load_unit
@@ -103,11 +104,12 @@ class LineBench:
         self.unit.wait_s = 0.0
 
     def measurements(self) -> int:
-        """How many the history has."""
-        if not self.db.exists():
+        """How many the history has; none while it is being made."""
+        try:
+            with Store(self.db, read_only=True) as store:
+                return store.count()
+        except (FileFormatError, InputError):
             return 0
-        with Store(self.db, read_only=True) as store:
-            return store.count()
 
     def points(self, number: int) -> int:
         """How many points a measurement has."""
