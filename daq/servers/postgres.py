@@ -12,7 +12,7 @@ from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy import event
-from sqlalchemy.exc import DBAPIError
+from sqlalchemy.exc import ArgumentError, DBAPIError
 
 from daq.errors import ConfigurationError, FileFormatError, InputError, LashbenchError, LinkError
 from daq.errors import MeasurementError as BenchError
@@ -122,7 +122,7 @@ def telling_server_faults(place: HistoryServer) -> Iterator[None]:
 def _engine(place: HistoryServer, read_only: bool) -> sa.Engine:
     try:
         url = sa.make_url(place.shown).set(drivername="postgresql+psycopg")
-    except (sa.exc.ArgumentError, ValueError):
+    except (ArgumentError, ValueError):
         raise InputError(f"{place}: cannot be read as an address of a server") from None
     # On Linux what is sent and not acknowledged ends the connection.
     options: dict[str, Any] = {

@@ -15,6 +15,7 @@ from typing import Any, Self
 
 import sqlalchemy as sa
 from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy.exc import DBAPIError
 
 from daq.errors import FileFormatError, InputError
 from daq.servers.place import HistoryPlace, HistoryServer, parse_place
@@ -68,7 +69,7 @@ class StoreFile:
         if self._flusher is not None:
             self._flusher.close()
         while self._claims:
-            with suppress(sa.exc.DBAPIError):
+            with suppress(DBAPIError):
                 self._claims.popitem()[1].invalidate()
         self._engine.dispose()
 
