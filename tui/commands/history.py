@@ -1,6 +1,6 @@
 """``lashbench history``: the measurements of a bench, and how a unit's backlash changes.
 
-Owns the options of the verb and the tables. Estimates that the history lacks
+Owns the options of the verb, and what is read for it. Estimates that the history lacks
 are made by the analysis and kept, so that the next look is quick. What is not
 shown is not read.
 """
@@ -22,19 +22,17 @@ from daq.errors import AnalysisError, ConfigurationError, InputError, LashbenchE
 from daq.servers.place import HistoryPlace
 from tui.executors import executor_at
 from tui.judging import limits_to_judge_by
-from tui.measurements.history_rows import (
-    QUANTITIES,
-    Trends,
-    answer_words,
-    correction_words,
-    measurement_row,
-    told_groups,
-    trend_lines,
+from tui.measurements.history_rows import Trends, measurement_row, trend_lines
+from tui.measurements.history_tables import (
+    corrected_lines,
+    estimated_lines,
+    judged_lines,
+    measured_table,
 )
 from tui.measurements.measured_unit import unit_as_measured
 from tui.options import Cluster, HistoryOption, Json, JudgeBy, Whole
 from tui.places import cache_folder, history_path
-from tui.text.layout import WIDTH, table_lines, wrapped
+from tui.text.layout import wrapped
 from tui.text.output import Console, Injected, as_json, readers_may_leave
 
 if TYPE_CHECKING:
@@ -50,8 +48,6 @@ _BUDGET_S = 45.0
 _SHOWN = 200
 """Measurements that are listed for people unless they ask for more."""
 _PROGRESS_EVERY = 1000
-_BAR, _LEAST_BAR = 41, 11
-"""Columns from a ratio of 0 to one of 1, and how few of them there may be beside long numbers."""
 
 
 def history(
@@ -132,9 +128,10 @@ def history(
             trends = Trends(rows, limits)
         else:
             trends = _whole_trends(store, rows, which, limits, console)
-        told = [part for line in trend_lines(trends.rows()) for part in wrapped(line, indent="  ")]
-        lines = [*_measured(rows), *_judged(rows), *_corrected(store, rows), *_estimated(rows)]
-        lines += told
+        lines = [*measured_table(rows), *judged_lines(rows), *corrected_lines(store, rows)]
+        lines += estimated_lines(rows)
+        for line in trend_lines(trends.rows()):
+            lines += wrapped(line, indent="  ")
     if whole > len(rows):
         console.note(f"the last {len(rows)} of {whole} measurements; --last N lists more")
     with readers_may_leave() if limits else nullcontext():
@@ -301,103 +298,3 @@ def _estimate(
         console.note(f"the estimate is shown but not kept: {error}")
         return loose_answer(content)
     return None
-
-
-def _measured(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """What was measured when, and how far; names of units and specimens may be long."""
-    return table_lines(
-        ("id", "started (UTC)", "unit", "serial", "state", "points"),
-        [
-            (
-                str(row["id"]),
-                row["started"][:16].replace("T", " "),
-                row["unit"] + (" (SIMULATED)" if row["simulated"] else ""),
-                row["serial"] or "-",
-                row["state"],
-                f"{row['points']}/{row['planned']}",
-            )
-            for row in rows
-        ],
-        may_wrap=(2, 3),
-    )
-
-
-def _judged(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """The verdict of each measurement, where there are limits, and what is wrong or open."""
-    from analysis.acceptance import reasons
-
-    lines = []
-    for row in rows:
-        judged = row.get("judgement")
-        if judged is not None:
-            what = reasons(judged["failed"], judged["undecided"])
-            text = f"{judged['verdict']:9}  #{row['id']}  {what}"
-            lines += wrapped(text.rstrip(), indent="  ")
-    if not lines:
-        return []
-    first = rows[0]["judgement"]
-    return ["", f"by limits {first['limits']['name']}", *lines]
-
-
-def _corrected(store: Store, rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """The audit trail of what is listed."""
-    lines = []
-    for row in rows:
-        for one in store.corrections(row["id"]) if row["corrections"] else ():
-            lines += wrapped(f"#{row['id']}: {correction_words(one)}", indent="  ")
-    return ["", *lines] if lines else []
-
-
-def _estimated(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """What is accepted of each unit, the contribution ratio as a dot with its bar from 0 to 1, too.
-
-    Below each measurement stands what was diagnosed and what there is to be warned of.
-    """
-    lines = []
-    for (unit, serial), group in told_groups(rows).items():
-        name = f"{unit} {serial}".strip()
-        numbers = [
-            tuple(
-                _shown(row[name], digits)
-                for name, digits in zip(QUANTITIES, (3, 4, 4), strict=True)
-            )
-            for row in group
-        ]
-        head = ("r", "b1 / deg", "b2 / deg")
-        widths = [max(map(len, column)) for column in zip(head, *numbers, strict=True)]
-        left = max(5, *(len(str(row["id"])) for row in group))
-        bar = min(_BAR, max(_LEAST_BAR, WIDTH - left - 1 - sum(widths) - 2 * len(widths)))
-        title = f"backlash of {name}; contribution ratio r from 0 to 1; one standard error"
-        lines += ["", *wrapped(title)]
-        pictured = [(str(row["id"]), _bar(row["contribution_ratio"], bar)) for row in group]
-        said = [[], *map(answer_words, group)]
-        for (key, picture), texts, words in zip(
-            [("", f"0{'':{bar - 2}}1"), *pictured], [head, *numbers], said, strict=True
-        ):
-            cells = (f"{text:<{width}}" for text, width in zip(texts, widths, strict=True))
-            lines.append("  ".join((f"{key:>{left}} {picture}", *cells)).rstrip())
-            indent = " " * (left + 1)
-            for word in words:
-                lines += [indent + part for part in wrapped(word, WIDTH - len(indent), "  ")]
-    return lines
-
-
-def _shown(number: Mapping[str, float] | None, digits: int) -> str:
-    if not number:
-        return "-"
-    return f"{number['value']:.{digits}f} +- {number['std'] or 0.0:.{digits}f}"
-
-
-def _bar(ratio: Mapping[str, float] | None, width: int) -> str:
-    if not ratio:
-        return " " * width
-
-    def place(value: float) -> int:
-        return round(min(max(value, 0.0), 1.0) * (width - 1))
-
-    cells = ["."] * width
-    value, std = ratio["value"], ratio["std"] or 0.0
-    for cell in range(place(value - std), place(value + std) + 1):
-        cells[cell] = "-"
-    cells[place(value)] = "o"
-    return "".join(cells)
