@@ -21,7 +21,7 @@ from analysis.inference.plans import Landmarks, landmarks, reference_response
 from analysis.inference.prior import COUNTS, Prior
 from analysis.inference.runs import Batch
 from analysis.inference.sets import CauseSets
-from analysis.observation.observation import USUAL_NOISE_V
+from analysis.observation.observation import QUIET_SHARE, USUAL_NOISE_V, scatter_sampling
 from sim.catalogue import not_of_unit
 from sim.unit import Unit
 
@@ -34,7 +34,6 @@ _BAND = 0.25
 """Largest share of the band that may be missing from an example."""
 
 _NOISE_V = (1e-4, 3e-3)
-_QUIET_SHARE = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -147,7 +146,7 @@ def estimated_noise(
     found = np.full(len(volts), USUAL_NOISE_V, dtype=np.float32)
     known = np.isfinite(volts).any(axis=1)
     if np.any(known):
-        quiet = np.nanquantile(volts[known], _QUIET_SHARE, axis=1)
+        quiet = np.nanquantile(volts[known], QUIET_SHARE, axis=1)
         found[known] = np.maximum(quiet, 1e-9) / np.sqrt(2.0)
     return found
 
@@ -182,9 +181,8 @@ def read_batch(
     gain = mean + added[0] + 1j * added[1]
     size = np.maximum(np.abs(gain), 1e-9)
     # The noise of so many cycles scatters, too; that of the motion was simulated.
-    sampling = rng.standard_normal(mean.shape, dtype=np.float32)
-    sampling /= np.sqrt(np.float32(2 * max(batch.plan.integrate_cycles - 1, 1)))
-    shown = np.exp(sampling) * noise / size
+    sampling = np.float32(scatter_sampling(batch.plan.integrate_cycles))
+    shown = np.exp(sampling * rng.standard_normal(mean.shape, dtype=np.float32)) * noise / size
     scatter = np.sqrt(variance * (np.abs(mean) / size) ** 2 + 2.0 * shown**2)
     scatter_known = rng.random(count) < (0.85 if degrade else 1.0)
     phase_known = rng.random(count) < (0.92 if degrade else 1.0)

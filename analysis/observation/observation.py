@@ -31,6 +31,7 @@ __all__ = [
     "noise_and_floor",
     "observe",
     "readings_of_cycles",
+    "scatter_sampling",
     "unread",
 ]
 
@@ -40,7 +41,7 @@ CHANNELS = ("gain", "phase", "scatter")
 SETTLE_CYCLES, INTEGRATE_CYCLES = 20, 30
 """Assumed where a file does not say."""
 
-_QUIET_SHARE = 0.02
+QUIET_SHARE = 0.02
 
 USUAL_NOISE_V = 5e-4
 """What a bench adds to each component of a reading, where nothing else is known, V."""
@@ -117,8 +118,7 @@ class Observation:
     @property
     def scatter_sampling(self) -> float:
         """Relative standard deviation of a standard error along one component, by its cycles."""
-        cycles = min(plan.integrate_cycles for plan, _ in self.plans)
-        return float(1.0 / np.sqrt(2.0 * max(cycles - 1, 1)))
+        return scatter_sampling(min(plan.integrate_cycles for plan, _ in self.plans))
 
     def with_noise(self, noise_v: float) -> Observation:
         """The same reading with another noise of its own, V."""
@@ -268,6 +268,11 @@ def _refuse_repeated(frequency_hz: NDArray[np.float64], source_vpk: float) -> No
         )
 
 
+def scatter_sampling(cycles: int) -> float:
+    """Relative standard deviation of a standard error along one component, of so many cycles."""
+    return float(1.0 / np.sqrt(2.0 * max(cycles - 1, 1)))
+
+
 def estimate_noise(volts: NDArray[np.float64]) -> float:
     """Noise of each component, V: what the quietest points show, as there the motion repeats.
 
@@ -277,7 +282,7 @@ def estimate_noise(volts: NDArray[np.float64]) -> float:
     known = volts[np.isfinite(volts) & (volts > 0)]
     if known.size == 0:
         return USUAL_NOISE_V
-    return float(np.quantile(known, _QUIET_SHARE) / np.sqrt(2.0))
+    return float(np.quantile(known, QUIET_SHARE) / np.sqrt(2.0))
 
 
 def _plans(swept: Sequence[_Level]) -> tuple[tuple[SweepPlan, NDArray[np.int64]], ...]:

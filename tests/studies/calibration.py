@@ -9,6 +9,7 @@ network says of them. Ranks of a calibrated posterior are uniform. It trains and
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,9 +25,14 @@ from analysis.inference.posterior import Posterior
 from analysis.inference.runs import Batch, load_batch, save_batch, simulate_batch
 from sim.unit import load_unit
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from studies.compare import binned_calibration_error
+
 Vector = NDArray[np.float64]
 
 _BARS, _INTERVAL = 20, 0.95
+_BELIEFS = np.linspace(0.0, 1.0, 11).tolist()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,16 +101,6 @@ def coverage(ranks: Vector) -> float:
     return float(np.mean((ranks > tail) & (ranks < 1.0 - tail)))
 
 
-def calibration_error(believed: Vector, right: NDArray[np.bool_], bins: int = 10) -> float:
-    """Expected calibration error over equal bins of belief (Naeini et al. 2015)."""
-    place = np.minimum((believed * bins).astype(int), bins - 1)
-    apart = [
-        abs(right[place == one].mean() - believed[place == one].mean()) * np.mean(place == one)
-        for one in np.unique(place)
-    ]
-    return float(np.sum(apart))
-
-
 def draw(ranks: Ranks, title: str, picture: Path) -> None:
     """Rank histograms with the band in which 95 % of the bars of a calibrated posterior lie."""
     from matplotlib.figure import Figure
@@ -133,7 +129,7 @@ def draw(ranks: Ranks, title: str, picture: Path) -> None:
     axes.plot([0.0, 1.0], [0.0, 1.0], color="0.6")
     axes.errorbar(said, hit, error, fmt="o", color="tab:orange", markersize=4)
     axes.set(xlabel="probability of the likeliest set", ylabel="share of them that is true")
-    wrong = calibration_error(ranks.believed, ranks.right)
+    wrong = binned_calibration_error(ranks.believed, ranks.right, _BELIEFS)
     axes.set_title(f"expected calibration error {wrong:.3f}", fontsize=9)
     figure.savefig(picture, dpi=110)
 
@@ -162,7 +158,7 @@ def main() -> None:
     draw(whole, f"{unit.name}: the network alone, {count:,} machines", given.picture)
     for name in ("ratio", "size", "error"):
         print(f"{name}: 95 % intervals hold {100.0 * coverage(getattr(whole, name)):.1f} %")
-    wrong = calibration_error(whole.believed, whole.right)
+    wrong = binned_calibration_error(whole.believed, whole.right, _BELIEFS)
     print(f"sets: expected calibration error {wrong:.3f} over {count} machines")
 
 

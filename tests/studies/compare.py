@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 SURE = 0.95
@@ -111,14 +112,24 @@ def score(truths: Mapping[str, Any], answers: Mapping[str, Any]) -> dict[str, st
 
 
 def calibration_error(firsts: Sequence[tuple[tuple[list[str], float], list[str]]]) -> float:
-    """Expected calibration error over bins of the first set's probability (Naeini et al. 2015)."""
-    total, error = len(firsts), 0.0
-    for low, high in zip(_BINS[:-1], _BINS[1:], strict=True):
-        part = [(first == true, p) for (first, p), true in firsts if low <= p < high]
-        if part:
-            hits, beliefs = zip(*part, strict=True)
-            error += len(part) / total * abs(np.mean(hits) - np.mean(beliefs))
-    return float(error) if total else math.nan
+    """Expected calibration error of the first set's probability; NaN of no answers."""
+    believed = np.array([p for (_, p), _ in firsts])
+    right = np.array([first == true for (first, _), true in firsts], dtype=bool)
+    return binned_calibration_error(believed, right, _BINS)
+
+
+def binned_calibration_error(
+    believed: NDArray[np.float64], right: NDArray[np.bool_], edges: Sequence[float]
+) -> float:
+    """Expected calibration error over bins of belief (Naeini et al. 2015); NaN of no answers."""
+    if not len(believed):
+        return math.nan
+    bins = np.searchsorted(np.asarray(edges)[1:-1], believed, side="right")
+    apart = [
+        abs(right[bins == one].mean() - believed[bins == one].mean()) * np.mean(bins == one)
+        for one in np.unique(bins)
+    ]
+    return float(np.sum(apart))
 
 
 def mcnemar(truths: Mapping[str, Any], one: Mapping[str, Any], other: Mapping[str, Any]) -> str:

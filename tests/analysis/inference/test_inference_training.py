@@ -3,7 +3,8 @@ from shutil import copytree
 
 import numpy as np
 import pytest
-from studies.calibration import calibration_error, coverage, ranks_of
+from studies.calibration import coverage, ranks_of
+from studies.compare import binned_calibration_error
 from worlds.untrained import SIZE, SIZE_STD, Untrained
 
 from analysis.inference.checkpoint import read_checkpoint
@@ -148,6 +149,7 @@ def test_intervals_that_are_too_narrow_are_seen():
     ranks = np.random.default_rng(1).uniform(size=20_000)
     assert coverage(ranks) == pytest.approx(0.95, abs=0.006)
     assert coverage(np.round(ranks)) == 0.0
-    right = ranks < 0.6
-    assert calibration_error(np.full(20_000, 0.6), right) < 0.02
-    assert calibration_error(np.full(20_000, 0.9), right) == pytest.approx(0.3, abs=0.02)
+    right, edges = ranks < 0.6, (0.0, 0.5, 1.0)
+    assert binned_calibration_error(np.full(20_000, 0.6), right, edges) < 0.02
+    too_sure = binned_calibration_error(np.full(20_000, 0.9), right, edges)
+    assert too_sure == pytest.approx(0.3, abs=0.02)
