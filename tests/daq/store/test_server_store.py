@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+import sqlalchemy as sa
 from hypothesis import given
 from hypothesis import strategies as st
 from worlds.postgres_server import PASSWORD, SHOWN
@@ -19,6 +20,7 @@ from daq.plan import SweepPlan
 from daq.servers.place import HistoryServer, parse_place
 from daq.session.bench_lock import BenchLock
 from daq.store import Store
+from daq.store.tables import units
 from daq.store_records import MeasurementHeader
 
 PLAN = SweepPlan((100.0, 110.0), (1.5,))
@@ -43,6 +45,30 @@ def test_two_benches_write_and_a_third_reads_what_is_committed(postgres_url):
         with pytest.raises(InputError, match="refused"):
             begin(reader)
         assert reader.count() == 2
+
+
+def test_a_server_and_a_file_hold_the_same_columns(tmp_path, postgres_url):
+    """Each has a layout of its own, and one description of the columns serves both."""
+    with Store(tmp_path / "bench.db", create=True), Store(postgres_url, create=True):
+        pass
+    described = {name: set(table.columns.keys()) for name, table in units.metadata.tables.items()}
+    assert len(described) == 10
+
+    def columns(url, schema=None):
+        """Whether each column may be empty, by table."""
+        engine = sa.create_engine(url)
+        found = sa.inspect(engine)
+        held = {
+            table: {c["name"]: c["nullable"] and c["name"] != "id" for c in columns}
+            for (_, table), columns in found.get_multi_columns(schema).items()
+        }
+        engine.dispose()
+        return held
+
+    server = columns(sa.make_url(postgres_url).set(drivername="postgresql+psycopg"), "lashbench")
+    del server["layout"]
+    assert server == columns(f"sqlite:///{tmp_path / 'bench.db'}")
+    assert {table: set(held) for table, held in server.items()} == described
 
 
 def test_histories_that_are_begun_at_once_are_one(postgres_url):
