@@ -31,10 +31,16 @@ def main() -> int:
         if _shows_front_page(sys.argv[1:]):
             return 0
         from tui.cli import main as run
+
+        code = run()
     except KeyboardInterrupt:
         sys.stderr.write("error: interrupted\n")
-        return INTERRUPTED
-    return run()
+        code = INTERRUPTED
+    if code == INTERRUPTED:
+        # An interrupt that met code made of text, as methods of a dataclass are, ends the process
+        # by a signal though it was caught. CPython takes that back when it next runs such code.
+        exec("")
+    return code
 
 
 def _shows_front_page(words: list[str]) -> bool:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from daq.configs import config_path
 from tui import entry
 
 ROOT = Path(entry.__file__).parents[1]
@@ -123,3 +124,16 @@ def test_a_package_of_another_distribution_is_told_in_one_line(tmp_path, name, w
     assert (run.returncode, run.stdout) == (2, "")
     assert run.stderr.count("\n") == 1
     assert f"another distribution owns the package '{name}' ({foreign}" in run.stderr
+
+
+def test_an_interrupt_that_meets_code_made_of_text_ends_with_its_exit_code(tmp_path):
+    """Methods of dataclasses are such; Python would end by the signal though it was caught."""
+    shutil.copy(config_path("units", "adss"), tmp_path / "unit.toml")
+    with (tmp_path / "unit.toml").open("a") as file:
+        file.write('\n[own_effects]\nfiles = ["met.py"]\n')
+    (tmp_path / "met.py").write_text('exec("raise KeyboardInterrupt")\n')
+    words = ["new-unit", "--check", str(tmp_path / "unit.toml"), "--trust-effects"]
+    ended = subprocess.run(
+        [sys.executable, "-m", "tui.cli", *words], capture_output=True, text=True
+    )
+    assert (ended.returncode, ended.stderr) == (130, "error: interrupted\n")
