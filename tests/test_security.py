@@ -54,9 +54,9 @@ def test_nothing_in_the_package_can_run_what_it_reads():
 
 @pytest.mark.parametrize(
     "source",
-    ["import pickle", "from pickle import loads", "eval(x)", "exec(x)", "exec('x')", "exec('', x)", "np.load(f)",
-     "os.system(x)",
-     "subprocess.run(x, shell=True)", "np.load(f, allow_pickle=True)"],
+    ["import pickle", "from pickle import loads", "eval(x)", "exec(x)", "exec('x')", "exec('', x)",
+     "np.load(f)", "os.system(x)", "subprocess.run(x, shell=True)",
+     "np.load(f, allow_pickle=True)"],
 )  # fmt: skip
 def test_what_could_is_found(source):
     assert dangers(source)

@@ -64,6 +64,15 @@ class TcpLink:
         opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._socket = opened
 
+    @property
+    def ends(self) -> tuple[str, str]:
+        """Numeric addresses of this machine and of the other side."""
+        connection = self._open()
+        try:
+            return str(connection.getsockname()[0]), str(connection.getpeername()[0])
+        except OSError as error:
+            raise self._lost(error) from error
+
     def send(self, data: bytes, deadline: Deadline) -> None:
         """Send all bytes, or raise `LinkError` or `BenchTimeout`."""
         connection = self._open()

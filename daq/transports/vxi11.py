@@ -1,4 +1,4 @@
-"""An instrument behind a VXI-11 gateway: messages, status byte, clear, and the abort channel.
+"""An instrument behind a VXI-11 gateway: messages, status byte, clear, abort, service requests.
 
 Owns links and calls of VXI-11 (revision 1.0). The Python back end of VISA has such a client, which
 cannot abort and takes a gateway that hung up for an instrument that is silent. It speaks no SCPI.
@@ -22,13 +22,16 @@ from daq.transports.rpc import (
     parse_reply,
     words,
 )
+from daq.transports.vxi11_interrupts import PROGRAM, InterruptServer
 
 __all__ = ["Vxi11Transport", "open_vxi11"]
 
 _CORE, _ABORT_PROGRAM = 0x0607AF, 0x0607B0
 _ABORT = 1
 _CREATE, _WRITE, _READ, _STATUS, _CLEAR, _DESTROY = 10, 11, 12, 13, 15, 23
-_NOT_SUPPORTED, _LOCKED, _IO_TIMEOUT, _ABORTED = 8, 11, 15, 23
+_ENABLE_REQUESTS, _CONNECT_BACK = 20, 25
+_OVER_TCP, _HANDLE = 0, b"lashbench"
+_NOT_ESTABLISHED, _NOT_SUPPORTED, _LOCKED, _IO_TIMEOUT, _ABORTED = 6, 8, 11, 15, 23
 _END, _ENDED = 8, 4
 _PORT_MAPPER_PORT, _GET_PORT, _TCP = 111, 3, 6
 _GRACE_S = 1.0
@@ -36,7 +39,16 @@ _GRACE_S = 1.0
 _ABORT_S = 1.0
 _CHUNK_BYTES = 20 * 1024
 _LEAST_CHUNK = 64
-_POLL_WORDS, _CLEAR_WORDS = "serial poll", "device clear"
+_POLL_WORDS, _CLEAR_WORDS, _REQUEST_WORDS = "serial poll", "device clear", "service requests"
+
+
+_OPTIONAL = {
+    _STATUS: (_NOT_SUPPORTED,),
+    _CLEAR: (_NOT_SUPPORTED,),
+    _CONNECT_BACK: (_NOT_SUPPORTED, _NOT_ESTABLISHED),
+    _ENABLE_REQUESTS: (_NOT_SUPPORTED,),
+}
+"""Errors that say that a gateway lacks an operation, by the operation."""
 
 
 class _Silent(Exception):
@@ -136,6 +148,7 @@ class Vxi11Transport(MessageReader):
         self._longest = max(_LEAST_CHUNK, min(longest, _CHUNK_BYTES))
         self.lacks: list[str] = []
         """What this gateway turned out not to have, in words."""
+        self._interrupts: InterruptServer | None = None
 
     def write(self, line: str, deadline: Deadline) -> None:
         """Send one message, line feed and end included."""
@@ -164,6 +177,22 @@ class Vxi11Transport(MessageReader):
         """
         return self._if_there_is(_CLEAR_WORDS, _CLEAR, deadline) is not None
 
+    def wait_for_service(self, deadline: Deadline) -> bool:
+        """Wait until the instrument requests service; False if it did not by the deadline.
+
+        The first call makes the interrupt channel. A gateway without one is noted in `lacks`, and
+        the answer is False at once; poll then.
+        """
+        if self._interrupts is None and _REQUEST_WORDS not in self.lacks:
+            self._call_back(deadline)
+        if self._interrupts is None:
+            return False
+        try:
+            return self._interrupts.wait(deadline) is not None
+        except LinkError as error:
+            self._waiting = _REQUEST_WORDS
+            raise self._lost(str(error)) from error
+
     def pause(self, seconds: float) -> None:
         """Sleep."""
         time.sleep(seconds)
@@ -173,8 +202,29 @@ class Vxi11Transport(MessageReader):
         with suppress(LashbenchError, _Silent, ValueError):
             self._channel.call(_CORE, _DESTROY, words(self._link), Deadline.after(_ABORT_S))
         self._channel.link.close()
+        if self._interrupts is not None:
+            self._interrupts.close()
 
     # Inside
+
+    def _call_back(self, deadline: Deadline) -> None:
+        """Let the gateway connect to this machine and tell it of service requests."""
+        self._waiting = _REQUEST_WORDS
+        here, there = self._channel.link.ends
+        server = InterruptServer(here, there)
+        try:
+            host, port = server.place
+            call = words(host, port, PROGRAM, 1, _OVER_TCP)
+            self._done(_CONNECT_BACK, call, deadline)
+            self._done(_ENABLE_REQUESTS, words(self._link, 1) + opaque(_HANDLE), deadline)
+        except _Refused:
+            server.close()
+            self.lacks.append(_REQUEST_WORDS)
+            return
+        except BaseException:
+            server.close()
+            raise
+        self._interrupts = server
 
     def _message(self, deadline: Deadline) -> bytes:
         """One message, up to its own end."""
@@ -226,7 +276,7 @@ class Vxi11Transport(MessageReader):
             raise self._lost(str(fault)) from fault
         if error == 0:
             return result
-        if error == _NOT_SUPPORTED and procedure in (_STATUS, _CLEAR):
+        if error in _OPTIONAL.get(procedure, ()):
             raise _Refused
         if error == _LOCKED:
             raise LinkError(

@@ -1,8 +1,8 @@
 """A VXI-11 gateway as its specification (VXI-11, revision 1.0) describes the server.
 
-Owns links, locks, time-outs and the abort channel. A read or write that the bus does not finish is
-waited for as long as the client allowed, and ended by an abort. There is no interrupt channel:
-enabling service requests is answered with error 8, as by several gateways.
+Owns links, locks, time-outs, the abort channel and service requests. A read or write that the bus
+does not finish is waited for as long as the client allowed, and ended by an abort. An interrupt
+channel goes to the machine of the client alone, over TCP; any other is not established.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from daq.transports.rpc import (
     refused,
 )
 from daq.transports.rpc import words as packed
+from sim.gateways.interrupts import NOT_ESTABLISHED, InterruptChannel, channel_to
 from sim.instrument.bus import Instrument, TalkState
 from sim.instrument.server_endpoints import Client
 
@@ -31,7 +32,8 @@ __all__ = ["AbortClient", "CoreClient", "Vxi11Gateway"]
 
 CORE, ABORT = 0x0607AF, 0x0607B0
 _NO_ERROR, _INVALID_LINK, _NOT_SUPPORTED = 0, 4, 8
-_LOCKED, _NO_LOCK, _IO_TIMEOUT, _ABORTED = 11, 12, 15, 23
+_LOCKED, _NO_LOCK, _IO_TIMEOUT, _ABORTED, _ESTABLISHED_BEFORE = 11, 12, 15, 23, 29
+_LONGEST_HANDLE = 40
 _WAIT_LOCK, _END, _TERMCHAR = 1, 8, 128
 _REQUEST_COUNT, _CHARACTER, _ENDED = 1, 2, 4
 _LONGEST_WRITE = 4096
@@ -43,6 +45,10 @@ class Link:
 
     number: int
     aborted: bool = False
+    handle: bytes | None = None
+    """What the client wants to be told with a service request; None where it wants none."""
+    requested: bool = False
+    """Whether it has been told of the request that is pending."""
 
 
 _Work = Iterator[bytes | None]
@@ -163,11 +169,26 @@ class CoreClient(_RpcClient):
     def __init__(self, wire: socket.socket, gateway: Vxi11Gateway) -> None:
         super().__init__(wire, gateway)
         self._own: list[Link] = []
+        self._interrupts: InterruptChannel | None = None
+
+    def work(self, now_s: float) -> None:
+        """Go on with the calls, and tell of a service request, once."""
+        super().work(now_s)
+        asks = self._gateway.instrument.service_request
+        for link in self._own:
+            if self._interrupts is not None and link.handle is not None:
+                if asks and not link.requested:
+                    self._interrupts.request_service(link.handle)
+                link.requested = asks
+        if self._interrupts is not None:
+            self._interrupts.flush()
 
     def close(self) -> None:
-        """Let go of the connection and of its links."""
+        """Let go of the connection, of its links and of its interrupt channel."""
         for link in self._own:
             self._gateway.drop(link)
+        if self._interrupts is not None:
+            self._interrupts.close()
         super().close()
 
     def _procedure(self, number: int) -> Callable[[Arguments], _Work] | None:
@@ -182,8 +203,8 @@ class CoreClient(_RpcClient):
             return lambda given: self._generic(given, lambda: simple[number]() or b"")
         return {
             10: self._create, 11: self._write, 12: self._read, 13: self._status, 18: self._lock,
-            19: self._unlock, 20: self._unsupported, 22: self._command, 23: self._destroy,
-            25: self._unsupported, 26: self._unsupported,
+            19: self._unlock, 20: self._enable, 22: self._command, 23: self._destroy,
+            25: self._connect, 26: self._disconnect,
         }.get(number)  # fmt: skip
 
     # ------------------------------------------------------------ links and locks
@@ -349,5 +370,26 @@ class CoreClient(_RpcClient):
     def _command(self, given: Arguments) -> _Work:
         return iter([packed(_NOT_SUPPORTED) + opaque(b"")])
 
-    def _unsupported(self, given: Arguments) -> _Work:
-        return iter([packed(_NOT_SUPPORTED)])
+    # ------------------------------------------------------------ service requests
+
+    def _enable(self, given: Arguments) -> _Work:
+        link, enabled, handle = self._link(given), given.whole(), given.bytes()
+        if len(handle) > _LONGEST_HANDLE:
+            raise ValueError("a handle has 40 bytes at most")
+        if link is None:
+            return iter([packed(_INVALID_LINK)])
+        link.handle, link.requested = handle if enabled else None, False
+        return iter([packed(_NO_ERROR)])
+
+    def _connect(self, given: Arguments) -> _Work:
+        if self._interrupts is not None and not self._interrupts.closed:
+            return iter([packed(_ESTABLISHED_BEFORE)])
+        self._interrupts, error = channel_to(self.wire.getpeername()[0], given)
+        return iter([packed(error)])
+
+    def _disconnect(self, given: Arguments) -> _Work:
+        channel, self._interrupts = self._interrupts, None
+        if channel is None:
+            return iter([packed(NOT_ESTABLISHED)])
+        channel.close()
+        return iter([packed(_NO_ERROR)])

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import random
 import signal
 import sys
 import time
@@ -59,6 +60,8 @@ def main() -> int:
         cases = [case for case in cases if case.driver == given.driver]
     if given.wire is not None:
         cases = [case for case in cases if case.wire == given.wire]
+    # So a campaign that is ended early has been over every driver and wire.
+    random.Random(given.seed).shuffle(cases)
     # A shell's background job is started with Ctrl-C ignored, and so would be its programs.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     kept = ROOT / "build" / f"faults-{given.seed}.jsonl"

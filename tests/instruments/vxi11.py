@@ -53,7 +53,7 @@ class Vxi11Instrument:
         return accepted + self._procedure(procedure, body)
 
     def _procedure(self, procedure: int, body: bytes) -> bytes:
-        if error := self.errors.get(procedure):
+        if (error := self.errors.get(procedure)) is not None:
             return struct.pack(">2I", error, 0)[: 4 if procedure == CLEAR else 8]
         if procedure == CREATE_LINK:
             return struct.pack(">4I", 0, 7, self.abort_port, 1024)

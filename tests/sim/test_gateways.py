@@ -18,11 +18,13 @@ from daq.plan import spaced_frequencies
 from daq.transports.base import Deadline, ask
 from daq.transports.hislip import HEADER, Kind, packed
 from daq.transports.open import open_transport
-from daq.transports.rpc import Records, opaque, packed_call, parse_reply, words
+from daq.transports.rpc import Records, opaque, packed_call, parse_call, parse_reply, words
 from sim.instrument.plant import LinearPlant
 
 CORE, ABORT = 0x0607AF, 0x0607B0
 CREATE, WRITE, READ, STATUS, CLEAR, LOCK, UNLOCK, DESTROY = 10, 11, 12, 13, 15, 18, 19, 23
+ENABLE, CONNECT, DISCONNECT = 20, 25, 26
+LOCALHOST = 0x7F000001
 HZ = spaced_frequencies(120.0, 160.0, 11)
 
 
@@ -201,6 +203,55 @@ def test_a_vxi11_lock_ends_with_its_owner(wires):
             time.sleep(0.02)
         assert two.write(second, b"*CLS\n") == 0
         assert two.write(first, b"*CLS\n") == 4  # a link that is gone
+
+
+def test_vxi11_tells_of_a_service_request_over_its_interrupt_channel(wires):
+    with served(box(), "vxi11") as url, socket.create_server(("127.0.0.1", 0)) as listener:
+        listener.settimeout(5.0)
+        port = listener.getsockname()[1]
+        caller = Caller(wires(place(url)))
+        link, _ = caller.linked()
+        assert caller.call(DISCONNECT, b"").whole() == 6
+        for host, program, family, error in (
+            (0x08080808, 0x0607B1, 0, 6),  # another machine than the client's
+            (LOCALHOST, 0x0607B1, 1, 8),  # UDP
+            (LOCALHOST, 0x0607B1, 0, 0),
+            (LOCALHOST, 0x0607B1, 0, 29),
+        ):
+            assert caller.call(CONNECT, words(host, port, program, 1, family)).whole() == error
+        wire, _ = listener.accept()
+        wire.settimeout(5.0)
+        told = Records()
+        with wire:
+            assert caller.call(ENABLE, words(link + 9, 1) + opaque(b"")).whole() == 4
+            assert caller.call(ENABLE, words(link, 1) + opaque(b"mine")).whole() == 0
+            for _ in range(2):
+                caller.write(link, b"*ESE 32;*SRE 32;*CLS;JUNK\n")
+                while (record := told.take()) is None:
+                    told.feed(wire.recv(4096))
+                call = parse_call(record)
+                assert (call.program, call.procedure) == (0x0607B1, 30)
+                assert call.arguments.bytes() == b"mine"
+                assert caller.call(STATUS, words(link, 0, 100, 500)).whole() == 0
+            assert caller.call(ENABLE, words(link, 0) + opaque(b"")).whole() == 0
+            caller.write(link, b"*CLS;JUNK\n")
+            wire.settimeout(0.2)
+            with pytest.raises(TimeoutError):
+                wire.recv(1)
+            assert caller.call(DISCONNECT, b"").whole() == 0
+            wire.settimeout(5.0)
+            assert wire.recv(1) == b""
+
+
+def test_service_is_waited_for_over_vxi11():
+    with served(box(), "vxi11") as url, closing(open_transport(url)) as transport:
+        assert not transport.wait_for_service(Deadline.after(0.05))
+        for _ in range(2):
+            transport.write("*ESE 32;*SRE 32;*CLS;JUNK", Deadline.after(2.0))
+            assert transport.wait_for_service(Deadline.after(5.0))
+            assert transport.serial_poll(Deadline.after(2.0)) == 96
+            assert not transport.wait_for_service(Deadline.after(0.05))
+        assert "35670A" in ask(transport, "*CLS;*IDN?", Deadline.after(5.0))
 
 
 class Hislip:

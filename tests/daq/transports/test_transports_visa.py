@@ -354,3 +354,15 @@ def test_a_call_that_a_gateway_does_not_end_is_aborted():
         assert transport.serial_poll(Deadline.after(1.0)) == 0
         transport.close()
     assert aborted == [(0x0607B0, 1, 7)]
+
+
+@pytest.mark.parametrize(("procedure", "error"), [(25, 8), (25, 6), (20, 8)], ids=str)
+def test_a_gateway_that_tells_of_no_service_request_is_polled(procedure, error):
+    device = Vxi11Instrument(instrument, status_byte=96)
+    device.errors = {25: 0, 20: 0} | {procedure: error}
+    with ByteServer(device.feed) as server:
+        transport = open_transport(f"TCPIP::127.0.0.1,{server.port}::inst0::INSTR")
+        assert not transport.wait_for_service(Deadline.after(5.0))
+        assert transport.lacks == ["service requests"]
+        assert transport.serial_poll(Deadline.after(1.0)) == 96
+        transport.close()
