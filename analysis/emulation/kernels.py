@@ -3,8 +3,8 @@
 Owns local regression over the runs near a place, the density of Student's t, and how datasheet
 values are leaned on. It lets other threads run beside it. What the numbers are is the surface's
 (`analysis.emulation.kernel_data` says in which form they come). A diagnosis asks for tens of
-thousands of places, so all of it is one compiled function at each; it shares a file because numba's
-cache on disk looks at this file alone to tell whether it is stale.
+thousands of places, so all of it is one compiled function at each. It has more than 400 lines since
+numba's cache on disk looks at one file alone to tell whether it is stale.
 """
 
 from __future__ import annotations

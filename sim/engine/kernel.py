@@ -107,6 +107,7 @@ class Program:
         self, layout: Layout, vectors: int, systems: int, fused: bool, architecture: str
     ) -> None:
         self._layout, self._structure = layout, layout.structure
+        self._whole, self._steady = not layout.structure.turning, layout.structure.steady
         self._all, self._of_each = range(vectors), vectors // systems
         self._beside = [self._all[v : v + _LAWS_BESIDE] for v in self._all[::_LAWS_BESIDE]]
         self._module = ir.Module()
@@ -346,14 +347,6 @@ class Program:
                 place = self._emit.mul(first, _INT(self._code.width))
                 self._emit.store(vector, self._vector_at(self._sums, place), align=VECTOR_BYTES)
             self._store("sums", k, self._code.constant(0.0, len(self._all)), self._all)
-
-    @property
-    def _whole(self) -> bool:
-        return not self._structure.turning
-
-    @property
-    def _steady(self) -> bool:
-        return self._structure.steady
 
     @contextmanager
     def _times(self, count: Any) -> Iterator[Any]:

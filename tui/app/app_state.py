@@ -33,10 +33,6 @@ class AppState(Host, Protocol):
         """Put a step on top, if what it needs is there; else say what is missing."""
         ...
 
-    def banner_text(self) -> str:
-        """Line of every screen: simulated or not, source, unit, measurement."""
-        ...
-
     def find_instruments(self) -> None:
         """List instruments beside the screen."""
         ...

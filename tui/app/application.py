@@ -144,18 +144,6 @@ class BenchApp(TerminalApp):
             return "no measurement yet: sweep first, or open one in step 7"
         return ""
 
-    def banner_text(self) -> str:
-        """Line that stands on every screen: simulated or not, source, unit, measurement."""
-        desk, run = self.desk, self.desk.run
-        parts = ["SIMULATED"] if desk.simulated else []
-        parts.append(run.source_text)
-        if desk.unit is not None:
-            parts.append(f"{desk.unit.name} {desk.serial}".strip())
-        if run.measurement is not None:
-            word = run.finished.state if run.finished is not None else run.phase
-            parts.append(f"#{run.measurement} {word} {run.done}/{run.total}")
-        return visible_line(" " + " | ".join(parts))
-
     # ------------------------------------------------------------ keys everywhere
 
     def stop_at_once(self) -> None:

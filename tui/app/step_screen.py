@@ -202,7 +202,7 @@ class StepScreen(Screen[None]):
         self.bench.undo.note()
         self.query_one("#step-bar", Words).update(_trail(self.STEP))
         banner = self.query_one("#banner", Words)
-        banner.update(self.bench.banner_text())
+        banner.update(self.desk.banner_text())
         source = self.desk.run.source
         alarm = source in (SourceState.UNCONFIRMED, SourceState.UNKNOWN)
         banner.set_class(source is SourceState.ON, "-driving")

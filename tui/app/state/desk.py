@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from daq.drivers import is_simulated
 from daq.errors import InputError
 from daq.servers.place import HistoryPlace
+from daq.untrusted.visible_text import visible_line
 from tui.app.run_view import RunView
 from tui.app.state.proposed_sweep import propose
 from tui.measure_options import PlanOptions
@@ -118,6 +119,18 @@ class Desk:
     def simulated(self) -> bool:
         """Whether the instrument is a simulated one, as far as is known."""
         return is_simulated(self.url) or (self.identity is not None and self.identity.simulated)
+
+    def banner_text(self) -> str:
+        """Line that stands on every screen: simulated or not, source, unit, measurement."""
+        run = self.run
+        parts = ["SIMULATED"] if self.simulated else []
+        parts.append(run.source_text)
+        if self.unit is not None:
+            parts.append(f"{self.unit.name} {self.serial}".strip())
+        if run.measurement is not None:
+            word = run.finished.state if run.finished is not None else run.phase
+            parts.append(f"#{run.measurement} {word} {run.done}/{run.total}")
+        return visible_line(" " + " | ".join(parts))
 
     def choose_unit(self, name: str) -> Unit:
         """Put a unit on the desk, with the sweep that goes with it.
