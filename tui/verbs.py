@@ -45,7 +45,7 @@ VERBS = {
         "Write a page that lists a history and its reports.",
     ),
     "new-unit": ("tui.commands.new_unit:new_unit", "Write a unit file to fill in, or check one."),
-    "serve": ("tui.commands.serve:serve", "Serve a simulated 35670A, SR785 or sampled bench."),
+    "serve": ("tui.commands.serve:serve", "Serve a simulated instrument."),
     "demo": ("tui.commands.demo:demo", "Do the whole job without hardware."),
     "bench": ("tui.commands.bench:bench", "Open the bench screen; so does no verb at all."),
     "replay": ("tui.commands.stored.replay:replay", "Show a recorded session as it ran."),

@@ -25,13 +25,10 @@ from sim.loopback import Loopback
 from sim.models import models
 
 ROOT = Path(daq.__file__).parents[1]
-INSTRUMENTS = (
-    "daq.hp35670a",
-    "daq.sr785",
-    "daq.sampled",
-    "sim.analyser35670a",
-    "sim.sr785",
-    "sim.sampled",
+INSTRUMENTS = tuple(
+    f"{place.parent.parent.name}.{place.parent.name}"
+    for entry in ("daq/*/driver.py", "sim/*/model.py")
+    for place in ROOT.glob(entry)
 )
 """How modules of instruments begin."""
 

@@ -40,6 +40,8 @@ _MEDDLING = {"": (
     b"SOUR:NOW?", b"*ESR?", b"\xff\x00garbage", b"SOUR:VOLT 0", b"SOUR:OFFS 0",
 )}  # fmt: skip
 """What another program may say to the instrument of each driver."""
+_ANY = (b"*IDN?", b"*RST", b"*CLS", b"*ESR?", b"*SRE 255", b"\xff\x00garbage", b"?", b"*OPC")
+"""The same, to one of which nothing is known."""
 
 
 class Beside:
@@ -64,7 +66,7 @@ class Beside:
         self._start_second = start_second
         self._wrong = wrong
         self._delay_s = case.delay_s
-        self._meddling = _MEDDLING[case.driver]
+        self._meddling = _MEDDLING.get(case.driver, _ANY)
         self._chance = random.Random(case.seed)
         self._over = threading.Event()
         self.child: Child | None = None

@@ -20,6 +20,9 @@ import time
 from collections.abc import Callable
 from contextlib import closing, suppress
 from datetime import UTC, datetime, timedelta
+from functools import partial
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +44,8 @@ from tui.measure_options import PlanOptions, session_request
 from tui.signals import listening
 
 BUSY_S = 1.0
+_SHORT = {"_BUDGET_S": 4.0, "_RESET_S": 4.0}
+_SHORT_TIMING = {"reply_s": 1.0, "block_s": 1.5, "overhead_s": 3.0, "point_s": 0.1}
 SOCKET = "freezer"
 """Where a program hands its file system over to whoever may freeze it."""
 _SIGNALS = {
@@ -188,22 +193,26 @@ def options(points: int) -> PlanOptions:
 
 def shorten_waits() -> None:
     """The same outcomes as with the driver's own limits, sooner."""
-    import daq.hp35670a.analyser
-    import daq.hp35670a.safe
-    import daq.hp35670a.setup
-    import daq.sr785.analyser
-    import daq.sr785.safe
-    import daq.sr785.setup
     import daq.store.file
 
-    short = {"reply_s": 1.0, "block_s": 1.5, "overhead_s": 3.0}
-    timing = daq.hp35670a.setup.Timing
-    daq.hp35670a.analyser.Timing = lambda: timing(**short)
-    daq.hp35670a.safe._BUDGET_S = 4.0
-    other = daq.sr785.setup.Timing
-    daq.sr785.analyser.Timing = lambda: other(**short, point_s=0.1)
-    daq.sr785.safe._BUDGET_S = daq.sr785.safe._RESET_S = 4.0
+    for entry in Path(daq.__file__).parent.glob("*/driver.py"):
+        _shorten_those_of(f"daq.{entry.parent.name}")
     daq.store.file._BUSY_S = BUSY_S
+
+
+def _shorten_those_of(room: str) -> None:
+    """Of one driver, where it has its limits under the names that the others have."""
+    for part in ("analyser", "safe"):
+        if find_spec(f"{room}.{part}") is None:
+            continue
+        module = import_module(f"{room}.{part}")
+        for name, value in _SHORT.items():
+            if hasattr(module, name):
+                setattr(module, name, value)
+        if timing := getattr(module, "Timing", None):
+            own = timing.__dataclass_fields__
+            chosen = {name: value for name, value in _SHORT_TIMING.items() if name in own}
+            module.Timing = partial(timing, **chosen)
 
 
 def replace_instrument(instrument: Any) -> None:

@@ -63,9 +63,9 @@ def serve(
     prologix_pty
         A Prologix-style adapter on a pseudo-terminal.
     serial_pty
-        The instrument's own RS-232 on a pseudo-terminal, where it has one (SR785).
+        The instrument's own RS-232 on a pseudo-terminal, where it has one.
     model
-        What is simulated: 35670A, SR785, or SAMPLED for the converter of a sampled bench.
+        Which instrument, such as SR785 or SAMPLED; a name that is unknown lists those there are.
     speed
         By the clock, or as fast as it can be computed.
     fault

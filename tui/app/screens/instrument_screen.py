@@ -16,6 +16,7 @@ from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
 from textual.widgets.option_list import Option
 
+from daq.drivers import DRIVERS
 from daq.errors import LashbenchError
 from daq.untrusted.visible_text import visible_line
 from tui.app.messages import InstrumentsListed
@@ -34,11 +35,14 @@ _SIMULATED = (
 )
 _SECRETS = 10_000
 """Seeds of what a simulated bench hides; another one whenever the screen is opened."""
+_OTHERS = tuple(driver for driver in DRIVERS if driver.scheme)
+"""Instruments whose address does not stand alone."""
+_BEFORE = ", or ".join(f"{one.scheme}: for {one.name}" for one in _OTHERS)
 _REMEDIES = (
     "What to try:",
     "- the simulated bench needs nothing: choose it above",
     "- power, cable and address of the analyser; its front panel shows the address",
-    "- an SR785 needs sr785: before its address",
+    *(f"- {one.name}: write {one.scheme}: before its address" for one in _OTHERS),
     "- a serial adapter needs the right to use its port: group dialout",
     "- a simulated one on a wire: lashbench serve --unit adss --ratio 0.3 --tcp 0",
 )
@@ -48,12 +52,11 @@ class InstrumentScreen(StepScreen):
     """Simulated, found, or typed."""
 
     STEP = 2
-    HELP = """
+    HELP = f"""
 Choose where the analyser is and press Enter: a simulated bench, a port or resource that was
 found on this machine, or an address that you type, such as TCPIP::192.0.2.7::5025::SOCKET,
 GPIB0::11::INSTR, prologix:/dev/ttyUSB0?addr=11 or prologix-tcp:HOST:PORT?addr=11. These are for a
-35670A. For an SR785 write sr785: before any of them, as in sr785:GPIB0::10::INSTR, or give its
-own serial port: sr785:serial:/dev/ttyUSB0?baud=9600.
+35670A. Before any of them write {_BEFORE}.
 
 One simulated bench hides a cause: its address does not tell which. Measure it, diagnose it, and
 press H in step 6 to see what it was.
