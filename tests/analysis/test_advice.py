@@ -61,20 +61,20 @@ def diagnosed(verdict, *models):
         ((0.3, 0.5), "Neither stage stands out: 40 %"),
     ],
 )
-def test_a_stage_is_named_only_where_the_whole_interval_is_on_its_side(interval, said):
+def test_stage_is_named_only_by_whole_interval(interval, said):
     advice = advise(accept_model(estimated(*interval)), ADSS)
     assert advice.headline.startswith(said)
     assert "by the plain model, not judged yet" in advice.headline
 
 
-def test_an_interval_that_is_not_stated_is_two_standard_deviations():
+def test_unstated_interval_is_two_standard_deviations():
     document = estimated(0.3, 0.4) | {"contribution_ratio": {"value": 0.61, "std": 0.05}}
     assert advise(accept_model(document)).headline.startswith("Adjust stage 1 first")
     document["contribution_ratio"] = {"value": 0.59, "std": 0.05}
     assert advise(accept_model(document)).headline.startswith("Neither stage")
 
 
-def test_the_model_that_is_accepted_is_followed_and_not_the_estimate():
+def test_advice_follows_accepted_model_not_estimate():
     """The estimate of practice-06 points at stage 1, and its diagnosis at stage 2."""
     refuted = estimated(0.53, 0.67, refuted=True)
     before = advise(accept_model(refuted), ADSS)
@@ -97,7 +97,8 @@ def test_the_model_that_is_accepted_is_followed_and_not_the_estimate():
         (None, diagnosed("ambiguous")),
     ],
 )
-def test_without_a_model_no_stage_is_adjusted_passed_or_failed(unit, estimate, diagnosis):
+def test_missing_model_gives_no_stage_verdict(unit, estimate, diagnosis):
+    """No stage is adjusted, passed or failed."""
     advice = advise(accept_model(estimate, diagnosis), unit)
     assert advice.headline.startswith("No advice")
     assert {stage.verdict for stage in advice.stages} <= {None, "UNDECIDED"}
@@ -117,14 +118,14 @@ def test_without_a_model_no_stage_is_adjusted_passed_or_failed(unit, estimate, d
         ("consistent", [(0.4, 0.6), (0.45, 0.7, "a")], "Neither stage stands out: 40 to 70 %"),
     ],
 )
-def test_of_several_models_all_must_agree_on_the_stage(verdict, models, said):
+def test_all_models_must_agree_on_stage(verdict, models, said):
     document = diagnosed(verdict, *(model(*one) for one in models))
     advice = advise(accept_model(None, document), ADSS)
     assert advice.headline.startswith(said)
     assert advice.headline.startswith("Undecided") == ("plain model" in advice.headline)
 
 
-def test_without_limits_the_greatest_value_there_can_be_is_named():
+def test_stage_without_limit_states_largest_value():
     answer = accept_model(estimated(0.2, 0.4))
     lines = [stage.line for stage in advise(answer, ADSS).stages]
     assert lines[0].endswith("no limit set, all of it would be 0.6930 deg.")
@@ -141,7 +142,7 @@ def test_without_limits_the_greatest_value_there_can_be_is_named():
         ((0.19, 0.30), "UNDECIDED"), ((0.21, 0.30), "FAIL"),
     ],
 )  # fmt: skip
-def test_a_limit_is_passed_or_failed_only_with_the_whole_interval(span, verdict):
+def test_limit_is_decided_by_whole_interval(span, verdict):
     def b1(*found):
         models = [{**model(0.1, 0.2), "b1_deg": number(sum(s) / 2, *s)} for s in found]
         document = diagnosed("explained" if len(models) == 1 else "ambiguous", *models)
@@ -173,7 +174,7 @@ def test_advice_and_judgement_decide_one_limit_alike(spans, limit, k, doubt):
     assert not doubt or set(decided.values()) == {"UNDECIDED"}
 
 
-def test_a_stage_is_held_to_the_limit_of_its_unit():
+def test_stage_is_compared_with_unit_limit():
     unit, estimate = with_limits(b1_deg=0.03), estimated(0.1, 0.2)
     other = LimitSet("other", Acceptance.model_validate({"b2_deg": {"upper": 1.0}}))
     judgement = judge(other, estimate=estimate)
@@ -181,7 +182,7 @@ def test_a_stage_is_held_to_the_limit_of_its_unit():
     assert [stage.verdict for stage in advice.stages] == ["FAIL", "PASS"]
 
 
-def test_a_wider_guard_band_leaves_a_stage_undecided():
+def test_wider_guard_band_leaves_stage_undecided():
     content = with_limits(b1_deg=0.2).model_dump(by_alias=True)
     content["acceptance"] = {"coverage_factor": 3.0, "b2_deg": {"upper": 1.0}}
     answer = accept_model(estimated(0.2, 0.28))
@@ -189,7 +190,7 @@ def test_a_wider_guard_band_leaves_a_stage_undecided():
     assert advise(answer, unit_from_mapping(content, "test")).stages[0].verdict == "UNDECIDED"
 
 
-def test_a_doubted_response_passes_and_fails_no_stage():
+def test_doubtful_response_passes_and_fails_no_stage():
     answer = accept_model(estimated(0.1, 0.2))
     advice = advise(answer, with_limits(0.03, 0.066), doubt="the gain looks halved")
     assert [stage.verdict for stage in advice.stages] == ["UNDECIDED", "UNDECIDED"]
@@ -205,7 +206,7 @@ def test_a_doubted_response_passes_and_fails_no_stage():
         ("explained", "load-inertia", "Adjust stage 1 first"),
     ],
 )
-def test_a_measuring_chain_that_is_off_comes_before_the_gears(verdict, first, said):
+def test_wrong_measuring_chain_precedes_gear_advice(verdict, first, said):
     document = diagnosed(verdict, model(0.7, 0.8, first), model(0.7, 0.9, "load-inertia"))
     lines = advise(accept_model(None, document), ADSS).lines()
     assert lines[0].startswith(said)
@@ -226,7 +227,7 @@ def test_limits_decide_and_not_the_ratio():
     assert undecided.startswith("Undecided: stage 1 UNDECIDED; stage 2 PASS.")
 
 
-def test_limits_are_not_decided_where_the_models_left_disagree():
+def test_disagreeing_models_leave_limits_undecided():
     document = diagnosed("ambiguous", model(0.1, 0.2, "a"), model(0.8, 0.9))
     advice = advise(accept_model(None, document), with_limits(0.3, 0.066))
     assert [stage.verdict for stage in advice.stages] == ["UNDECIDED", "PASS"]
@@ -238,7 +239,7 @@ limits = st.one_of(st.none(), st.floats(0, 1))
 
 
 @given(st.lists(spans, min_size=1, max_size=3), limits, limits)
-def test_the_headline_never_contradicts_the_lines_of_the_stages(ratios, b1, b2):
+def test_headline_agrees_with_stage_lines(ratios, b1, b2):
     models = [model(low, high, *"a" * n) for n, (low, high) in enumerate(ratios)]
     document = diagnosed("explained" if len(models) == 1 else "ambiguous", *models)
     advice = advise(accept_model(None, document), with_limits(b1, b2))
@@ -256,7 +257,7 @@ def test_the_headline_never_contradicts_the_lines_of_the_stages(ratios, b1, b2):
         assert asked.startswith("Adjust") == ("FAIL" in told.values())
 
 
-def test_one_gear_stage_holds_all_of_it_unless_its_model_does_not_fit():
+def test_single_stage_holds_all_if_model_fits():
     answer = accept_model(
         {
             "contribution_ratio": {"value": 1.0, "std": 0.0},

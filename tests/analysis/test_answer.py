@@ -65,7 +65,7 @@ def test_over_models_is_the_mixture_of_all():
     assert alone.over_models("contribution_ratio") is None
 
 
-def test_an_explained_diagnosis_replaces_the_estimate_it_refutes():
+def test_explained_diagnosis_replaces_refuted_estimate():
     answer = accept_model(
         estimated(0.6, warnings=WARNED), diagnosed("explained", model("load-inertia", ratio=0.17))
     )
@@ -75,14 +75,14 @@ def test_an_explained_diagnosis_replaces_the_estimate_it_refutes():
     assert answer.b_t_deg["value"] == 0.07
 
 
-def test_a_consistent_diagnosis_accepts_the_plain_model_by_its_own_numbers():
+def test_consistent_diagnosis_accepts_its_plain_model():
     answer = accept_model(estimated(0.6), diagnosed("consistent", model(ratio=0.58)))
     assert (answer.state, answer.source) == ("accepted", "plain model, consistent")
     assert answer.contribution_ratio["value"] == 0.58
 
 
 @pytest.mark.parametrize("estimate", [estimated(0.6), estimated(0.6, warnings=WARNED), None])
-def test_no_number_is_told_where_a_diagnosis_accepts_no_model(estimate):
+def test_diagnosis_without_accepted_model_gives_no_number(estimate):
     unexplained = accept_model(estimate, diagnosed("unexplained"))
     assert (unexplained.state, unexplained.numbers) == ("refuted", {})
     assert unexplained.source.endswith(": none")
@@ -99,13 +99,13 @@ def test_no_number_is_told_where_a_diagnosis_accepts_no_model(estimate):
     # Histories hold estimates of earlier versions, which say it in words alone.
     [{"refuted": True}, {"warnings": WARNED}, {"refuted": True, "warnings": WARNED}],
 )
-def test_a_refuted_plain_model_gives_no_number_before_a_diagnosis(refuted):
+def test_refuted_plain_model_gives_no_number(refuted):
     answer = accept_model(estimated(**refuted))
     assert (answer.state, answer.source) == ("refuted", "plain model refuted: none")
     assert (answer.contribution_ratio, answer.models, answer.diagnosed) == (None, (), False)
 
 
-def test_an_estimate_that_fits_is_told_as_not_judged():
+def test_fitting_estimate_is_marked_not_judged():
     answer = accept_model(estimated(0.6, refuted=False, warnings=["names unit EDSS"]))
     assert (answer.state, answer.source) == ("not judged", "plain model, not judged")
     assert answer.contribution_ratio["value"] == 0.6
@@ -144,7 +144,7 @@ diagnoses = st.fixed_dictionaries(
 
 
 @given(st.none() | parts, st.none() | diagnoses)
-def test_whatever_a_history_holds_it_is_an_answer_or_none(estimate, diagnosis):
+def test_any_stored_document_gives_answer_or_none(estimate, diagnosis):
     answer = accept_model(estimate, diagnosis)
     advice = advise(answer, load_unit("adss"))
     assert advice.headline

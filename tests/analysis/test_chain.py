@@ -35,7 +35,7 @@ def test_a_linear_servo_answers_in_proportion(upward):
     np.testing.assert_allclose(low, expected, rtol=1e-4)
 
 
-def test_the_direction_of_the_sweep_does_not_matter_to_a_linear_servo(upward):
+def test_sweep_direction_does_not_affect_linear_servo(upward):
     down = swept(direction="down", levels=(1.0,))
     np.testing.assert_allclose(down.gain, upward.gain[upward.source_vpk == 1.0], rtol=1e-6)
 
@@ -74,7 +74,7 @@ WITH_PLAY = SweepPlan((118.0, 138.0, 150.0), (1.5, 2.5), settle_cycles=15, integ
     [((*MECHANICAL, *FRICTION, "k_t"), 1.0), (ELECTRIC, 4.0)],
     ids=["torque", "voltage"],
 )
-def test_the_unit_of_torque_or_voltage_does_not_matter_even_with_play(names, levels, seed):
+def test_units_of_torque_and_voltage_cancel(names, levels, seed):
     """A power of two rounds nothing, so that not even chatter tells the two apart."""
     told = simulate(ADSS, 0.3, WITH_PLAY, seed=seed)
     plan = replace(WITH_PLAY, levels_vpk=tuple(levels * v for v in WITH_PLAY.levels_vpk))
@@ -83,7 +83,8 @@ def test_the_unit_of_torque_or_voltage_does_not_matter_even_with_play(names, lev
 
 
 @pytest.mark.parametrize(("limit", "near"), [(0.0, 1e-9), (1.0, 1.0 - 1e-9)])
-def test_with_all_play_in_one_stage_it_is_the_limit_of_nearly_all(limit, near):
+def test_one_stage_is_limit_of_uneven_shares(limit, near):
+    """All of the backlash in one stage gives the response of nearly all."""
     # Weakly driven: where it chatters, any change at all makes another motion.
     plan = replace(WITH_PLAY, levels_vpk=(1.5,))
     at, beside, other = (simulate(ADSS, r, plan, seed=1).gain for r in (limit, near, 1.0 - limit))
@@ -110,7 +111,7 @@ def read(f, gain, direction=None):
     return level
 
 
-def test_a_sweep_told_downward_is_read_the_same():
+def test_downward_sweep_is_read_alike():
     f = np.linspace(20, 110, 181)
     gain = pair(f)
     up, down = read(f, gain, "up"), read(f[::-1], gain[::-1], "down")

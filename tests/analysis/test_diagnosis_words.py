@@ -47,7 +47,8 @@ def line(found, start):
     return one.removeprefix(f"  {start}: ")
 
 
-def test_chain_or_mechanics_is_told_by_all_that_is_judged(explained):
+def test_site_probability_sums_all_judged_models(explained):
+    """Site: measuring chain or mechanics."""
     found = believed(explained, "ambiguous", load=0.4, stiff=0.3, gain=0.28, nothing=0.02)
     told = line(found, "chain or mechanics")
     assert told == "mechanics 0.70, measuring chain 0.28, nothing hidden 0.02"
@@ -61,9 +62,8 @@ def test_what_nobody_believes_is_not_told(explained):
     assert line(found, "chain or mechanics") == "mechanics 1.00"
 
 
-def test_it_is_open_where_nothing_explains_and_no_question_where_nothing_is_missing(
-    explained, unexplained
-):
+def test_site_is_open_only_if_unexplained(explained, unexplained):
+    """A consistent response does not state it at all."""
     assert line(unexplained, "chain or mechanics").startswith(
         "open; probabilities of the models that fit best:"
     )
@@ -71,7 +71,7 @@ def test_it_is_open_where_nothing_explains_and_no_question_where_nothing_is_miss
     assert not any("chain or mechanics" in text for text in consistent.summary())
 
 
-def test_a_rival_that_sits_elsewhere_is_told_to(explained):
+def test_rival_at_another_site_is_marked(explained):
     best = explained.verdict.best
     judged = tuple(
         one if one is best else replace(one, score=best.score - 5.0, objection="")
@@ -84,7 +84,7 @@ def test_a_rival_that_sits_elsewhere_is_told_to(explained):
     assert "shaft-stiffness or" in said or "or shaft-stiffness." in said
 
 
-def test_what_is_left_is_told_level_by_level_before_and_after(explained):
+def test_residuals_are_stated_by_level(explained):
     told = [text for text in explained.summary() if text.startswith("    at ")]
     by_level = explained.to_json()["by_level"]
     assert [one["source_vpk"] for one in by_level] == list(makings.LEVELS)
@@ -103,7 +103,7 @@ def test_what_is_left_is_told_level_by_level_before_and_after(explained):
     assert whole == pytest.approx(explained.held_out_db[1])
 
 
-def test_no_phase_is_left_of_one_that_was_not_read(explained):
+def test_unread_phase_gives_no_phase_residual(explained):
     best, rows = explained.verdict.best, explained.verdict.best.held_out.residual.copy()
     rows[1] = np.nan
     best = replace(best, held_out=replace(best.held_out, residual=rows))
@@ -118,7 +118,7 @@ def test_what_the_named_set_leaves_is_told(explained):
     assert explained.to_json()["shape_after"] == explained.left_shape
 
 
-def test_where_nothing_explains_what_comes_nearest_is_told_with_what_it_leaves(unexplained):
+def test_unexplained_verdict_states_nearest_rejected_model(unexplained):
     document = unexplained.to_json()
     assert document["verdict"] == "unexplained"
     first = document["first"]
@@ -128,7 +128,7 @@ def test_where_nothing_explains_what_comes_nearest_is_told_with_what_it_leaves(u
     assert told == unexplained.left_shape
 
 
-def test_no_extended_model_is_told_of_where_nothing_is_named(unexplained):
+def test_unnamed_causes_give_no_extended_model(unexplained):
     """What was refused is no model: its figures would be taken for a gain."""
     document = unexplained.to_json()
     assert document["causes"] == []
@@ -137,7 +137,7 @@ def test_no_extended_model_is_told_of_where_nothing_is_named(unexplained):
     assert document["misfit_sigma"]["extended"] == document["misfit_sigma"]["baseline"]
 
 
-def test_what_departs_in_no_band_may_be_refused_all_the_same(unexplained):
+def test_plain_model_may_fail_without_departure(unexplained):
     found = replace(unexplained, departures=(), shape="no band departs")
     objection = found.verdict.baseline.objection
     assert line(found, "against the plain model") == f"no band departs, yet it {objection}"
@@ -178,9 +178,7 @@ PLAN = SweepPlan(
         ),
     ],
 )
-def test_what_to_measure_next_says_whom_it_tells_apart_and_what_it_takes(
-    explained, sigma, others, told
-):
+def test_next_sweep_states_purpose_and_duration(explained, sigma, others, told):
     proposal = NextMeasurement("ADSS", PLAN, ("a", "b"), sigma, others)
     lines = replace(explained, next_measurement=proposal).summary()
     (said,) = (text for text in lines if text.startswith(f"  {told}"))
@@ -204,7 +202,7 @@ def judged(explained, *objections):
     ("objections", "asked"),
     [(("", ""), [0, 1]), (("unlike", ""), [1]), (("", "unlike"), [0]), (("unlike", "unlike"), [0])],
 )
-def test_a_sweep_is_asked_for_that_tells_all_that_may_be_the_explanation(
+def test_proposed_sweep_separates_all_possible_explanations(
     monkeypatch, explained, objections, asked
 ):
     verdict, given = judged(explained, *objections), []
@@ -222,7 +220,7 @@ def test_a_sweep_is_asked_for_that_tells_all_that_may_be_the_explanation(
     [((2.0,), 1, "halves of its band"), ((2.0,), 2, "whole sweeps at that level"),
      ((1.0, 2.0), 1, None), ((1.0, 2.0), 2, None)],
 )  # fmt: skip
-def test_one_level_is_one_level_in_however_many_sweeps(explained, levels_vpk, sweeps, told):
+def test_level_counts_once_in_several_sweeps(explained, levels_vpk, sweeps, told):
     observation = explained.observation
     half = len(observation) // 2
     rows = [np.arange(half), np.arange(half, 2 * half)]
@@ -246,7 +244,7 @@ def test_one_level_is_one_level_in_however_many_sweeps(explained, levels_vpk, sw
     ("frequencies", "told"),
     [(1, "1 usable frequency,"), (7, "7 usable frequencies,"), (8, None), (61, None)],
 )
-def test_a_few_points_are_refused_as_anything_explains_them(frequencies, told):
+def test_too_few_points_are_refused(frequencies, told):
     seen = SimpleNamespace(frequency_hz=np.tile(np.linspace(100.0, 180.0, frequencies), 3))
     if told is None:
         module._refuse_few(seen)
@@ -255,7 +253,7 @@ def test_a_few_points_are_refused_as_anything_explains_them(frequencies, told):
         module._refuse_few(seen)
 
 
-def test_a_file_of_one_point_is_refused_before_anything_is_simulated(monkeypatch):
+def test_one_point_is_refused_before_simulation(monkeypatch):
     monkeypatch.setattr(module, "refine", lambda *_, **__: pytest.fail("simulated"))
     response = makings.response()
     one = response.take(response.frequency_hz == response.frequency_hz[0])
@@ -273,9 +271,7 @@ def test_that_few_frequencies_show_little_is_said(explained, frequencies, warned
     assert len(said) == warned
 
 
-def test_where_nothing_was_found_it_is_told_what_may_be_there_all_the_same(
-    monkeypatch, unexplained
-):
+def test_consistent_verdict_states_possible_unseen_sizes(monkeypatch, unexplained):
     plain = makings.diagnosis(monkeypatch, (), [LOAD, STIFF])
     assert plain.verdict.word == "consistent"
     told, document = plain.summary(), plain.to_json()["unseen"]
@@ -287,7 +283,7 @@ def test_where_nothing_was_found_it_is_told_what_may_be_there_all_the_same(
     assert unexplained.to_json()["unseen"] == []
 
 
-def test_beside_what_is_named_it_is_told_what_else_may_be_there(monkeypatch):
+def test_named_cause_states_possible_further_ones(monkeypatch):
     named = makings.diagnosis(monkeypatch, LOAD, [LOAD, STIFF])
     assert named.verdict.best.effects == LOAD
     told, document = named.summary(), named.to_json()["unseen"]
@@ -298,7 +294,7 @@ def test_beside_what_is_named_it_is_told_what_else_may_be_there(monkeypatch):
     assert told[at + 1] == f"    {list_unseen(document)[0]}"
 
 
-def test_a_cause_that_is_likelier_than_nothing_by_chance_is_told(monkeypatch):
+def test_likely_cause_is_stated_beside_consistent_verdict(monkeypatch):
     plain = makings.diagnosis(monkeypatch, (), [LOAD, STIFF])
     assert plain.summary()[0].endswith("is needed to explain this response.")
     judged = tuple(

@@ -47,7 +47,7 @@ def through(format_: str, response: FrequencyResponse, folder: Path) -> Frequenc
 
 
 @pytest.mark.parametrize("name", ["adss", "edss"])
-def test_a_renamed_unit_finds_what_is_stored_of_its_physics(name, tmp_path):
+def test_renamed_unit_finds_its_stored_runs(name, tmp_path):
     unit, mine = load_unit(name), load_unit(renamed(name, tmp_path))
     sweep, family = usual_sweep(name), usual_families(name)[0]
     assert posterior_name(mine) == posterior_name(unit)
@@ -72,7 +72,7 @@ def test_limits_move_no_range_of_a_cause(name, tmp_path):
         np.testing.assert_array_equal(*logs)
 
 
-def test_name_limits_and_format_do_not_change_an_estimate(tmp_path):
+def test_name_limits_and_format_keep_estimate(tmp_path):
     plan = SweepPlan((110.0, 122.0, 128.0, 134.0, 140.0, 152.0), (1.5, 3.0), "up", 6, 6)
     measured = simulate(load_unit("adss"), 0.4, plan, seed=3)
     mine = load_unit(renamed("adss", tmp_path))
@@ -85,7 +85,7 @@ def test_name_limits_and_format_do_not_change_an_estimate(tmp_path):
         assert one == found[0]
 
 
-def test_a_copy_in_another_format_is_the_same_response(tmp_path):
+def test_copy_in_another_format_is_equal(tmp_path):
     plan = SweepPlan((110.0, 122.0), (1.5,), "up", 6, 6)
     measured = simulate(load_unit("adss"), 0.4, plan, seed=3)
     copies = [through(one, measured, tmp_path) for one in ("csv", "h5")]

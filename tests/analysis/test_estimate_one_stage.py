@@ -21,7 +21,7 @@ def measured():
 
 
 @pytest.mark.slow
-def test_the_play_is_found_though_the_file_says_another(measured):
+def test_backlash_is_found_despite_wrong_file(measured):
     # Believed by its kind it is 0.04 wide: a stiffness of 15 % looks like play.
     found = estimate_response(measured, ONE.with_tolerance({"default": 0.05})).to_json()
     b_t = found["b_t_deg"]

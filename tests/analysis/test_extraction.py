@@ -44,7 +44,7 @@ def held(name, draws=25):
     return np.mean(hz), np.mean(zeta)
 
 
-def test_every_resonance_pair_in_the_band_is_listed():
+def test_every_pair_in_band_is_listed():
     level = read("second pair at 140 / 200 Hz")
     assert [(pair.arf is None, pair.rf is None) for pair in level.pairs] == [(False, False)] * 2
     for pair, (arf, rf) in zip(level.pairs, ((35, 62.5), (140, 200)), strict=True):
@@ -60,7 +60,7 @@ def test_every_resonance_pair_in_the_band_is_listed():
     assert any("ARF 2" in line for line in summary([level]))
 
 
-def test_a_small_pair_below_does_not_take_the_place_of_the_strong_one():
+def test_small_pair_does_not_replace_strong_one():
     level = read("small pair at 28 / 29 Hz")
     assert level.arf.frequency_hz == pytest.approx(45, rel=0.01)
     assert level.rf.frequency_hz == pytest.approx(70, rel=0.01)
@@ -73,7 +73,7 @@ def test_a_level_with_one_pair_lists_it():
     assert level.flags == ()
 
 
-def test_damping_on_a_coarse_grid_is_that_of_the_pair_whatever_errors_are_stated():
+def test_damping_on_coarse_grid_ignores_stated_errors():
     for draw in range(5):
         level = read("3 Hz steps, zeta 0.01 / 0.02, errors stated at a sixth", draw)
         near(level.arf, 40.0, 0.01)
@@ -82,7 +82,7 @@ def test_damping_on_a_coarse_grid_is_that_of_the_pair_whatever_errors_are_stated
         assert any("times the stated errors" in flag for flag in level.flags)
 
 
-def test_a_coarse_log_grid_does_not_lose_a_deep_valley():
+def test_coarse_log_grid_keeps_deep_valley():
     level = read("40 points in log f, zeta 0.005 / 0.01")
     near(level.arf, 40.0, 0.005)
     near(level.rf, 70.0, 0.01)
@@ -118,7 +118,7 @@ def test_one_spike_is_no_resonance(name):
         assert any(flag.startswith("rf: ") for flag in level.flags)
 
 
-def test_a_spike_beside_a_pair_is_left_out_and_named():
+def test_spike_near_pair_is_omitted_and_named():
     level = read("a pair and one spike")
     near(level.arf, truth(case("a pair and one spike"))[0][1], 0.03)
     near(level.rf, truth(case("a pair and one spike"))[1][1], 0.05)
@@ -126,7 +126,7 @@ def test_a_spike_beside_a_pair_is_left_out_and_named():
     assert any(f"the reading at {f[3 * f.size // 4]:.6g} Hz" in flag for flag in level.flags)
 
 
-def test_a_minimum_without_zeros_is_no_anti_resonance():
+def test_minimum_without_zeros_is_no_anti_resonance():
     level = read("no zeros")
     assert level.arf is None
     near(level.rf, truth(case("no zeros"))[0][1], 0.05)
@@ -134,7 +134,7 @@ def test_a_minimum_without_zeros_is_no_anti_resonance():
     assert "no pair of zeros" in said
 
 
-def test_an_anti_resonance_above_the_resonance_is_said_to_be():
+def test_anti_resonance_above_resonance_is_flagged():
     level = read("ARF above RF")
     rf, arf = (hz for _, hz, _ in truth(case("ARF above RF")))
     near(level.arf, arf, 0.03)
@@ -146,7 +146,7 @@ def test_an_anti_resonance_above_the_resonance_is_said_to_be():
     assert "edge" not in said
 
 
-def test_half_power_damping_knows_the_step_of_the_sweep():
+def test_half_power_damping_includes_grid_step():
     """A response that leaps has no model; its damping is known no better than its grid."""
     f = np.arange(20.0, 110.0, 3.0)
     rng = np.random.default_rng(3)
@@ -159,7 +159,7 @@ def test_half_power_damping_knows_the_step_of_the_sweep():
     assert level.arf.damping_std > 0.9 * step_share
 
 
-def test_a_stated_error_does_not_choose_the_model():
+def test_stated_error_does_not_choose_model():
     """The same readings with errors at a half and at twice give the same features."""
     one = measured(case("zeta 0.03 / 0.05, noise 2 %"), 1)
     found = []

@@ -35,14 +35,15 @@ def test_the_advice_is_right_or_undecided(name, diagnosed):
     assert said.startswith((f"Adjust stage {right} first", *UNDECIDED))
 
 
-def test_with_a_diagnosis_it_decides_where_there_is_something_to_decide():
+def test_diagnosis_advises_wherever_ratio_is_decidable():
+    """Eight practice units have a ratio that is not near one half."""
     far = [name for name in TRUTH if abs(TRUTH[name]["contribution_ratio"] - 0.5) > 0.05]
     assert len(far) == 8
     assert all(headline(name, diagnosed=True).startswith("Adjust stage") for name in far)
 
 
 @pytest.mark.parametrize("name", sorted(TRUTH))
-def test_the_numbers_that_are_told_hold_the_truth(name):
+def test_stated_numbers_contain_the_truth(name):
     answer = accept_model(SAID[name]["estimate"], SAID[name]["diagnosis"])
     unit, truth = load_unit(TRUTH[name]["unit"].lower()), TRUTH[name]
     ratio = truth["contribution_ratio"]
@@ -58,7 +59,7 @@ def test_the_numbers_that_are_told_hold_the_truth(name):
         assert low < value < high
 
 
-def test_where_nothing_is_hidden_the_words_follow_the_probability():
+def test_nothing_hidden_wording_follows_the_probability():
     said = SAID["practice-09"]["diagnosis"]
     assert "probability 0.95: extremely likely." in " ".join(verdict_words(said))
     near = [

@@ -44,7 +44,7 @@ def top_of_dip():
 
 
 @pytest.mark.parametrize("scatter_db", [0.1, 0.5, 2.0])
-def test_skewed_dip_and_jump_lie_within_their_bars(scatter_db, top_of_dip):
+def test_skewed_dip_and_jump_are_within_errors(scatter_db, top_of_dip):
     arf, rf, bars, jumps = [], [], [], 0
     for seed in range(40):
         (level,) = extract(draw(seed, scatter_db))
@@ -63,7 +63,7 @@ def test_skewed_dip_and_jump_lie_within_their_bars(scatter_db, top_of_dip):
     assert jumps > 26
 
 
-def test_bars_of_a_nonlinear_dip_grow_with_scatter():
+def test_errors_of_nonlinear_dip_grow_with_scatter():
     widths = [
         np.median([extract(draw(seed, scatter))[0].arf.std_hz for seed in range(12)])
         for scatter in (0.1, 0.5, 2.0)
@@ -71,7 +71,7 @@ def test_bars_of_a_nonlinear_dip_grow_with_scatter():
     assert widths[0] < widths[1] < widths[2]
 
 
-def test_a_smooth_nonlinear_peak_is_read_by_parabola_and_says_so():
+def test_smooth_nonlinear_peak_uses_parabola():
     def smooth(f):
         # A hardening spring bends its peak over: not a rational one, but without a jump.
         return (

@@ -39,7 +39,7 @@ def test_simulated_data_say_so():
     assert draw_response(simulated).axes[0].get_title() == "ADSS, SIMULATED"
 
 
-def test_a_spoilt_reading_breaks_the_line_and_is_hollow():
+def test_spoilt_reading_breaks_line_and_is_hollow():
     flags = np.zeros(12, dtype=int)
     flags[2] = PointFlag.SPOILT
     gain = draw_response(response(flags=flags).at_level(1.5)).axes[0]

@@ -16,7 +16,7 @@ RARE, TEN_TIMES = ("motor-inertia",), 34.5
 @pytest.mark.parametrize(
     ("lead", "adequate", "rivals"), [(44.0, True, [()]), (46.0, True, []), (44.0, False, [])]
 )
-def test_that_nothing_is_hidden_is_a_rival_while_it_has_a_twentieth(lead, adequate, rivals):
+def test_plain_model_is_rival_above_one_twentieth(lead, adequate, rivals):
     found = judge(seen(TRUE, 1), ((), TRUE), 1)
     against = "" if adequate else "fits worse than replicates of this model"
     plain = replace(found.baseline, score=found.best.score - lead, objection=against)
@@ -28,7 +28,7 @@ def test_that_nothing_is_hidden_is_a_rival_while_it_has_a_twentieth(lead, adequa
     ("behind", "adequate", "rivals"),
     [(29.0, True, [WRONG]), (31.0, True, []), (29.0, False, []), (1.0, False, [])],
 )
-def test_another_set_is_a_rival_while_it_has_a_seventh_and_explains(behind, adequate, rivals):
+def test_explaining_set_is_rival_above_one_seventh(behind, adequate, rivals):
     found = judge(seen(TRUE, 1), ((), TRUE, WRONG), 1)
     (wrong,) = (one for one in found.judged if one.effects == WRONG)
     against = "" if adequate else "needs a size outside its plausible range"
@@ -49,7 +49,7 @@ def test_another_set_is_a_rival_while_it_has_a_seventh_and_explains(behind, adeq
         (RARE, TRUE, 31.0, False),
     ],
 )
-def test_a_rare_set_is_a_rival_where_it_does_about_as_well(best, other, behind, is_rival):
+def test_rare_set_is_rival_if_comparable(best, other, behind, is_rival):
     found = judge(seen(TRUE, 1), ((), best, other), 1)
     one, another = (
         next(o for o in found.judged if o.effects == effects) for effects in (best, other)
@@ -71,9 +71,7 @@ def test_a_rare_set_is_a_rival_where_it_does_about_as_well(best, other, behind, 
         (-40.0, rules._NOT_ASKED, False, "explained"),
     ],
 )
-def test_what_stands_in_for_a_refused_leader_is_not_named_alone(
-    lead, objection, alike, word, monkeypatch
-):
+def test_substitute_for_rejected_leader_is_not_alone(lead, objection, alike, word, monkeypatch):
     """A shaft that hardens, withheld, was told to be a light load: a stiff shaft led it."""
     observed = seen(TRUE, 1)
     found = [candidate(observed, effects, 1 + i) for i, effects in enumerate(((), TRUE, WRONG))]
@@ -100,9 +98,8 @@ def test_what_stands_in_for_a_refused_leader_is_not_named_alone(
         (0.48, 0.0, rules._NOT_ASKED, []),
     ],
 )
-def test_what_is_refused_is_a_rival_where_more_is_believed_of_others(
-    best, holding, objection, rivals, monkeypatch
-):
+def test_rejected_set_is_rival_if_less_believed(best, holding, objection, rivals, monkeypatch):
+    """It is a rival where the named model has the lower probability."""
     monkeypatch.setattr(rules, "is_equivalent_at_load", lambda *_: False)
     found = judge(seen(TRUE, 1), ((), TRUE, WRONG), 1)
     first = replace(found.best, probability=best)
@@ -115,9 +112,7 @@ def test_what_is_refused_is_a_rival_where_more_is_believed_of_others(
 
 
 @pytest.mark.parametrize(("behind", "rivals"), [(24.0, [WRONG]), (31.0, [])])
-def test_what_is_refused_near_three_causes_is_a_rival_however_likely_they_are(
-    behind, rivals, monkeypatch
-):
+def test_rejected_set_is_rival_near_three_causes(behind, rivals, monkeypatch):
     """A tachometer's gain, withheld, was told to be three other causes with 0.71."""
     monkeypatch.setattr(rules, "is_equivalent_at_load", lambda *_: False)
     found = judge(seen(TRUE, 1), ((), TRUE, WRONG), 1)
@@ -140,7 +135,7 @@ def test_what_is_refused_near_three_causes_is_a_rival_however_likely_they_are(
         (False, "", ["same", "other"]),
     ],
 )
-def test_what_says_the_same_counts_for_the_best(alike, against, rivals, monkeypatch):
+def test_equivalent_set_adds_to_best_probability(alike, against, rivals, monkeypatch):
     found = judge(seen(TRUE, 1), ((), TRUE, WRONG), 1)
     (wrong,) = (one for one in found.judged if one.effects == WRONG)
     wrong = replace(wrong, objection="")

@@ -27,7 +27,7 @@ def name(request):
 @pytest.mark.parametrize(
     ("set_name", "unit", "truth"), [("09", "adss", 0.933), ("10", "edss", 0.548)]
 )
-def test_an_estimate_of_the_usual_sweep_simulates_nothing(set_name, unit, truth, tmp_path):
+def test_estimate_of_usual_sweep_simulates_nothing(set_name, unit, truth, tmp_path):
     response = read_response(PRACTICE / f"practice-{set_name}.csv")
     found = estimate_response(response, load_unit(unit), cache=tmp_path)
     assert found.simulated_s == 0.0
@@ -65,7 +65,7 @@ def test_another_unit_or_sweep_is_simulated(name):
         assert len(flat.asked) == len(some)
 
 
-def test_exactly_those_come_along_that_an_estimate_may_ask_for():
+def test_shipped_runs_are_those_estimates_need():
     wanted = {
         run_name(load_unit(name), family, usual_sweep(name))
         for name in BANDS_HZ
@@ -89,13 +89,13 @@ def test_without_them_an_estimate_simulates(damage, name, tmp_path, monkeypatch)
     assert np.all(draws.mean == 1.0)
 
 
-def test_this_engine_would_make_the_same_of_them(name):
+def test_engine_reproduces_the_shipped_runs(name):
     """False once in 10,000: runs from other starts at the same places."""
     seed, p = again(name)
     assert p > 1e-4, f"seed {seed}: simulate them anew, python tests/usual_runs.py"
 
 
-def test_that_would_be_seen_if_the_engine_made_another_machine_of_the_unit(name):
+def test_changed_engine_would_differ_from_shipped_runs(name):
     seed, p = again(name, J_L=1.05)
     assert p <= 1e-3, f"seed {seed}"
 

@@ -7,7 +7,7 @@ from analysis.trend import SECONDS_PER_DAY, fit_trend
 from daq.errors import InputError
 
 
-def test_a_line_is_found_and_its_error_is_that_of_another_fit():
+def test_line_and_error_match_reference_fit():
     generator = np.random.default_rng(5)
     days, std = generator.uniform(0, 100, 30), generator.uniform(0.5, 2.0, 30)
     values = 3.0 - 0.25 * days + std * generator.standard_normal(30)
@@ -19,7 +19,7 @@ def test_a_line_is_found_and_its_error_is_that_of_another_fit():
     assert trend.degrees == 28
 
 
-def test_the_slope_is_covered_as_often_as_it_says():
+def test_slope_interval_has_stated_coverage():
     days = np.array([0.0, 1.0, 5.0, 9.0, 30.0])
     inside = 0
     for seed in range(400):
@@ -64,7 +64,7 @@ def test_what_cannot_be_fitted_is_refused(times, values, stds):
         (0.1, (None, 1.2), 1.2, 2.0),
     ],
 )
-def test_the_line_meets_the_limit_that_it_moves_towards(slope, limits, limit, day):
+def test_line_meets_limit_it_moves_towards(slope, limits, limit, day):
     days = np.array([0.0, 1.0, 3.0, 4.0])
     trend = fit_trend(1e9 + days * SECONDS_PER_DAY, 1.0 + slope * days, [0.01] * 4)
     found = trend.reaches(*limits)
@@ -76,7 +76,7 @@ def test_the_line_meets_the_limit_that_it_moves_towards(slope, limits, limit, da
     ("slope", "std", "limits"),
     [(0.1, 0.01, (0.5, None)), (0.1, 1.0, (0.5, 2.0)), (0.0, 0.01, (0.5, 2.0))],
 )
-def test_no_limit_is_met_that_lies_the_other_way_or_by_chance(slope, std, limits):
+def test_opposite_or_insignificant_slope_meets_no_limit(slope, std, limits):
     days = np.array([0.0, 1.0, 3.0, 4.0])
     trend = fit_trend(days * SECONDS_PER_DAY, 1.0 + slope * days, [std] * 4)
     assert trend.reaches(*limits) is None

@@ -30,7 +30,7 @@ def judge(seed, step=1, scatter=1.0):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_no_verdict_is_surer_with_fewer_points_or_more_noise(seed):
+def test_certainty_falls_with_fewer_noisier_points(seed):
     whole = judge(seed)
     assert whole.word == "explained"
     for less in (judge(seed, step=3), judge(seed, scatter=4.0)):

@@ -33,7 +33,7 @@ def transfer_by_inertia(unit: Unit, inertia):
     return np.array(found)
 
 
-def test_four_effects_act_on_the_load_alone_and_are_linear():
+def test_four_effects_are_linear_at_the_load():
     assert set(AT_LOAD) == {
         "cable-stiffness", "load-inertia", "load-viscous-damping", "payload-flexibility"
     }  # fmt: skip
@@ -42,7 +42,7 @@ def test_four_effects_act_on_the_load_alone_and_are_linear():
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
 @pytest.mark.parametrize("effect", AT_LOAD)
 @pytest.mark.parametrize("name", ["adss", "edss"])
-def test_the_load_is_felt_as_the_drivetrain_has_it(name, effect, share):
+def test_added_inertia_gives_the_drivetrain_transfer(name, effect, share):
     unit = load_unit(name)
     ends = {p.name: p.range(unit) for p in AT_LOAD[effect].parameters}
     values = {key: low * (high / low) ** share for key, (low, high) in ends.items()}

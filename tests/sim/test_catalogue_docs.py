@@ -7,7 +7,7 @@ from sim.catalogue import BUILT_IN
 PAGE = Path(__file__).parents[2] / "docs" / "effects.md"
 
 
-def test_every_effect_stands_on_the_page_with_its_parameters():
+def test_page_lists_every_effect_with_parameters():
     rows = [line.split("|") for line in PAGE.read_text().splitlines() if line.startswith("| ")]
     listed = {row[1].strip(): row for row in rows[2:]}
     assert list(listed) == list(BUILT_IN)

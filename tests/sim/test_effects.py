@@ -82,12 +82,12 @@ def without():
     return oracle_with({}).mean(axis=0)
 
 
-def test_every_effect_of_the_catalogue_is_held_against_the_oracle():
+def test_every_effect_has_an_oracle_case():
     assert [identifier(text) for text in CASES] == list(BUILT_IN)
 
 
 @pytest.mark.parametrize("text", CASES)
-def test_effect_does_what_the_equations_with_it_do(text, without):
+def test_effect_agrees_with_oracle_equations(text, without):
     expected = oracle_with(CASES[text])
     assert np.ptp(np.abs(expected[:, 1])) < 1e-3 * abs(expected[0, 1])
     expected, got = expected.mean(axis=0), engine_with(text).mean(axis=0)
@@ -100,7 +100,7 @@ def test_effect_does_what_the_equations_with_it_do(text, without):
     assert abs(expected[1] / without[1] - 1.0) > 3e-3
 
 
-def test_torque_bias_makes_even_harmonics_and_a_clip_odd_ones(without):
+def test_bias_gives_even_clip_odd_harmonics(without):
     biased = engine_with("load-torque-bias:T_b=0.2").mean(axis=0)
     clipped = engine_with("amplifier-saturation:V_sat=6").mean(axis=0)
     assert abs(biased[2]) > 100.0 * abs(without[2])
@@ -121,7 +121,7 @@ def everything(unit, end):
 
 
 @pytest.mark.parametrize("unit", [ADSS, EDSS], ids=["adss", "edss"])
-def test_no_effect_at_the_ends_of_its_range_breaks_the_engine(unit):
+def test_range_ends_of_effects_keep_motion_finite(unit):
     heavy = ["shaft-damping:c_s1=0.1", "mesh1-damping:c_g1=10", "mesh2-damping:c_2=100"]
     sets = [[setting] for setting in ends(unit)]
     sets += [[parse_effect(text) for text in heavy], everything(unit, 0), everything(unit, 1)]
@@ -136,7 +136,7 @@ def test_no_effect_at_the_ends_of_its_range_breaks_the_engine(unit):
             assert np.abs(5.0 * gains[:, 1]).max() < 4.0 * largest * bound, (effects, f)
 
 
-def test_settings_of_one_effect_land_where_they_should():
+def test_settings_of_effect_reach_their_elements():
     effects = [
         "shaft-stiffness:k_s1=40",
         "shaft-hardening:h=100",
@@ -151,7 +151,7 @@ def test_settings_of_one_effect_land_where_they_should():
         assert (friction.T, friction.T_s, friction.omega_s) == (0.1, 0.05, 0.2)
 
 
-def test_effects_leave_the_paper_model_and_its_unit_alone():
+def test_effects_do_not_change_the_paper_model():
     before = drivetrain_with(ADSS, 0.3).system()
     drivetrain_with(ADSS, 0.3, [parse_effect(text) for text in CASES])
     after = drivetrain_with(ADSS, 0.3).system()
@@ -224,7 +224,7 @@ def test_a_wrong_setting_says_what_is_allowed():
         drivetrain_with(ADSS, 0.5, [parse_effect("load-inertia:J_L=1")] * 2)
 
 
-def test_a_negative_bias_is_allowed_and_mirrors_a_positive_one():
+def test_negative_bias_mirrors_positive_one():
     ahead = engine_with("load-torque-bias:T_b=0.2").mean(axis=0)
     back = engine_with("load-torque-bias:T_b=-0.2").mean(axis=0)
     assert back[1] == pytest.approx(ahead[1], rel=1e-2)

@@ -40,7 +40,7 @@ def test_parameters_are_read():
         ("overload-burst:seconds=1", "seconds"), ("dropped-connection:", "KEY=VALUE"),
     ],
 )  # fmt: skip
-def test_bad_faults_are_refused_with_what_is_allowed(text, names):
+def test_bad_faults_are_refused_with_allowed_ones(text, names):
     with pytest.raises(InputError, match=names):
         parse_fault(text)
 
@@ -162,7 +162,7 @@ def test_a_stuck_measuring_bit(bench):
     assert controller.integer("STAT:OPER:COND?") & 16 == 0
 
 
-def test_a_stuck_parser_is_freed_by_device_clear(bench):
+def test_device_clear_frees_a_stuck_parser(bench):
     controller = bench("stuck-parser:phase=prepare,skip=1")
     controller.instrument.listen(b"FREQ:STEP 1\n")
     controller.instrument.listen(b"FREQ:STEP 2\n*IDN?\n")
@@ -189,7 +189,7 @@ def test_a_missing_option(bench):
     assert controller.refusal("INST:SEL SINE") == [-200]
 
 
-def test_power_off_over_the_bus_needs_a_hand(bench):
+def test_power_off_over_bus_needs_a_person(bench):
     controller = bench()
     controller.sweep()
     controller.write("SYST:POW:STAT OFF")

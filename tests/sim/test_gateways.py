@@ -82,7 +82,7 @@ class Caller:
 
 @pytest.mark.parametrize("wire", GATEWAYS)
 @pytest.mark.parametrize("driver", DRIVERS, ids=lambda driver: driver.scheme or "preset")
-def test_every_driver_gets_the_points_of_a_bare_socket(driver, wire):
+def test_every_driver_measures_alike_through_gateways(driver, wire):
     found = {}
     for way in ("tcp", wire):
         instrument = box(driver.scheme)
@@ -115,7 +115,7 @@ def test_pyvisa_asks_polls_and_clears(name):
 
 
 @pytest.mark.parametrize("wire", GATEWAYS)
-def test_a_gateway_that_starts_anew_is_met_again_and_made_safe(wire):
+def test_restarted_gateway_is_reconnected_and_made_safe(wire):
     instrument = box("", "link-away:point=3,seconds=0.3")
     with served(instrument, wire) as url:
         analyser = open_analyser(url)
@@ -136,7 +136,7 @@ def test_a_gateway_that_starts_anew_is_met_again_and_made_safe(wire):
 
 
 @pytest.mark.parametrize("wire", GATEWAYS)
-def test_a_late_reply_is_waited_for_and_a_silent_instrument_told(wire):
+def test_late_reply_is_awaited_silence_is_reported(wire):
     with served(box("", "slow-reply:point=0,seconds=0.3"), wire) as url:
         transport = open_transport(url)
         assert "35670A" in ask(transport, "*IDN?", Deadline.after(5.0))
@@ -150,7 +150,7 @@ def test_a_late_reply_is_waited_for_and_a_silent_instrument_told(wire):
         transport.close()
 
 
-def test_vxi11_reads_in_pieces_and_up_to_a_character(wires):
+def test_vxi11_reads_pieces_up_to_a_character(wires):
     with served(box(), "vxi11") as url:
         caller = Caller(wires(place(url)))
         link, _ = caller.linked()
@@ -166,7 +166,7 @@ def test_vxi11_reads_in_pieces_and_up_to_a_character(wires):
         assert 0.15 < time.monotonic() - began < 5.0
 
 
-def test_vxi11_abort_ends_a_read_and_only_that(wires):
+def test_vxi11_abort_ends_only_a_read(wires):
     with served(box(), "vxi11") as url:
         caller = Caller(wires(place(url)))
         link, abort_port = caller.linked()

@@ -40,13 +40,13 @@ def chain(unit, frequency_hz):
     return e.filter_numerator / (d2 * s**2 + d1 * s + d0) * e.k_ts * s * theta
 
 
-def test_without_play_and_friction_it_is_the_chain_worked_out_by_hand():
+def test_linear_drive_equals_chain_by_hand():
     frequency = np.geomspace(5.0, 2000.0, 400)
     system = paper_drivetrain(ONE, 1.0).system()
     np.testing.assert_allclose(system.transfer(frequency), chain(ONE, frequency), rtol=1e-8)
 
 
-def test_its_anti_resonance_is_the_load_on_its_shaft():
+def test_anti_resonance_is_load_on_its_shaft():
     # A shaft without inertia and a load alone: sqrt(k_s1/J_L), whatever drives it.
     light = ONE.with_parameters(J_s1=1e-9, J_g1=1e-9, k_g1=1e8)
     expected = math.sqrt(light.stage1.k_s1 / light.load.J_L) / (2 * math.pi)
@@ -55,7 +55,7 @@ def test_its_anti_resonance_is_the_load_on_its_shaft():
     assert frequency[np.argmin(gain)] == pytest.approx(expected, rel=1e-4)
 
 
-def test_with_play_it_is_the_limit_of_two_stages_whose_second_is_rigid():
+def test_backlash_equals_two_stages_one_rigid():
     stiff = document()
     stiff["stage1"]["J_p2"] = 1e-7
     stiff["stage2"] = {"N": 1.0, "k_2": 1e6}
@@ -75,7 +75,7 @@ def test_with_play_it_is_the_limit_of_two_stages_whose_second_is_rigid():
     assert np.abs(means[0].reshape(2, -1) - linear).max() > 3.0
 
 
-def test_all_of_the_play_sits_in_its_one_stage():
+def test_single_stage_holds_all_backlash():
     assert (ONE.stages, ONE.output_ratio) == (1, 1.0)
     backlash = ONE.split(1.0)
     assert (backlash.b1_deg, backlash.b2_deg) == (ONE.backlash.b_t_deg, 0.0)
@@ -84,7 +84,7 @@ def test_all_of_the_play_sits_in_its_one_stage():
             ONE.split(ratio)
 
 
-def test_every_effect_but_that_of_mesh_2_has_its_place():
+def test_every_effect_except_mesh_2_applies():
     for identifier, effect in BUILT_IN.items():
         setting = EffectSetting(
             identifier, {p.name: 0.5 * sum(p.range(ONE)) for p in effect.parameters}
@@ -115,7 +115,7 @@ def test_half_a_second_stage_is_refused(change, said):
         unit_from_mapping(wrong, "here")
 
 
-def test_a_copy_with_other_numbers_keeps_its_one_stage():
+def test_changed_copy_keeps_its_one_stage():
     changed = ONE.with_parameters(J_L=3e-3)
     assert changed.stages == 1
     assert changed.parameters["J_L"] == 3e-3

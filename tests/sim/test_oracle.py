@@ -50,7 +50,7 @@ def through(spring, beyond):
 
 
 @pytest.mark.parametrize("extras", [DAMPED, DAMPED | PAYLOAD], ids=["damped", "payload"])
-def test_without_play_and_friction_it_is_the_transfer_function(extras):
+def test_linear_limit_is_the_transfer_function(extras):
     frequencies = [40.0, 95.0, 139.0, 152.0, 200.0]
     parameters = ADSS | SMOOTH
     expected = linear_response(parameters, extras, frequencies)
@@ -62,7 +62,7 @@ def test_without_play_and_friction_it_is_the_transfer_function(extras):
         assert np.abs(coefficients[-1, 2:]).max() < 1e-6 * abs(gain)
 
 
-def test_amplifier_lag_and_filter_corner_turn_the_response_as_they_should():
+def test_amplifier_lag_and_filter_shift_the_response():
     scale, tau = 0.8, 4e-4
     parameters = ADSS | SMOOTH
     plain = linear_response(parameters, DAMPED, [100.0])[0]
@@ -80,7 +80,7 @@ def test_amplifier_lag_and_filter_corner_turn_the_response_as_they_should():
     assert coefficients[-1, 1] == pytest.approx(expected, rel=1e-6)
 
 
-def test_error_falls_with_the_fourth_power_of_the_step():
+def test_error_falls_with_step_to_the_fourth():
     # A soft mesh keeps every mode inside the asymptotic range of these steps.
     soft = ADSS | SMOOTH | {"k_g1": 50.0, "k_2": 2000.0, "J_s1": 1e-6, "J_p2": 1e-6}
     start = np.zeros(len(rk4.STATES))
@@ -111,7 +111,7 @@ def mechanical_energy(y, p, delta_1, delta_2, h=0.0):
     return energy
 
 
-def test_a_chain_without_losses_keeps_its_energy_through_thousands_of_impacts():
+def test_lossless_chain_conserves_energy_through_impacts():
     conservative = ADSS | SMOOTH | {"k_t": 0.0, "k_b": 0.0, "B_m": 0.0}
     plays = half_plays(0.5)
     start = np.zeros(len(rk4.STATES))
@@ -127,7 +127,7 @@ def test_a_chain_without_losses_keeps_its_energy_through_thousands_of_impacts():
 
 
 @pytest.mark.parametrize("ratio", [0.0, 0.25, 1.0])
-def test_energy_put_in_is_energy_stored_plus_energy_lost(ratio):
+def test_energy_input_is_stored_plus_lost(ratio):
     plays = half_plays(ratio)
     t, y = rk4.record(ADSS, *plays, 2.5, 125.0, 4, 1e-6, extras={"B_L": 0.05, "T_s_L": 0.01})
     column = dict(zip(rk4.STATES, y.T, strict=True))
@@ -157,14 +157,14 @@ def test_dry_friction_holds_what_cannot_overcome_it():
     assert y[rk4.STATES.index("th_L")] == 0.0
 
 
-def test_within_its_play_the_load_does_not_feel_the_motor():
+def test_load_rests_while_motor_stays_in_backlash():
     plays = (math.radians(5.0), math.radians(5.0))
     _, y = rk4.record(ADSS, *plays, 0.5, 200.0, 5, every=20)
     assert np.ptp(y[:, rk4.STATES.index("th_m")]) > 0.0
     assert np.all(y[:, rk4.STATES.index("th_g1") : rk4.STATES.index("w_L") + 1] == 0.0)
 
 
-def test_clip_and_torque_bias_show_in_their_harmonics():
+def test_clip_and_bias_show_in_their_harmonics():
     plays = half_plays(0.0)
     quiet = DAMPED
     plain = rk4.simulate_cycles(ADSS, *plays, 2.5, 160.0, 60, extras=quiet)[0][-10:].mean(axis=0)
@@ -177,7 +177,7 @@ def test_clip_and_torque_bias_show_in_their_harmonics():
     assert abs(pushed[2]) > 100.0 * abs(plain[2])
 
 
-def test_state_carries_a_sweep_and_rest_forgets_it():
+def test_state_continues_a_sweep_until_rest():
     plays = half_plays(1.0)
     whole, end = rk4.simulate_cycles(ADSS, *plays, 2.5, 150.0, 12)
     first, middle = rk4.simulate_cycles(ADSS, *plays, 2.5, 150.0, 5)
@@ -190,7 +190,8 @@ def test_state_carries_a_sweep_and_rest_forgets_it():
     assert not np.array_equal(carried[1], whole[2:5])
 
 
-def test_resonance_of_adss_with_all_play_in_stage_1_at_two_microseconds():
+def test_adss_resonance_at_two_microsecond_step():
+    """All of the backlash is in stage 1."""
     # Known from an independent computation of the published model: 152 Hz, runs 152 to 153.
     band = np.arange(149.0, 157.0)
     gains = rk4.sweep(ADSS, *half_plays(1.0), 2.5, band, 60, 40, from_rest=True)[..., 1]
@@ -206,7 +207,7 @@ def answer_at(frequency, extras, source_vpk=2.5):
     )[0][-1]
 
 
-def test_a_dead_zone_takes_from_the_fundamental_what_its_describing_function_says():
+def test_dead_zone_follows_its_describing_function():
     delta = 0.2
     V_d = delta * ADSS["k_a"] * 2.5
     left = 1.0 - 2.0 / math.pi * (math.asin(delta) + delta * math.sqrt(1.0 - delta**2))
@@ -215,7 +216,7 @@ def test_a_dead_zone_takes_from_the_fundamental_what_its_describing_function_say
     assert np.all(answer_at(95.0, {"V_d": 5.1 * V_d}) == 0.0)
 
 
-def test_an_amplifier_that_gives_more_one_way_drives_the_load_round():
+def test_asymmetric_amplifier_turns_the_load():
     u_p = 0.3
     plain = linear_response(ADSS | SMOOTH, DAMPED, [95.0, 1e-6])
     answer = answer_at(95.0, {"u_p": u_p})
@@ -241,14 +242,14 @@ def period(t, x):
     return float(np.diff(at).mean())
 
 
-def test_cogging_holds_the_motor_like_a_spring_between_two_teeth():
+def test_cogging_acts_as_spring_between_teeth():
     T_cog, middle = 0.02, math.pi / 24.0
     t, found = free_run({"th_m": middle + 1e-3}, 20, extras={"T_cog": T_cog})
     expected = 2.0 * math.pi * math.sqrt(ADSS["J_m"] / (24.0 * T_cog))
     assert period(t, found["th_m"] - middle) == pytest.approx(expected, rel=1e-3)
 
 
-def test_no_more_current_than_its_limit_makes_torque():
+def test_current_limit_bounds_the_torque():
     start, i_max = {"i_a": 2.0}, 0.5
     parameters = {"k_t": ADSS["k_t"], "L_a": 1e3}
     t, found = free_run(start, 1, parameters, {"i_max": i_max})
@@ -256,13 +257,13 @@ def test_no_more_current_than_its_limit_makes_torque():
     assert found["w_m"] == pytest.approx(expected, rel=1e-6, abs=1e-12)
 
 
-def test_drag_of_air_brakes_with_the_square_of_the_speed():
+def test_air_drag_grows_with_speed_squared():
     D_L, w_0 = 0.05, 3.0
     t, found = free_run({"w_L": w_0}, 20, extras={"D_L": D_L})
     assert found["w_L"] == pytest.approx(w_0 / (1.0 + D_L * w_0 / ADSS["J_L"] * t), rel=1e-6)
 
 
-def test_friction_that_bends_first_is_a_spring_and_then_the_friction_that_it_was():
+def test_presliding_friction_is_spring_then_friction():
     s_L, T_f_L = 50.0, 0.01
     parameters, extras = {"T_f_L": T_f_L}, {"s_L": s_L}
     small = 1e-3 * T_f_L / s_L * math.sqrt(s_L / ADSS["J_L"])

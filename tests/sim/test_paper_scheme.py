@@ -22,7 +22,7 @@ def decibels(gains):
 
 
 @pytest.mark.parametrize("ratio", [0.0, 0.5, 1.0])
-def test_plain_start_steps_the_same_equations_as_the_oracle(unit, ratio):
+def test_plain_start_matches_the_oracle(unit, ratio):
     # 80 and 160 Hz hold whole numbers of steps, so both sum the same instants. One cycle:
     # from the second on, chaos makes much of the last bit.
     backlash = play(unit, ratio)
@@ -36,13 +36,13 @@ def test_plain_start_steps_the_same_equations_as_the_oracle(unit, ratio):
         assert gain == pytest.approx(cycles[0, 1], rel=1e-6)
 
 
-def test_a_step_that_does_not_divide_the_cycle_reads_the_same_gain():
+def test_step_not_dividing_cycle_reads_same_gain():
     unit = load_unit("adss")
     near = paper_gains(unit, play(unit, 0.0), [149.9, 150.0, 150.1], starts=1)[0]
     assert abs(near[1] - 0.5 * (near[0] + near[2])) < 1e-4 * abs(near[1])
 
 
-def test_starts_are_seeded_and_the_first_is_the_plain_one():
+def test_starts_are_seeded_first_is_plain():
     unit = load_unit("edss")
     runs = {"settle_cycles": 5, "integrate_cycles": 3}
     one = paper_gains(unit, play(unit, 0.5), [70.0], starts=4, seed=1, **runs)
@@ -56,7 +56,7 @@ def test_starts_are_seeded_and_the_first_is_the_plain_one():
     assert np.unique(same).size == 1
 
 
-def test_every_start_is_at_rest_inside_the_play():
+def test_every_start_rests_inside_the_backlash():
     # Too weak to overcome the motor's friction: whatever moved would have been pushed by a mesh.
     unit = load_unit("adss")
     gains = paper_gains(
@@ -88,7 +88,7 @@ def test_ten_microseconds_damp_what_two_leave():
     assert fine.std() > 2.0 * coarse.std()
 
 
-def test_two_responses_stand_side_by_side_where_table_2_puts_the_resonance():
+def test_two_motions_exist_at_table_2_resonance():
     # EDSS 0 % at 79 Hz, the printed RF of -3.4 dB: some starts end there, others 3.6 dB lower.
     unit = load_unit("edss")
     gains = decibels(paper_gains(unit, play(unit, 0.0), [79.0], starts=24, start_spread=1.0))

@@ -49,14 +49,14 @@ def dwells(plan, seed, level, rest):
 @pytest.mark.parametrize("direction", ["up", "down"])
 @pytest.mark.parametrize("from_rest", [False, True])
 @pytest.mark.parametrize("offset", [0.0, 0.3])
-def test_a_sweep_is_its_dwells_one_after_the_other(direction, from_rest, offset):
+def test_sweep_is_its_dwells_in_sequence(direction, from_rest, offset):
     plan = plan_with(direction=direction, from_rest=from_rest, dc_offset_v=offset)
     (cycles,) = simulate_cycles([Servo.of(ADSS, 0.25, seed=7)], plan)
     assert cycles.shape == (1, 3, 6, 4)
     assert np.array_equal(cycles[0], dwells(plan, 7, 2.5, from_rest))
 
 
-def test_direction_and_rest_matter_and_rows_stay_ascending():
+def test_direction_and_rest_matter_rows_stay_ascending():
     kinds = [
         plan_with(),
         plan_with(direction="down"),
@@ -74,7 +74,7 @@ def test_direction_and_rest_matter_and_rows_stay_ascending():
     assert np.all(up != down)
 
 
-def test_levels_keep_their_order_and_each_starts_anew():
+def test_levels_keep_order_and_start_anew():
     both = simulate(ADSS, 0.25, plan_with(levels_vpk=(2.5, 1.0)))
     assert list(both.source_vpk) == [2.5] * 3 + [1.0] * 3
     assert list(both.frequency_hz) == list(BAND) * 2
@@ -84,7 +84,7 @@ def test_levels_keep_their_order_and_each_starts_anew():
 
 
 @pytest.mark.parametrize("seed", [0, 1, 12345])
-def test_a_seed_gives_the_same_bits_and_another_seed_does_not(seed):
+def test_seed_reproduces_bits_and_others_differ(seed):
     first, again, other = (simulate(EDSS, 0.5, PLAN, seed=s) for s in (seed, seed, seed + 1))
     assert np.array_equal(first.gain, again.gain)
     assert np.array_equal(first.gain_std_db, again.gain_std_db)
@@ -122,7 +122,7 @@ def test_no_servos_give_nothing(from_rest):
 
 
 @pytest.mark.parametrize("direction", ["up", "down"])
-def test_points_from_rest_are_the_same_however_many_share_them(direction):
+def test_from_rest_points_ignore_worker_count(direction):
     plan = plan_with(
         frequencies_hz=(118.0, 125.0, 131.0, 140.0, 155.0), levels_vpk=(2.5, 1.2),
         integrate_cycles=2, from_rest=True, direction=direction,
@@ -138,7 +138,7 @@ def test_points_from_rest_are_the_same_however_many_share_them(direction):
     np.testing.assert_array_equal(one[1][:, 2:3], alone)
 
 
-def test_the_response_is_what_the_oracle_finds_from_a_settled_motion():
+def test_response_matches_oracle_from_settled_motion():
     unit = ADSS.with_parameters(b_t_deg=0.02)
     plan = plan_with(frequencies_hz=(60.0,), settle_cycles=150, integrate_cycles=5)
     bias = parse_effect("load-torque-bias:T_b=0.2")
@@ -154,7 +154,7 @@ def test_the_response_is_what_the_oracle_finds_from_a_settled_motion():
     assert response.gain_std_db[0] < 1e-3
 
 
-def test_an_offset_of_the_source_turns_the_motor_steadily():
+def test_source_offset_turns_motor_steadily():
     quiet = ADSS.with_parameters(T_f_m=0.0, T_f_L=0.0)
     plan = plan_with(frequencies_hz=(100.0,), settle_cycles=150, dc_offset_v=0.5)
     response = simulate(quiet, 0.0, plan, effects=DAMPED)
@@ -163,7 +163,7 @@ def test_an_offset_of_the_source_turns_the_motor_steadily():
     assert response.dc_v[0] == pytest.approx(p["k_ts"] * speed, rel=1e-2)
 
 
-def test_mean_and_errors_of_three_cycles_by_hand():
+def test_mean_and_errors_of_cycles_by_hand():
     # Mean 2j; departures of 0.3 along it and 0.6 across it.
     mean, along, across, worst = scatter_of_cycles(np.array([2.3j, -0.6 + 1.7j, 0.6 + 2.0j]))
     assert mean == pytest.approx(2j)
@@ -173,7 +173,7 @@ def test_mean_and_errors_of_three_cycles_by_hand():
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_standard_errors_of_synthetic_cycles_are_the_scatter_of_their_means(seed):
+def test_standard_errors_match_scatter_of_means(seed):
     # 4000 points of 12 cycles: the scatter of the means is known within 1.1 % (one sigma), the
     # bound is 5 %; a false alarm is a matter of 1e-5.
     rng = np.random.default_rng(seed)
@@ -196,7 +196,7 @@ def synthetic(cycles):
     return response_of_cycles(whole, plan, "x", {"kind": "simulated"})
 
 
-def test_standard_errors_are_given_in_decibel_and_degree():
+def test_standard_errors_are_decibel_and_degree():
     response = synthetic([[0.5 + 0.01j, 0.5 - 0.01j, 0.52, 0.48]])
     assert response.gain[0] == pytest.approx(0.5)
     along = np.std([0.0, 0.0, 0.02, -0.02], ddof=1) / 2.0
@@ -205,7 +205,7 @@ def test_standard_errors_are_given_in_decibel_and_degree():
     assert response.phase_std_deg[0] == pytest.approx(np.degrees(across / 0.5))
 
 
-def test_a_point_that_does_not_repeat_is_flagged():
+def test_point_that_does_not_repeat_is_flagged():
     small, large = 0.9 * PERIODIC_SCATTER, 1.1 * PERIODIC_SCATTER
     response = synthetic([[1.0 + small, 1.0 - small], [1.0 + large, 1.0 - large]])
     assert list(response.flags) == [0, int(PointFlag.NOT_PERIODIC)]
@@ -218,7 +218,7 @@ def test_a_single_cycle_has_no_error_bar():
     assert response.flags[0] == 0
 
 
-def test_undamped_play_is_flagged_and_a_damped_servo_without_play_is_not():
+def test_undamped_backlash_is_flagged_linear_servo_not():
     rough = simulate(ADSS, 0.5, plan_with(frequencies_hz=(133.0,), settle_cycles=20))
     assert rough.flags[0] & PointFlag.NOT_PERIODIC
     assert rough.gain_std_db[0] > 0.01
@@ -227,7 +227,7 @@ def test_undamped_play_is_flagged_and_a_damped_servo_without_play_is_not():
     assert smooth.flags[0] == 0
 
 
-def test_the_start_rests_where_the_seed_puts_it_inside_the_plays():
+def test_start_lies_inside_backlash_by_seed():
     # So weak a drive that friction holds the motor: the meshes stay where they start.
     places = []
     for seed in range(20):
@@ -242,7 +242,7 @@ def test_the_start_rests_where_the_seed_puts_it_inside_the_plays():
     assert np.ptp(places, axis=0).min() > 1.0
 
 
-def test_motion_without_bound_is_an_error_and_no_number():
+def test_unbounded_motion_is_an_error():
     engine = drivetrain_with(ADSS, 0.25).adding(drive=Damper({"th_L": 1.0}, -100.0))
     with pytest.raises(AnalysisError, match=r"100 Hz.*without bound"):
         simulate_cycles([Servo(engine.system())], plan_with(settle_cycles=50))
@@ -269,12 +269,12 @@ def test_provenance_tells_how_to_do_it_again():
     assert response.unit == "ADSS"
 
 
-def test_a_ratio_that_is_no_share_is_refused():
+def test_ratio_outside_0_to_1_is_refused():
     with pytest.raises(ConfigurationError, match="outside 0 to 1"):
         simulate(ADSS, 1.5, PLAN)
 
 
-def test_only_servos_that_need_a_shorter_step_take_it():
+def test_only_servos_that_need_shorten_the_step():
     plan = SweepPlan((40.0, 60.0, 80.0), (4.0,), settle_cycles=2, integrate_cycles=3)
     hard = [parse_effect("shaft-hardening:h=2e7")]
     servos = [Servo.of(EDSS, 0.3), Servo.of(EDSS, 0.6, hard), Servo.of(EDSS, 0.6)]

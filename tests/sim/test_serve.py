@@ -103,7 +103,7 @@ def test_it_listens_on_the_local_host_only():
                 socket.create_connection(("127.0.0.2", port), timeout=5.0)
 
 
-def test_a_port_in_use_is_a_link_error():
+def test_port_in_use_is_a_link_error():
     with served() as server:
         port = int(server.addresses["tcp"].split(":")[1])
         with pytest.raises(LinkError, match=str(port)):
@@ -130,7 +130,7 @@ def test_two_clients_get_their_own_replies():
             assert line(two) == b"1992.0\n"
 
 
-def test_who_asks_without_end_and_never_listens_is_hung_up_on(monkeypatch):
+def test_client_that_never_reads_is_disconnected(monkeypatch):
     monkeypatch.setattr("sim.instrument.server_endpoints._MOST_UNHEARD", 10_000)
 
     def ask_on(wire):
@@ -146,7 +146,7 @@ def test_who_asks_without_end_and_never_listens_is_hung_up_on(monkeypatch):
         assert b"35670A" in other.recv(100)
 
 
-def test_a_script_that_only_sleeps_finds_the_sweep_done():
+def test_sleeping_script_finds_the_sweep_done():
     with served() as server, raw(server) as wire:
         wire.sendall(
             b"*RST;*CLS\nINST:SEL SINE\nFREQ:RES:AUTO OFF\nFREQ:STAR 100;STOP 200;RES 51 PNT/SWP\n"
@@ -277,7 +277,7 @@ def measured(transport: Any) -> list[complex]:
         analyser.close()
 
 
-def test_the_same_seed_gives_the_same_points_on_every_wire():
+def test_seed_gives_same_points_on_every_wire():
     expected = measured(Loopback(instrument(seed=7)))
     assert expected == pytest.approx(
         [known_answer(hz) for hz in (100.0, 150.0, 123.5, 200.0)], rel=0.02
@@ -291,7 +291,8 @@ def test_the_same_seed_gives_the_same_points_on_every_wire():
 
 
 @pytest.mark.parametrize("wire", ["tcp", "prologix-tcp", "prologix"])
-def test_a_dropped_connection_leaves_the_source_on_and_can_be_met_again(wire):
+def test_dropped_connection_leaves_source_on(wire):
+    """The instrument can be connected to again."""
     with served("dropped-connection:point=2") as server:
         transport = open_transport(urls(server)[wire])
         analyser = HP35670A(transport)
@@ -307,7 +308,7 @@ def test_a_dropped_connection_leaves_the_source_on_and_can_be_met_again(wire):
         assert server.instrument.output_vpk == 0
 
 
-def test_the_name_of_the_terminal_stays_and_goes_with_the_server():
+def test_terminal_name_survives_a_dropped_connection():
     with served("dropped-connection:phase=prepare") as server:
         path = server.addresses["prologix_pty"]
         assert os.path.realpath(path).startswith("/dev/")
@@ -326,7 +327,7 @@ def test_the_name_of_the_terminal_stays_and_goes_with_the_server():
     assert not os.path.lexists(path)
 
 
-def test_an_ar488_on_a_terminal_starts_anew_when_it_is_opened():
+def test_ar488_on_terminal_restarts_when_opened():
     import serial
 
     with served(dialect="ar488") as server:

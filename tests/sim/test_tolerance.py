@@ -25,7 +25,8 @@ def unit_with(tolerance, name="adss"):
 
 
 @pytest.mark.parametrize("name", ["adss", "edss"])
-def test_the_shipped_units_are_believed_to_half_a_per_cent_in_six_values(name):
+def test_shipped_units_state_six_tolerances(name):
+    """Half a per cent each."""
     believed = load_unit(name).believed
     for symbol, (share, origin) in believed.items():
         assert share == (0.005 if symbol in SIX else 0.0)
@@ -43,7 +44,7 @@ KINDS = {
 
 
 @pytest.mark.parametrize("tolerance", [None, {}, {"R_m": 0.2}])
-def test_a_value_of_which_a_file_says_nothing_is_believed_by_its_kind(tolerance):
+def test_unstated_value_has_tolerance_of_its_kind(tolerance):
     believed = unit_with(tolerance).believed
     assert "b_t_deg" not in believed
     expected = {symbol: share for share, symbols in KINDS.items() for symbol in symbols}
@@ -56,7 +57,7 @@ def test_a_value_of_which_a_file_says_nothing_is_believed_by_its_kind(tolerance)
 
 
 @pytest.mark.parametrize("name", ["one-stage", "two-stage"])
-def test_a_new_file_tells_what_is_believed_by_kind(name):
+def test_new_file_states_tolerances_by_kind(name):
     text = config_path("templates", name).read_text(encoding="utf-8")
     unit = unit_from_mapping(tomllib.loads(text), name)
     assert {origin for _, origin in unit.believed.values()} == {"default"}
@@ -68,7 +69,7 @@ def test_a_new_file_tells_what_is_believed_by_kind(name):
     st.floats(1e-6, 0.5),
     st.sampled_from([("uniform", 3.0**0.5), ("triangular", 6.0**0.5), ("normal", 1.96)]),
 )
-def test_limits_count_as_the_standard_deviation_of_their_distribution(within, kind):
+def test_limits_count_as_their_standard_deviation(within, kind):
     distribution, divisor = kind
     unit = unit_with({"R_m": {"within": within, "distribution": distribution}})
     assert unit.believed["R_m"] == (pytest.approx(within / divisor), "unit file")
@@ -87,13 +88,14 @@ def test_limits_count_as_the_standard_deviation_of_their_distribution(within, ki
     [{}, {"within": -0.1}, {"within": "a"}, {"within": 0.1, "distribution": "beta"},
      {"within": 0.1, "sigma": 2.0}, {"within": 2.0}, {"within": True}],
 )  # fmt: skip
-def test_what_are_no_limits_is_refused_in_one_line(value):
+def test_invalid_limits_are_refused_in_one_line(value):
     with pytest.raises(ConfigurationError, match=r"mine\.toml: tolerance\.R_m") as caught:
         unit_with({"R_m": value})
     assert "\n" not in str(caught.value)
 
 
-def test_a_name_counts_before_the_default_and_an_option_before_the_file():
+def test_tolerance_precedence_is_option_name_default():
+    """An option counts before the file, a name before the default."""
     unit = unit_with({"default": 0.02, "R_m": 0.06, "N": 0.001, "k_a": 0})
     assert unit.believed["R_m"] == (0.06, "unit file")
     assert unit.believed["J_L"] == (0.02, "unit file")
@@ -112,7 +114,7 @@ def test_a_name_counts_before_the_default_and_an_option_before_the_file():
 
 
 @given(st.sampled_from(["k_s2", "r_m", "", "b_t_deg", "filter_denominator", "J_p2 "]))
-def test_a_name_without_a_tolerance_is_refused_with_those_that_have_one(name):
+def test_unknown_tolerance_name_lists_allowed_ones(name):
     for refused in (lambda: unit_with({name: 0.01}),
                     lambda: load_unit("adss").with_tolerance({name: 0.01})):  # fmt: skip
         with pytest.raises(ConfigurationError) as caught:
@@ -131,7 +133,7 @@ def test_what_is_no_share_is_refused(value):
         unit_with({"R_m": value})
 
 
-def test_a_drive_of_one_stage_has_no_tolerance_of_a_second():
+def test_one_stage_drive_has_no_second_tolerance():
     document = tomllib.loads(config_path("templates", "one-stage").read_text())
     assert "k_2" not in unit_from_mapping(document, "one").tolerances
     document["tolerance"] = {"k_2": 0.1}

@@ -41,7 +41,7 @@ def test_shipped_units_hold_the_published_table(name):
     assert unit.electronics.filter_denominator == (1.0, 1710.0, 723439.0)
 
 
-def test_every_fault_is_named_at_once_with_file_and_key(tmp_path):
+def test_all_faults_are_named_with_file_key(tmp_path):
     wrong = tmp_path / "wrong.toml"
     text = config_path("units", "adss").read_text(encoding="utf-8")
     text = text.replace("R_m = 4.10", "R_m = -4.10").replace("k_ts = 8.60e-2", 'k_ts = "much"')
@@ -71,7 +71,7 @@ def test_every_fault_is_named_at_once_with_file_and_key(tmp_path):
         (b"schema = true", "schema"),
     ],
 )
-def test_a_file_that_is_no_unit_is_refused(tmp_path, content, said):
+def test_file_that_is_no_unit_is_refused(tmp_path, content, said):
     path = tmp_path / "unit.toml"
     path.write_bytes(content)
     with pytest.raises(ConfigurationError, match=said):
@@ -79,7 +79,7 @@ def test_a_file_that_is_no_unit_is_refused(tmp_path, content, said):
 
 
 @pytest.mark.parametrize("name", ["nosuch", "../units", "/", "a\0b"])
-def test_a_name_that_leads_nowhere_is_refused_with_the_names_that_exist(name):
+def test_unknown_name_is_refused_with_known_ones(name):
     with pytest.raises(ConfigurationError, match="adss, edss"):
         load_unit(name)
 
@@ -118,7 +118,7 @@ def test_no_single_bad_value_is_half_accepted(data):
         unit_from_mapping(bad, source="here")
 
 
-def test_whole_numbers_are_real_numbers_but_truth_values_are_not():
+def test_integers_are_numbers_but_booleans_are_not():
     written = document()
     written["stage2"]["N"] = 10
     assert unit_from_mapping(written, source="here").stage2.N == 10.0
@@ -129,7 +129,7 @@ def test_whole_numbers_are_real_numbers_but_truth_values_are_not():
         unit_from_mapping(written, source="here")
 
 
-def test_changing_a_parameter_leaves_the_rest_and_is_checked_like_a_file():
+def test_changed_parameter_is_checked_like_a_file():
     unit = load_unit("adss")
     changed = unit.with_parameters(k_s1=30.0, b_t_deg=0)
     assert changed.parameters == unit.parameters | {"k_s1": 30.0, "b_t_deg": 0.0}
@@ -155,12 +155,12 @@ def test_stage_backlash_adds_up_to_the_total(ratio, b_t_deg, N):
     assert 2.0 * math.degrees(delta_2) == pytest.approx(b.b2_deg)
 
 
-def test_stage_backlash_of_the_azimuth_unit_at_a_quarter():
+def test_stage_backlash_of_azimuth_at_a_quarter():
     b = stage_backlash(0.25, 0.066, 10.5)
     assert (b.b1_deg, b.b2_deg) == (pytest.approx(0.17325), pytest.approx(0.0495))
 
 
 @pytest.mark.parametrize("ratio", [-0.01, 1.01, math.nan, math.inf])
-def test_a_ratio_that_is_no_share_is_refused(ratio):
+def test_ratio_outside_0_to_1_is_refused(ratio):
     with pytest.raises(ConfigurationError, match="outside 0 to 1"):
         stage_backlash(ratio, 0.066, 10.5)

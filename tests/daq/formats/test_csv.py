@@ -44,7 +44,7 @@ def refused(tmp_path, content):
 
 
 @pytest.mark.parametrize("path", PRACTICE, ids=lambda path: path.stem)
-def test_a_practice_file_is_read_whole_and_survives_being_written(path, tmp_path):
+def test_practice_file_survives_a_write(path, tmp_path):
     original = read_response(path)
     rows = [line for line in path.read_text().splitlines() if line[:1].isdigit()]
     assert len(original) == len(rows) == 183
@@ -134,14 +134,14 @@ def test_a_swept_down_file_keeps_its_order(tmp_path):
 
 
 @pytest.mark.parametrize("frequencies", [[100.0], [100.0, 101.0]])
-def test_one_point_of_a_level_or_two_are_no_less_true_than_many(tmp_path, frequencies):
+def test_levels_of_few_points_are_kept(tmp_path, frequencies):
     few = response(frequency_hz=frequencies, gain=0.5 + 0.1j, provenance=MEASURED)
     write_response(few, tmp_path / "few.csv")
     assert_same(read_response(tmp_path / "few.csv"), few)
 
 
 @pytest.mark.parametrize("direction", ["up", "down"])
-def test_a_frequency_that_was_measured_twice_keeps_both_readings(tmp_path, direction):
+def test_repeated_frequency_keeps_both_readings(tmp_path, direction):
     path = tmp_path / "twice.csv"
     twice = [50.0, 50.015625, 50.015625, 50.03125][:: 1 if direction == "up" else -1]
     both = response(
@@ -157,7 +157,7 @@ def test_a_frequency_that_was_measured_twice_keeps_both_readings(tmp_path, direc
     assert "repeated at source level 1.5 V; take one out" in refused(tmp_path, silent)
 
 
-def test_only_a_response_with_a_frequency_twice_says_so(tmp_path):
+def test_only_repeated_frequencies_give_a_note(tmp_path):
     path = tmp_path / "once.csv"
     for frequencies, said in ([100.0, 101.0, 102.0], False), ([100.0, 101.0, 101.0], True):
         write_response(response(frequency_hz=frequencies), path)
@@ -167,7 +167,7 @@ def test_only_a_response_with_a_frequency_twice_says_so(tmp_path):
     assert "repeated_points" not in path.read_text()
 
 
-def test_a_measurement_on_a_grid_coarser_than_its_plan_can_be_exported(store, tmp_path):
+def test_grid_coarser_than_plan_can_be_exported(store, tmp_path):
     plan = SweepPlan((50.0, 50.01, 50.02), (1.5,))
     measurement = store.begin(MeasurementHeader("ADSS", "", plan, "sim:", "t"))
     for asked_hz, set_hz in zip(plan.frequencies_hz, (50.0, 50.015625, 50.015625), strict=True):
@@ -197,7 +197,7 @@ def test_a_spreadsheet_may_have_saved_the_file(tmp_path):
     assert len(read_response(path)) == 3
 
 
-def test_a_file_that_names_no_kind_counts_as_measured(tmp_path):
+def test_file_without_kind_counts_as_measured(tmp_path):
     path = tmp_path / "plain.csv"
     path.write_text("# operator = 'M. Rossi'\n" + GOOD)
     assert dict(read_response(path).provenance) == {"kind": "measured", "operator": "M. Rossi"}
@@ -249,7 +249,7 @@ def test_a_file_without_its_frame_is_refused(tmp_path, content, said):
         ("101,1.5", "# 101,1.5", "line 4: a comment after the header"),
     ],
 )
-def test_a_wrong_row_is_named_by_its_line(tmp_path, old, new, said):
+def test_error_names_line_of_wrong_row(tmp_path, old, new, said):
     assert GOOD.count(old) == 1 or old in ("102,", "101,1.5")
     assert said in refused(tmp_path, GOOD.replace(old, new, 1))
 
@@ -278,7 +278,7 @@ def test_a_wrong_comment_is_refused(tmp_path, comment, said):
 
 
 @pytest.mark.parametrize("sweep", ["# sweep = 'up'\n", ""])
-def test_falling_frequencies_need_a_sweep_that_goes_down(tmp_path, sweep):
+def test_falling_frequencies_need_a_downward_sweep(tmp_path, sweep):
     rows = "102,1,-3,,\n101,1,-3,,\n100,1,-3,,\n"
     text = sweep + '# unit = "ADSS"\n' + HEADER + rows
     assert "out of order" in refused(tmp_path, text)
@@ -298,7 +298,7 @@ cells = st.one_of(st.floats().map(repr), st.integers().map(str), st.text(max_siz
 
 @given(row=st.lists(cells, min_size=4, max_size=6))
 @settings(max_examples=300, deadline=None)
-def test_a_row_is_either_refused_or_read_as_it_stands(row, tmp_path_factory):
+def test_row_is_refused_or_read_as_written(row, tmp_path_factory):
     path = tmp_path_factory.mktemp("csv") / "row.csv"
     path.write_bytes((GOOD + "200,1.5,-5,12,0.1\n" + ",".join(row) + "\n").encode())
     try:
@@ -332,7 +332,7 @@ def test_an_unknown_suffix_lists_the_known_ones(name, tmp_path):
         check_writable("trace.sdf")
 
 
-def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path):
+def test_failed_write_keeps_the_old_file_only(tmp_path):
     path = tmp_path / "kept.csv"
     write_response(response(), path)
     before = path.read_bytes()
@@ -352,7 +352,7 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path):
     assert [entry.name for entry in tmp_path.iterdir()] == ["kept.csv"]
 
 
-def test_a_file_is_never_made_where_none_belongs(tmp_path):
+def test_folder_device_or_missing_folder_is_refused(tmp_path):
     (tmp_path / "folder.csv").mkdir()
     (tmp_path / "pipe.csv").symlink_to("/dev/null")
     for place in ("folder.csv", "pipe.csv", "missing/response.csv"):
@@ -361,7 +361,7 @@ def test_a_file_is_never_made_where_none_belongs(tmp_path):
     assert Path("/dev/null").is_char_device()
 
 
-def test_a_link_is_followed_and_stays_a_link(tmp_path):
+def test_link_is_followed_and_kept(tmp_path):
     (tmp_path / "real.csv").write_text("old")
     (tmp_path / "link.csv").symlink_to("real.csv")
     write_response(response(), tmp_path / "link.csv")
@@ -369,7 +369,7 @@ def test_a_link_is_followed_and_stays_a_link(tmp_path):
     assert len(read_response(tmp_path / "real.csv")) == 3
 
 
-def test_spoilt_readings_are_listed_and_not_passed_off_as_data(tmp_path):
+def test_spoilt_readings_are_listed_apart(tmp_path):
     path = tmp_path / "spoilt.csv"
     flags = [0, PointFlag.SPOILT, 0, PointFlag.OVERLOAD]
     spoilt = response(
@@ -384,7 +384,7 @@ def test_spoilt_readings_are_listed_and_not_passed_off_as_data(tmp_path):
     assert_same(read_response(path), read)
 
 
-def test_an_offset_that_is_no_voltage_is_refused_with_the_file_that_states_it(tmp_path):
+def test_invalid_offset_is_refused_with_its_file(tmp_path):
     path = tmp_path / "odd.csv"
     path.write_text('# dc_offset_v = "half"\n' + PRACTICE[0].read_text())
     with pytest.raises(FileFormatError, match=r"odd\.csv: .*dc_offset_v 'half' is no voltage"):

@@ -37,7 +37,7 @@ def test_what_is_known_of_some_rows_only(tmp_path):
     ["[1.0]", "3", '"x"', "[[1.0, 2.0]]", '["a", "b"]', "[[1.0], [1.0, 2.0]]", "[true]", "{a = 1}"],
 )
 @pytest.mark.parametrize("key", ["point_dc_v", "point_harmonic2"])
-def test_a_list_that_does_not_fit_the_rows_is_refused(tmp_path, key, value):
+def test_list_of_other_length_is_refused(tmp_path, key, value):
     path = tmp_path / "x.csv"
     write_response(measured(dc_v=np.nan, harmonic3=np.nan), path)
     path.write_text(f"# {key} = {value}\n" + path.read_text())

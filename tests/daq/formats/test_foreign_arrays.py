@@ -11,7 +11,7 @@ from daq.formats import Reading, read_response
 from daq.formats.reading import remarks_of
 
 
-def test_variables_of_a_matlab_file_are_read_by_name(tmp_path):
+def test_matlab_variables_are_read_by_name(tmp_path):
     path = tmp_path / "m.mat"
     savemat(path, {"f": HERTZ, "H": GAIN[:, None], "notes": "text", "fs": 1000.0})
     with pytest.raises(FileFormatError, match=r"f 1x181, H 181x1; say what these are"):
@@ -24,7 +24,7 @@ def test_variables_of_a_matlab_file_are_read_by_name(tmp_path):
     np.testing.assert_array_equal(guessed.levels_vpk, [2.0])
 
 
-def test_fields_of_a_struct_and_columns_of_a_matrix_have_names(tmp_path):
+def test_struct_fields_and_matrix_columns_have_names(tmp_path):
     path = tmp_path / "s.mat"
     matrix = np.column_stack([GAIN, 2 * GAIN, 3 * GAIN])
     savemat(path, {"data": {"w": 2 * np.pi * HERTZ, "frf": matrix, "x": np.zeros((2, 181, 2))}})
@@ -37,7 +37,7 @@ def test_fields_of_a_struct_and_columns_of_a_matrix_have_names(tmp_path):
 
 
 @pytest.mark.parametrize("pair", [None, ("r", "i"), ("real", "imag")])
-def test_data_sets_of_an_hdf5_file_are_read_by_path(tmp_path, pair):
+def test_hdf5_data_sets_are_read_by_path(tmp_path, pair):
     path = tmp_path / "d.h5"
     values = GAIN
     if pair is not None:
@@ -53,7 +53,7 @@ def test_data_sets_of_an_hdf5_file_are_read_by_path(tmp_path, pair):
     np.testing.assert_allclose(response.gain, GAIN)
 
 
-def test_a_matlab_file_of_version_73_is_read_alike(tmp_path):
+def test_matlab_version_73_is_read_alike(tmp_path):
     path = tmp_path / "v73.mat"
     with h5py.File(path, "w", userblock_size=512) as file:
         file["f"], file["db"], file["deg"] = HERTZ[None], DB[None], DEG[None]
@@ -82,7 +82,7 @@ def test_variables_that_are_no_response_are_refused(tmp_path, held, reading, fau
         read_response(path, reading)
 
 
-def test_a_bomb_of_another_program_is_refused_in_bounded_memory(tmp_path):
+def test_foreign_bomb_is_refused_in_bounded_memory(tmp_path):
     path = tmp_path / "bomb.h5"
     with h5py.File(path, "w") as file:
         file["f"] = HERTZ

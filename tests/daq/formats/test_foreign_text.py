@@ -19,7 +19,7 @@ TABLE = "Frequency (Hz);Gain (dB);Phase (deg)\n" + rows(HERTZ, DB, DEG, mark=";"
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.program)
-def test_a_file_of_a_program_is_read_rightly_or_says_what_to_tell(file, tmp_path):
+def test_program_file_is_right_or_names_option(file, tmp_path):
     path = tmp_path / file.name
     path.write_bytes(file.content)
     if file.told != NOTHING_TOLD:
@@ -36,7 +36,7 @@ def test_a_file_of_a_program_is_read_rightly_or_says_what_to_tell(file, tmp_path
     assert any("as frequency_" in text for text in remarks_of(response))
 
 
-def test_the_page_of_tried_files_names_each_program():
+def test_page_of_tested_files_names_all_programs():
     page = (Path(__file__).parents[3] / "docs" / "foreign-files.md").read_text()
     assert len(FILES) >= 30
     for file in FILES:
@@ -66,7 +66,7 @@ def read_text(tmp_path, text, reading=NOTHING_TOLD, name="x.csv"):
         ("Frequency (Hz),SPL (dB)\n" + rows(HERTZ, DB), "gain_db"),
     ],
 )
-def test_a_guess_is_not_taken_unless_it_is_confirmed(tmp_path, text, quantity):
+def test_guess_is_used_only_when_confirmed(tmp_path, text, quantity):
     with pytest.raises(FileFormatError, match=f"by guess .* as {quantity}.*--as-guessed"):
         read_text(tmp_path, text)
     response = read_text(tmp_path, text, Reading(as_guessed=True))
@@ -94,7 +94,7 @@ def test_a_guess_is_not_taken_unless_it_is_confirmed(tmp_path, text, quantity):
         ("1;2;3;4\n2;3;4;5\n", "4 columns without names"),
     ],
 )
-def test_a_table_with_any_fault_is_refused_whole(tmp_path, text, fault):
+def test_table_with_any_fault_is_refused_whole(tmp_path, text, fault):
     with pytest.raises(FileFormatError, match=fault):
         read_text(tmp_path, text)
 
@@ -104,7 +104,7 @@ def test_a_negative_linear_magnitude_is_refused(tmp_path):
         read_text(tmp_path, "Frequency (Hz),Gain (lin)\n" + rows(HERTZ, np.round(DB, 1)))
 
 
-def test_rows_without_a_phase_are_read_without_it(tmp_path):
+def test_rows_without_phase_are_read(tmp_path):
     line = next(line for line in TABLE.splitlines() if line.startswith("25;"))
     bare = ";".join(line.split(";")[:2])
     for empty in ("", "NaN", "--"):
@@ -113,13 +113,13 @@ def test_rows_without_a_phase_are_read_without_it(tmp_path):
         np.testing.assert_allclose(np.abs(response.gain), np.abs(GAIN), rtol=1e-6)
 
 
-def test_a_comma_that_may_set_thousands_apart_is_a_guess(tmp_path):
+def test_possible_thousands_separator_is_a_guess(tmp_path):
     rows_ = "".join(f"{k};{k},{100 + k}\n" for k in range(1, 9))
     with pytest.raises(FileFormatError, match="whether the comma in 1,101 is a decimal mark"):
         read_text(tmp_path, "Frequency (Hz);Gain (lin)\n" + rows_)
 
 
-def test_falling_rows_are_turned_round_and_that_is_said(tmp_path):
+def test_falling_rows_are_reversed_with_a_note(tmp_path):
     text = "Frequency (Hz),Gain (dB),Phase (deg)\n" + rows(HERTZ[::-1], DB[::-1], DEG[::-1])
     response = read_text(tmp_path, text)
     np.testing.assert_allclose(response.gain, GAIN, rtol=1e-6)
@@ -129,7 +129,7 @@ def test_falling_rows_are_turned_round_and_that_is_said(tmp_path):
     assert down.direction == "down"
 
 
-def test_coherence_beside_a_response_is_error_bars_given_the_averages(tmp_path):
+def test_coherence_and_averages_give_error_bars(tmp_path):
     coherence = np.linspace(0.3, 1.0, len(HERTZ))
     text = "Frequency (Hz),Gain (dB),Phase (deg),Coherence\n" + rows(HERTZ, DB, DEG, coherence)
     plain = read_text(tmp_path, text)
@@ -144,7 +144,7 @@ def test_coherence_beside_a_response_is_error_bars_given_the_averages(tmp_path):
         read_text(tmp_path, text.replace(",0.3\n", ",1.2\n", 1), Reading(averages=100))
 
 
-def test_measured_amplitudes_are_no_levels_but_a_quotient(tmp_path):
+def test_measured_amplitudes_give_gain_not_levels(tmp_path):
     drive = 2.0 + 0.01 * np.sin(HERTZ)
     text = rows(HERTZ, drive, drive * np.abs(GAIN), DEG)
     first = ("frequency_hz", "1")
@@ -159,7 +159,7 @@ def test_measured_amplitudes_are_no_levels_but_a_quotient(tmp_path):
     np.testing.assert_array_equal(response.levels_vpk, [2.0])
 
 
-def test_levels_in_a_column_are_converted_to_peak(tmp_path):
+def test_level_column_is_converted_to_peak(tmp_path):
     text = "source_vrms,Frequency (Hz),Gain (dB)\n" + "".join(
         f"{level},{hertz},-3\n" for level in (1.0, 2.0) for hertz in (10, 20, 30, 40)
     )
@@ -180,19 +180,19 @@ def test_levels_in_a_column_are_converted_to_peak(tmp_path):
         (Reading(averages=3), "has no coherence"),
     ],
 )
-def test_what_is_told_of_a_table_must_fit_it(tmp_path, reading, fault):
+def test_options_that_misfit_table_are_refused(tmp_path, reading, fault):
     with pytest.raises(InputError, match=fault):
         read_text(tmp_path, TABLE, reading)
 
 
-def test_headers_named_gain_alone_say_nothing_of_decibels(tmp_path):
+def test_header_gain_alone_does_not_imply_decibels(tmp_path):
     path = tmp_path / "x.csv"
     path.write_text("freq,gain,phase\n" + rows(HERTZ, DB, DEG))
     layout = foreign_layout(path)
     assert [one.how for one in layout.assigned] == ["guessed"] * 3
 
 
-def test_a_trace_that_the_35670a_saved_as_ascii_is_read_with_its_abscissa(tmp_path):
+def test_ascii_trace_of_35670a_keeps_its_abscissa(tmp_path):
     header = 'SDF_DATA_HDR   \ndataType      FREQ_RESP_DATA  \nxUnit.label   "Hz"  \n'
     (tmp_path / "T1.HDR").write_text(header)
     (tmp_path / "T1.X").write_text(rows(HERTZ, form="{:.10e}"))
@@ -211,7 +211,7 @@ def test_a_trace_that_the_35670a_saved_as_ascii_is_read_with_its_abscissa(tmp_pa
 
 
 @pytest.mark.parametrize("listed", [True, False])
-def test_a_transfer_function_of_diaggui_is_read_with_its_coherence(tmp_path, listed):
+def test_diaggui_transfer_function_keeps_its_coherence(tmp_path, listed):
     path = tmp_path / "tf.xml"
     path.write_bytes(dtt_xml(listed))
     response = read_response(path)
@@ -247,7 +247,7 @@ def test_a_damaged_file_of_diaggui_is_refused(tmp_path, old, new, fault):
         read_response(path)
 
 
-def test_entities_that_would_fill_the_memory_are_refused(tmp_path):
+def test_expanding_xml_entities_are_refused(tmp_path):
     path = tmp_path / "bomb.xml"
     layers = "".join(f'<!ENTITY l{k} "{f"&l{k - 1};" * 10}">' for k in range(1, 10))
     path.write_text(f'<!DOCTYPE LIGO_LW [<!ENTITY l0 "ha">{layers}]><LIGO_LW>&l9;</LIGO_LW>')

@@ -28,9 +28,7 @@ def written(path, **changes):
 @pytest.mark.parametrize("hertz", [None, HERTZ])
 @pytest.mark.parametrize("double", [True, False])
 @pytest.mark.parametrize("order", ["<", ">"])
-def test_a_binary_function_is_read_whose_end_stands_right_behind_its_data(
-    tmp_path, hertz, double, order
-):
+def test_binary_function_may_end_without_line_break(tmp_path, hertz, double, order):
     path = tmp_path / "b.uff"
     one = binary_58(hertz=hertz, double=double, order=order)
     assert not one.removesuffix(b"    -1\n").endswith(b"\n")
@@ -43,7 +41,8 @@ def test_a_binary_function_is_read_whose_end_stands_right_behind_its_data(
 
 
 @pytest.mark.parametrize("stated", [None, 0, 100, 1448])
-def test_binary_data_may_look_like_an_end_and_state_a_wrong_length(tmp_path, stated):
+def test_binary_data_may_resemble_an_end_mark(tmp_path, stated):
+    """Their stated length may be wrong as well."""
     path = tmp_path / "b.uff"
     fake = GAIN.copy()
     fake.real[3] = np.frombuffer(b"\n    -1\n", "<f8")[0]
@@ -51,7 +50,7 @@ def test_binary_data_may_look_like_an_end_and_state_a_wrong_length(tmp_path, sta
     np.testing.assert_array_equal(read_response(path).gain, fake)
 
 
-def test_a_binary_function_of_another_machine_is_refused_with_the_cure(tmp_path):
+def test_binary_of_another_machine_names_remedy(tmp_path):
     path = tmp_path / "b.uff"
     for old, new in ((b"58b     1     2", b"58b     1     3"), (b"58b     1", b"58b     3")):
         path.write_bytes(binary_58().replace(old, new))
@@ -59,13 +58,13 @@ def test_a_binary_function_of_another_machine_is_refused_with_the_cure(tmp_path)
             read_response(path)
 
 
-def test_the_number_of_a_set_need_not_be_aligned(tmp_path):
+def test_set_number_need_not_be_aligned(tmp_path):
     path = tmp_path / "b.uff"
     path.write_bytes(binary_58().replace(b"    58b     1     2          11", b"58b 1 2 11"))
     np.testing.assert_allclose(read_response(path).gain, GAIN)
 
 
-def test_a_binary_function_that_is_cut_or_changed_is_refused(tmp_path):
+def test_truncated_or_changed_binary_is_refused(tmp_path):
     path = tmp_path / "b.uff"
     content = binary_58()
     line_ends = content.replace(b"\n", b"\r\n")
@@ -77,7 +76,7 @@ def test_a_binary_function_that_is_cut_or_changed_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize("hertz", [None, HERTZ])
-def test_a_last_line_may_be_filled_up_with_zeros(tmp_path, hertz):
+def test_last_line_may_be_padded_with_zeros(tmp_path, hertz):
     path = tmp_path / "p.uff"
     numbers = interleaved(hertz=hertz)
     fill = -len(numbers) % 6
@@ -91,7 +90,7 @@ def test_a_last_line_may_be_filled_up_with_zeros(tmp_path, hertz):
             read_response(path)
 
 
-def test_numbers_without_blanks_and_fortran_exponents_are_read(tmp_path):
+def test_unseparated_numbers_and_fortran_exponents_are_read(tmp_path):
     path = tmp_path / "f.uff"
     values = np.full(181, -1.23456e-3)
     text = text_58(values, 2, True, ordinate="dB").replace(" -1.23456E-03", "-1.234560D-03")
@@ -105,7 +104,7 @@ def test_numbers_without_blanks_and_fortran_exponents_are_read(tmp_path):
 @pytest.mark.parametrize(
     ("name", "row"), [("1", 0), ("2:-Z/1:+X", 1), ("2:-z/1:+x", 1), ("Load point", 1), ("a/c", 2)]
 )
-def test_one_of_several_functions_is_chosen_by_number_dof_or_name(tmp_path, name, row):
+def test_function_is_chosen_by_number_dof_name(tmp_path, name, row):
     path = tmp_path / "s.uff"
     written(path)
     written(path, data=2 * GAIN, rsp_node=2, rsp_dir=-3, id1="Load point")
@@ -154,7 +153,7 @@ def test_an_unknown_abscissa_is_refused(tmp_path):
         ((0, "", 2.5), None),
     ],
 )
-def test_a_third_axis_is_a_level_only_where_it_says_so(tmp_path, third, level):
+def test_third_axis_is_level_only_if_stated(tmp_path, third, level):
     path = tmp_path / "z.uff"
     path.write_text(text_58(interleaved(), 5, True, points=181, third=third))
     response = read_response(path)
@@ -167,7 +166,7 @@ def test_a_third_axis_is_a_level_only_where_it_says_so(tmp_path, third, level):
             read_response(path, Reading(level_vpk=7.0))
 
 
-def test_a_real_function_is_taken_only_where_somebody_says_what_it_holds(tmp_path):
+def test_real_function_needs_its_meaning_stated(tmp_path):
     path = tmp_path / "r.uff"
     decibels = 20 * np.log10(np.abs(GAIN))
     for values in (decibels, np.abs(GAIN), GAIN.real):
@@ -185,7 +184,7 @@ def test_a_real_function_is_taken_only_where_somebody_says_what_it_holds(tmp_pat
     np.testing.assert_allclose(read_response(path, both).gain, GAIN, rtol=1e-4, atol=1e-6)
 
 
-def test_a_line_at_0_hz_is_left_out_and_said(tmp_path):
+def test_zero_frequency_row_is_omitted_with_note(tmp_path):
     path = tmp_path / "dc.uff"
     hertz = 0.5 * np.arange(221)
     written(path, x=hertz, data=gain_at(hertz))
@@ -229,7 +228,7 @@ WHOLE = text_58(interleaved(), 5, True, points=181).encode()
 
 @given(st.integers(0, len(WHOLE) - 1), st.integers(0, len(WHOLE)), st.binary(max_size=3))
 @settings(max_examples=150, deadline=None)
-def test_damage_is_refused_or_changes_what_it_says(tmp_path_factory, start, length, put):
+def test_damage_is_refused_or_changes_content(tmp_path_factory, start, length, put):
     path = tmp_path_factory.mktemp("d") / "d.uff"
     path.write_bytes(WHOLE[:start] + put + WHOLE[start + length :])
     told = "read"

@@ -82,7 +82,7 @@ def crashers(folder: Path) -> list[Path]:
     return paths
 
 
-def test_a_file_that_crashes_its_reader_is_one_line():
+def test_crash_of_reader_is_one_line():
     done = subprocess.run([LASHBENCH, "extract", str(CRASH)], capture_output=True, text=True)
     assert done.returncode == 2
     assert done.stdout == ""
@@ -113,14 +113,14 @@ def test_a_bomb_is_refused_in_bounded_memory(tmp_path):
     assert peak_mib < 1024
 
 
-def test_the_same_file_with_few_numbers_is_no_bomb(tmp_path):
+def test_small_file_of_same_form_passes_limit(tmp_path):
     path = tmp_path / "small.mat"
     path.write_bytes(bomb((1 << 20) // 8))
     with pytest.raises(FileFormatError, match="its document is missing"):
         read_response(path)
 
 
-def test_a_reader_that_does_not_end_is_ended(tmp_path):
+def test_endless_reader_is_stopped(tmp_path):
     path = tmp_path / "x.mat"
     write_response(measured(), path)
     with pytest.raises(FileFormatError, match="it took too long"):
@@ -128,7 +128,7 @@ def test_a_reader_that_does_not_end_is_ended(tmp_path):
 
 
 @pytest.mark.parametrize("suffix", ["mat", "h5"])
-def test_what_was_read_apart_is_what_was_written(tmp_path, suffix):
+def test_child_process_reads_what_was_written(tmp_path, suffix):
     path, whole = tmp_path / f"x.{suffix}", measured()
     write_response(whole, path)
     again = read_response(path)

@@ -29,7 +29,7 @@ except LashbenchError as error:
 
 @pytest.mark.parametrize("suffix", [".csv", ".h5", ".mat", ".uff"])
 @pytest.mark.parametrize("limit", [0, 8192])
-def test_a_full_disk_is_told_in_one_line_and_keeps_the_old_file(tmp_path, suffix, limit):
+def test_full_disk_keeps_old_file_with_message(tmp_path, suffix, limit):
     pytest.importorskip("resource")
     path = tmp_path / f"lim{suffix}"
     root = Path(__file__).parents[3]

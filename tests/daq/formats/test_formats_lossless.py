@@ -32,7 +32,7 @@ def read_here(path: Path) -> FrequencyResponse:
 @every_format
 @often
 @given(response=responses())
-def test_any_response_comes_back_to_the_last_bit(tmp_path, suffix, response):
+def test_any_response_survives_bit_for_bit(tmp_path, suffix, response):
     path = tmp_path / f"any{suffix}"
     write_response(response, path)
     same(read_here(path), response)
@@ -59,7 +59,7 @@ def test_conversions_in_a_chain_lose_nothing(tmp_path, suffix):
 
 
 @every_format
-def test_arrays_and_tuples_in_the_provenance_come_back_as_lists(tmp_path, suffix):
+def test_provenance_arrays_and_tuples_return_as_lists(tmp_path, suffix):
     path = tmp_path / f"p{suffix}"
     provenance = {"a": np.arange(3), "b": (1, 2.5), "c": np.float64(0.1), "d": math.nan}
     write_response(measured(provenance=provenance), path)
@@ -72,7 +72,7 @@ def test_arrays_and_tuples_in_the_provenance_come_back_as_lists(tmp_path, suffix
 
 @every_format
 @pytest.mark.parametrize("odd", [b"bytes", object(), {1: "x"}, {"x": {2, 3}}])
-def test_a_provenance_without_a_form_is_refused_and_nothing_written(tmp_path, suffix, odd):
+def test_unwritable_provenance_is_refused_without_file(tmp_path, suffix, odd):
     with pytest.raises(InputError, match="provenance cannot be written"):
         write_response(measured(provenance={"odd": odd}), tmp_path / f"x{suffix}")
     assert list(tmp_path.iterdir()) == []
@@ -93,7 +93,7 @@ def test_a_provenance_without_a_form_is_refused_and_nothing_written(tmp_path, su
         ({"flags": -1}, "flags are not those of a point in row 2"),
     ],
 )
-def test_an_impossible_reading_is_refused_in_both_directions(tmp_path, suffix, changes, fault):
+def test_impossible_reading_is_refused_both_ways(tmp_path, suffix, changes, fault):
     response = measured(flags=0)
     path = tmp_path / f"x{suffix}"
     write_response(response, path)
@@ -150,7 +150,7 @@ def test_columns_of_unequal_length_are_refused(tmp_path, suffix):
 @every_format
 @often
 @given(data=st.data())
-def test_a_damaged_file_is_refused_or_says_what_it_said(tmp_path, suffix, data):
+def test_damaged_file_is_refused_or_unchanged(tmp_path, suffix, data):
     good = tmp_path / f"good{suffix}"
     if not good.exists():
         write_response(measured(), good)
@@ -220,7 +220,7 @@ def test_an_absurd_size_is_refused_unread(tmp_path, suffix):
 
 
 @every_format
-def test_a_write_that_fails_leaves_the_old_file(tmp_path, suffix, monkeypatch):
+def test_failed_write_keeps_the_old_file(tmp_path, suffix, monkeypatch):
     path = tmp_path / f"x{suffix}"
     write_response(measured(unit="old"), path)
     before = path.read_bytes()
@@ -259,7 +259,7 @@ def test_hdf5_follows_what_viewers_expect(tmp_path):
 
 
 @pytest.mark.parametrize("trick", ["soft", "external", "raw", "virtual", "scalar", "text"])
-def test_hdf5_that_leads_out_of_the_file_is_refused(tmp_path, trick):
+def test_external_hdf5_link_is_refused(tmp_path, trick):
     import h5py
 
     secret = tmp_path / "secret.h5"
@@ -287,7 +287,7 @@ def test_hdf5_that_leads_out_of_the_file_is_refused(tmp_path, trick):
         read_response(path)
 
 
-def test_hdf5_that_unpacks_to_too_much_is_refused(tmp_path):
+def test_expanding_hdf5_is_refused(tmp_path):
     import h5py
 
     path = tmp_path / "bomb.h5"
@@ -302,7 +302,7 @@ def test_hdf5_that_unpacks_to_too_much_is_refused(tmp_path):
 
 
 @every_format
-def test_a_file_altered_by_another_program_is_refused(tmp_path, suffix):
+def test_file_altered_elsewhere_is_refused(tmp_path, suffix):
     import h5py
     from scipy.io import loadmat, savemat
 
@@ -346,7 +346,7 @@ def test_unknown_level_and_phase_survive(tmp_path):
 
 
 @every_format
-def test_a_file_that_was_edited_without_a_fault_is_read(tmp_path, suffix):
+def test_valid_edit_of_a_file_is_read(tmp_path, suffix):
     path = tmp_path / f"x{suffix}"
     write_response(measured(), path)
     edit(path, lambda arrays, document: document["provenance"].update(edited="yes"))

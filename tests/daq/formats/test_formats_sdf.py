@@ -22,7 +22,7 @@ def saved(tmp_path, file: File):
     return path
 
 
-def test_the_records_have_the_sizes_of_the_format():
+def test_records_have_sizes_of_the_format():
     content = File().content()
     assert struct.unpack(">hl", content[2:8]) == (10, 64)
     assert struct.unpack(">hl", content[66:72]) == (11, 140)
@@ -44,7 +44,8 @@ def test_a_frequency_response_is_read(tmp_path, application):
     assert not np.any(response.flags)
 
 
-def test_the_reading_agrees_with_the_library_where_that_scales_nothing(tmp_path):
+def test_reading_agrees_with_unscaled_library_reading(tmp_path):
+    """Compared with a file to which the library applies no scale."""
     path = saved(tmp_path, File(application=HP_35665A, channels=(Channel(unit=2.0), Channel())))
     _, values = sdfascii.read_sdf_file(str(path))
     np.testing.assert_allclose(read_response(path).gain, values, rtol=1e-7)
@@ -71,7 +72,7 @@ def test_only_the_measured_span_counts(tmp_path):
     np.testing.assert_array_equal(read_response(path).frequency_hz, [102.5, 105.0])
 
 
-def test_engineering_units_and_windows_of_both_channels_count(tmp_path):
+def test_engineering_units_and_windows_are_applied(tmp_path):
     channels = (Channel(unit=4.0, window=2.0), Channel(b"Chan  2", unit=0.5, window=2.0))
     path = saved(tmp_path, File(channels=channels))
     expected = (2.0 / 0.5) / (2.0 / 4.0)
@@ -141,7 +142,7 @@ def test_the_format_is_only_read(tmp_path):
         write_response(response, tmp_path / "new.dat")
 
 
-def test_a_line_at_0_hz_is_left_out_and_the_level_told(tmp_path):
+def test_zero_frequency_row_is_omitted_with_note(tmp_path):
     path = tmp_path / "TRACE1.DAT"
     path.write_bytes(File(first=0.0).content())
     response = read_response(path, Reading(level_vpk=2.5, unit_name="ADSS", direction="up"))
@@ -153,7 +154,7 @@ def test_a_line_at_0_hz_is_left_out_and_the_level_told(tmp_path):
     np.testing.assert_allclose(read_response(tmp_path / "known.csv").gain, response.gain)
 
 
-def test_a_dat_file_of_text_is_a_table(tmp_path):
+def test_text_dat_file_is_read_as_table(tmp_path):
     path = tmp_path / "t.dat"
     path.write_text("Frequency (Hz) Gain (dB)\n10 -3\n20 -4\n30 -5\n")
     np.testing.assert_allclose(read_response(path).gain_db, [-3, -4, -5])

@@ -66,7 +66,8 @@ def test_every_line_fits_the_format(tmp_path):
     read_response(path)
 
 
-def test_readings_without_value_are_left_out_for_others_but_kept_for_us(tmp_path):
+def test_missing_readings_stay_in_companion_only(tmp_path):
+    """Other programs get the finite readings alone."""
     path = tmp_path / "x.uff"
     response = measured(levels=(1.5,), flags=[0, 0, PointFlag.SPOILT, 0, 0])
     response.gain[2] = np.nan
@@ -77,7 +78,7 @@ def test_readings_without_value_are_left_out_for_others_but_kept_for_us(tmp_path
     same(read_response(path), response)
 
 
-def test_magnitudes_alone_are_not_written_as_real_positive_responses(tmp_path):
+def test_response_without_phase_is_written_complex(tmp_path):
     path = tmp_path / "x.uff"
     response = FrequencyResponse.from_arrays(
         FREQUENCY, 1.0, np.abs(GAIN), unit="U", phase_known=False
@@ -113,7 +114,7 @@ def test_levels_on_the_third_axis_are_taken(tmp_path):
     np.testing.assert_array_equal(read_response(path).levels_vpk, [0.5, 2.0])
 
 
-def test_an_even_abscissa_and_single_precision_are_read(tmp_path):
+def test_even_abscissa_and_single_precision_are_read(tmp_path):
     path = tmp_path / "other.uff"
     foreign(path, abscissa_spacing=1, x=np.arange(100.0, 104.0))
     np.testing.assert_allclose(read_response(path).frequency_hz, np.arange(100.0, 104.0))
@@ -152,7 +153,7 @@ def altered(path, old: str, new: str, count: int = 1) -> None:
     path.write_text(text.replace(old, new, count))
 
 
-def test_a_function_altered_beside_its_companion_is_refused(tmp_path):
+def test_function_unlike_its_companion_is_refused(tmp_path):
     path = tmp_path / "x.uff"
     write_response(FrequencyResponse.from_arrays(FREQUENCY, 1.0, GAIN, unit="U"), path)
     altered(path, "5.000000000000e-01", "5.100000000000e-01")
@@ -160,7 +161,7 @@ def test_a_function_altered_beside_its_companion_is_refused(tmp_path):
         read_response(path)
 
 
-def test_without_its_companion_a_file_of_ours_is_still_read(tmp_path):
+def test_own_file_without_companion_is_read(tmp_path):
     path = tmp_path / "x.uff"
     write_response(measured(), path)
     text = path.read_text()

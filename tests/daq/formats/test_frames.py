@@ -43,7 +43,7 @@ def test_every_row_and_column_is_there(response):
     )
 
 
-def test_what_is_known_of_it_goes_along_even_into_copies(response):
+def test_attributes_go_along_into_copies(response):
     frame = response.to_frame()
     copied = frame[frame["source_vpk"] > 2.0].copy()
     assert copied.attrs["unit"] == "ADSS"
@@ -52,7 +52,7 @@ def test_what_is_known_of_it_goes_along_even_into_copies(response):
     assert copied.attrs["provenance"]["instrument"] == {"model": "35670A"}
 
 
-def test_a_table_that_is_written_to_leaves_the_response_alone(response):
+def test_writing_to_table_leaves_response_unchanged(response):
     frame = response.to_frame()
     frame.loc[0, "frequency_hz"] = 1.0
     frame.attrs["provenance"]["kind"] = "made up"

@@ -29,13 +29,14 @@ def status_after(controller, wanted: int) -> list[int]:
         ([bytes([byte]) for byte in b"  *idn?\n"], False),
     ],
 )
-def test_a_message_ends_on_line_feed_or_eoi_and_may_come_in_pieces(controller, pieces, eoi):
+def test_message_ends_on_line_feed_or_eoi(controller, pieces, eoi):
+    """It may come in pieces."""
     for index, piece in enumerate(pieces):
         controller.write(piece, end=eoi and index == len(pieces) - 1)
     assert controller.read() == b"HEWLETT-PACKARD,35670A,LASHSIM001,A.01.11\n"
 
 
-def test_a_long_message_is_held_back_and_not_dropped(controller):
+def test_long_message_is_held_not_dropped(controller):
     controller.write("INST:SEL SINE")
     message = ";".join([":FREQ:STAR 100"] * 30) + ";:FREQ:STOP 321\n"
     assert len(message) > 3 * 128
@@ -44,13 +45,13 @@ def test_a_long_message_is_held_back_and_not_dropped(controller):
     assert controller.errors() == []
 
 
-def test_the_input_queue_holds_128_bytes_while_the_parser_waits(swept):
+def test_input_queue_holds_128_bytes_while_busy(swept):
     swept.write("INIT;*WAI")
     assert swept.instrument.listen(b"FREQ:STEP 1;" * 20) == 128
     assert swept.instrument.listen(b"x") == 0
 
 
-def test_410_a_new_message_throws_an_unread_reply_away(controller):
+def test_410_new_message_discards_unread_reply(controller):
     controller.write("*IDN?", "FREQ:STEP 123")
     status_after(controller, -410)
     assert controller.number("FREQ:STEP?") == 123
@@ -63,7 +64,7 @@ def test_410_a_half_read_reply(controller):
     status_after(controller, -410)
 
 
-def test_410_a_late_reply_is_interrupted_before_it_is_there(swept):
+def test_410_late_reply_is_interrupted_in_advance(swept):
     swept.write("INIT", "*OPC?", "FREQ:STEP 5")
     status_after(swept, -410)
     assert swept.number("FREQ:STEP?") == 5
@@ -84,7 +85,7 @@ def test_420_an_unfinished_question_is_dropped(controller):
     assert controller.ask("*OPT?") == '"1D2"'
 
 
-def test_a_reply_that_is_under_way_is_waited_for_without_error(swept):
+def test_reply_under_way_is_awaited_without_error(swept):
     swept.write("INIT", "*OPC?")
     assert swept.instrument.talk().state is TalkState.WAITING
     assert swept.read() == b"+1\n"
@@ -103,16 +104,16 @@ def test_430_both_queues_full(controller):
     assert controller.ask("*OPT?") == '"1D2"'
 
 
-def test_a_few_queries_in_one_message_are_answered_in_one(controller):
+def test_queries_in_one_message_share_reply(controller):
     assert controller.ask("*OPT?;:FREQ:STEP 7;STEP?;:INST?") == '"1D2";+7.00000000000E+000;FFT'
 
 
-def test_a_late_reply_is_not_interrupted_by_the_rest_of_its_own_message(swept):
+def test_same_message_does_not_interrupt_late_reply(swept):
     assert swept.ask("INIT;*OPC?;*OPT?") == '+1;"1D2"'
     assert swept.errors() == []
 
 
-def test_device_clear_empties_queues_and_frees_the_parser(swept):
+def test_device_clear_empties_queues_frees_parser(swept):
     swept.write("SOUR:VOLT 2 VPK;:JUNK", "*ESE 255;*SRE 4", "INIT;*OPC;*WAI")
     swept.instrument.listen(b"*IDN?\n")
     swept.instrument.device_clear()
@@ -138,7 +139,7 @@ def test_device_clear_cancels_a_late_reply(swept):
     assert swept.instrument.talk().state is TalkState.NOTHING
 
 
-def test_the_group_trigger_is_refused_as_trg_is(swept):
+def test_group_trigger_is_refused_as_trg(swept):
     swept.instrument.trigger()
     assert swept.errors() == [-221]
     assert swept.refusal("*TRG") == [-221]
@@ -151,7 +152,7 @@ def test_remote_and_local(controller):
     assert controller.instrument.remote
 
 
-def test_a_reply_ends_with_line_feed_and_eoi(controller):
+def test_reply_ends_with_line_feed_and_eoi(controller):
     controller.write("*OPT?")
     talk = controller.instrument.talk()
     assert talk.data.endswith(b'"\n')
@@ -161,7 +162,7 @@ def test_a_reply_ends_with_line_feed_and_eoi(controller):
     assert [part.end for part in parts] == [False] * 5 + [True]
 
 
-def test_a_reply_may_be_later_than_any_adapter_waits(bench):
+def test_reply_may_outlast_every_adapter_timeout(bench):
     now = [0.0]
     controller = bench("slow-reply:seconds=4,phase=prepare", clock=lambda: now[0])
     controller.write("*IDN?")

@@ -36,14 +36,14 @@ def test_displayed_points(quiet, resolution, shown):
     assert len(quiet.reals("CALC:X:DATA?")) == shown
 
 
-def test_the_axis_is_a_ramp_from_start_towards_stop(quiet):
+def test_axis_is_ramp_from_start_towards_stop(quiet):
     for query in ("CALC:X:DATA?", "TRAC:X? TRAC1"):
         axis = quiet.reals(query)
         assert axis == pytest.approx(100 + 100 * np.arange(401) / 401)
     assert quiet.ask("TRAC:X:UNIT? TRAC1") == '"HZ"'
 
 
-def test_every_measured_point_is_displayed_where_it_was_measured(quiet):
+def test_measured_points_are_displayed_where_measured(quiet):
     quiet.write("FREQ:RES 401 PNT/SWP", "ABOR;:INIT")
     quiet.run()
     gains, axis = quiet.complexes("TRAC D1,TRAC1;:TRAC? D1"), quiet.reals("TRAC:X? D1")
@@ -51,7 +51,7 @@ def test_every_measured_point_is_displayed_where_it_was_measured(quiet):
 
 
 @pytest.mark.parametrize(("hold", "filled"), [(True, 401), (False, 5)])
-def test_what_stands_between_measured_points_is_a_choice(bench, hold, filled):
+def test_fill_between_points_is_a_choice(bench, hold, filled):
     controller = bench(hold_between=hold, **NOISELESS)
     controller.sweep()
     gains = controller.complexes("TRAC D1,TRAC1;:TRAC? D1")
@@ -72,7 +72,7 @@ def test_what_stands_between_measured_points_is_a_choice(bench, hold, filled):
         ("POL", lambda g: np.column_stack((abs(g), np.degrees(np.angle(g)))).ravel()),
     ],
 )
-def test_shown_data_follow_coordinates_and_raw_data_do_not(quiet, form, expected):
+def test_only_shown_data_follow_coordinates(quiet, form, expected):
     quiet.write(f"CALC:FORM {form}")
     quiet.run()
     gains = quiet.complexes("TRAC D1,TRAC1;:TRAC? D1")
@@ -162,7 +162,7 @@ def test_downward_sweeps_fill_from_the_top(swept):
     assert not measured[:300].any()
 
 
-def test_fast_display_hides_new_points_until_the_end(swept):
+def test_fast_display_delays_points_until_end(swept):
     swept.write("AVER:IRES ON", "SOUR:VOLT 1 VPK", "ABOR;:INIT")
     swept.wait(4.0)
     assert swept.instrument.measurement.points_begun > 1
@@ -187,7 +187,7 @@ def test_a_register_is_one_frozen_picture(swept):
     assert len(swept.reals("TRAC:X? D3")) == len(then)
 
 
-def test_a_change_of_data_or_coordinates_takes_a_moment(quiet):
+def test_change_of_data_or_coordinates_takes_time(quiet):
     quiet.write("CALC:FORM REAL")
     quiet.run()
     real = quiet.reals("CALC:DATA?")
@@ -250,7 +250,7 @@ def test_registers_take_only_what_fits(quiet):
     assert len(quiet.reals("CALC2:DATA?")) == 401
 
 
-def test_ascii_transfers_say_the_same_as_binary_ones(quiet):
+def test_ascii_and_binary_transfers_agree(quiet):
     binary = quiet.reals("CALC:DATA?")
     quiet.write("FORM ASC,12")
     text = np.array([float(part) for part in (quiet.ask("CALC:DATA?") or "").split(",")])

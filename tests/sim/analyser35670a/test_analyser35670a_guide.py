@@ -48,7 +48,7 @@ def test_units_are_sent_and_given_between_quotes(fft, header, words):
     assert fft.errors() == [-151]
 
 
-def test_data_without_such_a_unit_answer_a_null_string(fft):
+def test_data_without_unit_answer_null_string(fft):
     assert fft.ask("CALC1:UNIT:VOLT?") == '"V2"'
     assert fft.ask("CALC1:UNIT:AMPL?") == "RMS"
     fft.write("CALC1:FEED 'XFR:POW:RAT 2,1'")
@@ -61,14 +61,14 @@ def test_data_without_such_a_unit_answer_a_null_string(fft):
 
 @pytest.mark.parametrize("quoted", [False, True])
 @pytest.mark.parametrize("word", ["UNIT", "unit", "'UNIT'"])
-def test_what_unit_a_value_has_is_told_alike_however_it_is_asked(bench, quoted, word):
+def test_unit_of_value_is_reported_uniformly(bench, quoted, word):
     controller = bench(unit_quoted=quoted)
     for header, unit in (("SOUR:VOLT", "VPK"), ("VOLT2:RANG", "DBVRMS"), ("FREQ:STAR", "HZ")):
         assert controller.ask(f"{header}? {word}") == (f'"{unit}"' if quoted else unit)
     assert controller.ask(f"FREQ:RES? {word}") == '""'
 
 
-def test_a_spectrum_is_the_same_in_every_unit(fft):
+def test_spectrum_is_equal_in_every_unit(fft):
     fft.write("WIND UNIF", "FREQ:STOP 25600 HZ")
     measured(fft)
     power = fft.reals("CALC1:DATA?")
@@ -123,7 +123,7 @@ def test_more_averages_are_quieter(fft):
     assert 0.07 < spread[1] < 0.14
 
 
-def test_averages_that_are_raised_after_the_end_are_added(fft):
+def test_averages_raised_afterwards_are_added(fft):
     fft.write("AVER ON;:AVER:TCON FRE;COUN 40")
     few = measured(fft).reals("CALC1:DATA?")
     fft.write("AVER:COUN 400")
@@ -166,7 +166,7 @@ def test_the_axis_goes_on_beyond_the_lines(fft, asked, lines, read):
     assert axis[lines] == pytest.approx(float(fft.ask("FREQ:STOP?")))
 
 
-def test_the_axis_can_be_chosen_to_be_as_long_as_the_data(bench):
+def test_axis_length_can_match_data(bench):
     controller = bench(long_fft_axis=False)
     controller.write(*FFT)
     measured(controller)
@@ -176,7 +176,7 @@ def test_the_axis_can_be_chosen_to_be_as_long_as_the_data(bench):
 # Markers and maths
 
 
-def test_a_marker_function_that_is_not_calculated_says_so(fft):
+def test_uncalculated_marker_function_says_so(fft):
     assert float(fft.ask("CALC1:MARK:FUNC:RES?")) == 9.91e37
     fft.write("CALC1:MARK:FUNC WEIG")
     assert float(fft.ask("CALC1:MARK:FUNC:RES?")) == 0.0

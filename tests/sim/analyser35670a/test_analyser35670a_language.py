@@ -41,12 +41,12 @@ def test_no_form_between_and_nothing_newer(controller, header):
         ":volt2:rang:upp?", "VOLT2:DC:RANG?",
     ],
 )  # fmt: skip
-def test_bracketed_nodes_may_be_sent_or_left_out(controller, header):
+def test_bracketed_nodes_are_optional(controller, header):
     controller.write("VOLT1:RANG 1 VPK", "VOLT2:RANG 11")
     assert controller.number(header) == 11
 
 
-def test_a_channel_or_trace_left_out_is_the_first(controller):
+def test_omitted_channel_or_trace_is_first(controller):
     controller.write("VOLT1:RANG -5", "VOLT2:RANG 11", "CALC1:FORM IMAG", "CALC2:FORM PHAS")
     assert controller.number("VOLT:RANG?") == -5
     assert controller.ask("CALC:FORM?") == "IMAG"
@@ -62,7 +62,7 @@ def test_the_path_lasts_until_a_colon(controller):
     )
 
 
-def test_without_the_colon_the_level_of_the_last_command_counts(controller):
+def test_missing_colon_keeps_last_command_level(controller):
     assert controller.refusal("FREQ:STEP 7;FREQ:STEP 8") == [-113]
     assert controller.number("FREQ:STEP?") == 7
     # A one-word header leaves the path at the root.
@@ -72,7 +72,7 @@ def test_without_the_colon_the_level_of_the_last_command_counts(controller):
     assert controller.refusal("STEP 9") == [-113]
 
 
-def test_optional_nodes_left_out_are_no_part_of_the_path(controller):
+def test_omitted_optional_nodes_leave_the_path(controller):
     assert controller.refusal("AVER ON;INP2 ON;:AVER:COUN 3;TYPE RMS") == []
     assert controller.refusal("VOLT2:RANG 1 VPK;RANG:AUTO ON") == []
     assert controller.integer("VOLT2:RANG:AUTO?") == 1
@@ -130,13 +130,13 @@ def test_what_is_refused_and_with_which_number(controller, message, number):
     assert controller.refusal(message) == [number]
 
 
-def test_a_value_out_of_range_is_not_changed(controller):
+def test_value_out_of_range_is_unchanged(controller):
     controller.write("FREQ:STEP 55")
     assert controller.refusal("FREQ:STEP 1E9") == [-222]
     assert controller.number("FREQ:STEP?") == 55
 
 
-def test_a_wrong_unit_does_not_stop_the_rest_of_the_message(controller):
+def test_wrong_unit_does_not_stop_message(controller):
     assert controller.refusal("FREQ:STEP 1 V;STEP 44") == [-131]
     assert controller.number("FREQ:STEP?") == 44
 
@@ -174,7 +174,7 @@ def test_bounds_steps_and_units(controller):
     assert controller.errors() == []
 
 
-def test_numbers_come_back_signed_with_three_digits_of_exponent(controller):
+def test_numbers_are_signed_with_three_exponent_digits(controller):
     assert controller.ask("FREQ:STOP?") == "+5.12000000000E+004"
     assert controller.ask("SOUR:VOLT:OFFS?") == "+0.00000000000E+000"
     controller.write("SOUR:VOLT:OFFS -0.5")
@@ -187,14 +187,14 @@ def test_numbers_come_back_signed_with_three_digits_of_exponent(controller):
 
 
 @pytest.mark.parametrize(("digits", "length"), [(3, 10), (7, 14), (12, 19)])
-def test_ascii_data_have_as_many_digits_as_asked_for(controller, digits, length):
+def test_ascii_data_have_requested_digits(controller, digits, length):
     controller.write(f"FORM ASC,{digits}")
     first = (controller.ask("CALC:X:DATA?") or "").split(",")[1]
     assert len(first) == length
     assert float(first) == pytest.approx(128.0, rel=10.0**-digits)
 
 
-def test_the_error_queue_keeps_the_oldest_and_says_that_there_were_more(controller):
+def test_error_queue_keeps_oldest_and_reports_overflow(controller):
     controller.write("FREQ:STEP 1 V", *["JUNK"] * 7)
     assert controller.errors() == [-131, -113, -113, -113, -350]
     assert controller.ask("SYST:ERR?") == NO_ERROR
@@ -207,7 +207,7 @@ def test_what_empties_the_error_queue(controller):
         assert controller.errors() == left
 
 
-def test_a_quote_in_an_error_text_cannot_break_the_reply(controller):
+def test_quote_in_error_text_is_escaped(controller):
     controller.write('CALC:FEED "XFR:POW:RAT ""2,1"""')
     reply = controller.ask("SYST:ERR?") or ""
     assert reply.count('"') % 2 == 0
@@ -229,7 +229,7 @@ def headers() -> list[tuple[str, Setting]]:
 
 
 @pytest.mark.parametrize("mode", ["FFT", "SINE"])
-def test_every_command_of_the_list_is_understood_in_both_forms(bench, mode):
+def test_every_listed_command_works_in_both_forms(bench, mode):
     controller = bench(options="1D0,1D1,1D2,1D3,1D4,1C2")
     controller.write(f"INST:SEL {mode}")
     controller.run()
@@ -307,7 +307,7 @@ def test_no_message_crashes_or_hangs_it(data):
 
 @settings(max_examples=100)
 @given(st.text(st.characters(codec="ascii", exclude_characters="\n"), max_size=60))
-def test_every_refusal_has_a_number_of_the_list(text):
+def test_every_refusal_has_listed_number(text):
     instrument = Analyser35670A(LinearPlant(lambda hz: 0.1), Choices())
     instrument.listen(text.encode() + b"\n")
     instrument.device_clear()

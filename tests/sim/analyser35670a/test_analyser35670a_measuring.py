@@ -20,7 +20,7 @@ def test_a_measurement_is_overlapped(swept):
     assert swept.integer("STAT:OPER:COND?") & 16 == 0
 
 
-def test_wai_holds_the_parser_to_the_end_of_the_sweep(swept):
+def test_wai_holds_parser_until_sweep_end(swept):
     swept.write("ABOR;:INIT;*WAI;:STAT:OPER:COND?")
     assert swept.instrument.measurement.points_begun < 5
     assert swept.read() == b"+0\n"
@@ -51,7 +51,7 @@ def test_pause_and_go_on(swept):
 
 @pytest.mark.parametrize("change", ["SOUR:VOLT 2 VPK", "SWE:STIM 9 CYCLE", "FREQ:STOP 210",
                                     "CAL:AUTO ONCE", "VOLT2:RANG 1 VPK"])  # fmt: skip
-def test_going_on_is_refused_after_a_change_or_a_calibration(swept, change):
+def test_continuing_after_change_or_calibration_is_refused(swept, change):
     swept.write("ABOR;:INIT")
     swept.wait(1.0)
     swept.write("INIT:CONT OFF", change)
@@ -63,7 +63,7 @@ def test_going_on_is_refused_after_a_change_or_a_calibration(swept, change):
     assert swept.refusal("ABOR;:INIT") == []
 
 
-def test_a_level_of_zero_parks_the_sweep_for_ever(swept):
+def test_zero_level_pauses_the_sweep(swept):
     swept.write("SOUR:VOLT 0 VPK", "*CLS", "ABOR;:INIT;*OPC")
     assert swept.ask("SYST:ERR?") == (
         '-221,"Settings conflict; SOURCE LEVEL is 0 Volts, measurement paused."'
@@ -74,7 +74,7 @@ def test_a_level_of_zero_parks_the_sweep_for_ever(swept):
     assert swept.integer("STAT:OPER:COND?") & 16 == 0
 
 
-def test_a_level_taken_away_in_mid_sweep_parks_it_too(swept):
+def test_level_zeroed_in_sweep_pauses_it(swept):
     swept.write("*CLS", "ABOR;:INIT;*OPC")
     swept.wait(1.0)
     swept.write("SOUR:VOLT 0 VPK")
@@ -85,7 +85,7 @@ def test_a_level_taken_away_in_mid_sweep_parks_it_too(swept):
     assert swept.instrument.measurement.points_begun == begun
 
 
-def test_entering_swept_sine_while_continuous_meets_level_zero(bench):
+def test_continuous_swept_sine_starts_at_level_zero(bench):
     controller = bench()
     controller.write("SYST:PRES")
     controller.run()
@@ -93,7 +93,7 @@ def test_entering_swept_sine_while_continuous_meets_level_zero(bench):
     assert controller.errors() == [-221]
 
 
-def test_abort_ends_the_operation_and_a_new_start_begins_anew(swept):
+def test_abort_ends_operation_and_start_restarts(swept):
     swept.write("*CLS", "ABOR;:INIT;*OPC")
     swept.wait(1.0)
     swept.write("ABOR")
@@ -124,7 +124,7 @@ def test_time_passes_as_cycles_and_seconds_ask(swept, settle, dwell, seconds):
     assert swept.instrument.agenda.now_s - begin == pytest.approx(seconds, rel=1e-3)
 
 
-def test_the_example_of_the_service_guide_takes_about_a_minute(bench):
+def test_service_guide_example_takes_a_minute(bench):
     controller = bench()
     controller.write("INST:SEL SINE;:FREQ:RES:AUTO OFF;:SWE:SPAC LOG", "AVER:IRES ON",
                      "FREQ:STOP 51200;STAR 51.2;RES 101 PNT/SWP", "SWE:DWEL 0.1 S",
@@ -165,13 +165,13 @@ def test_which_points_are_measured(bench, changes, expected):
     assert plant.frequencies == pytest.approx(expected)
 
 
-def test_whether_the_stop_is_measured_is_a_choice(bench):
+def test_measuring_the_stop_frequency_is_choice(bench):
     plant = Recording()
     bench(plant=plant, both_ends=True).sweep()
     assert plant.frequencies == [100, 125, 150, 175, 200]
 
 
-def test_auto_resolution_takes_small_steps_where_the_response_changes(bench):
+def test_auto_resolution_refines_where_response_changes(bench):
     def resonance(hz):
         return 0.1 / (1.0 - (hz / 150.0) ** 2 + 0.02j * hz / 150.0)
 

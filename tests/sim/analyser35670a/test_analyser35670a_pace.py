@@ -63,7 +63,7 @@ def test_a_process_holds_resumes_and_stops():
 
 
 @pytest.mark.parametrize(("rate", "wall_s"), [(1.0, 1.5), (100.0, 0.015)])
-def test_by_the_clock_a_second_is_a_second_or_a_stated_part_of_it(swept, rate, wall_s):
+def test_by_the_clock_follows_stated_rate(swept, rate, wall_s):
     now = [50.0]
     swept.write("VOLT1:RANG 5 VPK", "VOLT2:RANG 5 VPK", "ABOR;:INIT")
     pace = ByTheClock(swept.instrument, rate, lambda: now[0])
@@ -76,14 +76,14 @@ def test_by_the_clock_a_second_is_a_second_or_a_stated_part_of_it(swept, rate, w
     assert swept.instrument.measurement.points_begun == 3
 
 
-def test_by_the_clock_says_how_long_to_wait(swept):
+def test_by_the_clock_states_its_wait(swept):
     swept.write("VOLT1:RANG 5 VPK", "VOLT2:RANG 5 VPK", "ABOR;:INIT")
     pace = ByTheClock(swept.instrument, 1.0, lambda: 50.0)
     # The first thing to end is the settling: two cycles of 100 Hz.
     assert pace.wait_s == pytest.approx(0.02)
 
 
-def test_fast_runs_a_sweep_to_its_end_and_then_rests(swept):
+def test_fast_completes_sweep_then_rests(swept):
     pace = Fast(swept.instrument)
     swept.write("ABOR;:INIT")
     pace.touch()
@@ -96,7 +96,7 @@ def test_fast_runs_a_sweep_to_its_end_and_then_rests(swept):
     assert pace.wait_s is None
 
 
-def test_fast_does_not_sweep_for_ever_when_nobody_cares(swept):
+def test_fast_stops_a_sweep_without_client(swept):
     pace = Fast(swept.instrument)
     swept.write("INIT:CONT ON")
     pace.touch()

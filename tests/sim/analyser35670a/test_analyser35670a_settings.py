@@ -17,7 +17,8 @@ def test_identity_and_options(controller, bench):
     assert bench(options="").ask("*OPT?") == '""'
 
 
-def test_without_the_option_swept_sine_is_refused_and_the_mode_stays(bench):
+def test_swept_sine_without_option_is_refused(bench):
+    """The mode stays as it is."""
     controller = bench(options="1D3")
     controller.write("INST:SEL SINE")
     assert controller.ask("SYST:ERR?") == (
@@ -238,7 +239,7 @@ def test_offsets_have_two_steps(controller, sent, volts):
 
 
 @pytest.mark.parametrize("order", ["level first", "offset first"])
-def test_the_offset_moves_silently_where_both_do_not_fit(controller, order):
+def test_offset_yields_silently_to_the_level(controller, order):
     messages = ["SOUR:VOLT 3 VPK", "SOUR:VOLT:OFFS -9 V"]
     controller.write(*(messages if order == "level first" else messages[::-1]))
     assert controller.number("SOUR:VOLT:OFFS?") == -7
@@ -249,7 +250,7 @@ def test_the_offset_moves_silently_where_both_do_not_fit(controller, order):
 @pytest.mark.parametrize(
     ("sent", "answer"), [("30 CYCLE", 30), ("0.2 CYCLE", 1), ("0 CYCLE", 1), ("7.4 CYCLE", 7)]
 )
-def test_integration_takes_whole_cycles_and_at_least_one(swept, sent, answer):
+def test_integration_takes_at_least_one_whole_cycle(swept, sent, answer):
     swept.write(f"SWE:DWEL {sent}")
     assert swept.number("SWE:DWEL?") == answer
     assert swept.ask("SWE:DWEL? UNIT") == "CYCLE"

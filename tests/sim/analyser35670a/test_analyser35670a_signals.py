@@ -17,7 +17,7 @@ OVERLOAD_2, ABOVE_HALF_1, ABOVE_HALF_2 = 2, 256, 512
 # Ranges
 
 
-def test_autorange_follows_the_signal_and_takes_its_time(bench):
+def test_autorange_follows_signal_and_takes_time(bench):
     controller = bench(**NOISELESS)
     controller.sweep("SWE:MODE MAN", "FREQ:MAN 150", "SOUR:VOLT 2 VPK")
     first = controller.instrument.agenda.now_s
@@ -33,7 +33,7 @@ def test_autorange_follows_the_signal_and_takes_its_time(bench):
     assert controller.integer("STAT:QUES:VOLT?") & 0xF == 0
 
 
-def test_a_fixed_range_clips_flags_and_keeps_the_point(bench):
+def test_fixed_range_clips_and_flags_point(bench):
     controller = bench(plant=LinearPlant(lambda hz: 1.0), **NOISELESS)
     controller.sweep("VOLT1:RANG 5 VPK", "VOLT2:RANG 0.5 VPK", "SOUR:VOLT 4 VPK")
     assert controller.integer("STAT:QUES:VOLT?") & 0xF == OVERLOAD_2
@@ -67,7 +67,7 @@ def test_the_overload_bit_latches_and_sums_up(bench):
 # Source
 
 
-def test_the_source_ramps_up_with_the_sweep_and_down_with_the_level(bench):
+def test_source_ramps_with_sweep_and_level(bench):
     plant = Recording()
     controller = bench(plant=plant)
     controller.write("INST:SEL SINE;:FREQ:RES:AUTO OFF;:FREQ:STAR 100;STOP 200;RES 3 PNT/SWP",
@@ -89,7 +89,7 @@ def test_the_source_ramps_up_with_the_sweep_and_down_with_the_level(bench):
 
 
 @pytest.mark.parametrize(("stays", "left"), [(True, 1.0), (False, 0.0)])
-def test_whether_the_source_stays_on_after_the_sweep_is_a_choice(bench, stays, left):
+def test_source_after_sweep_is_a_choice(bench, stays, left):
     controller = bench(source_stays_on=stays)
     controller.sweep()
     assert controller.instrument.output_vpk == left
@@ -111,7 +111,7 @@ def test_what_silences_the_source(bench):
     assert controller.instrument.output_vpk == 0
 
 
-def test_auto_level_holds_its_channel_within_both_limits(bench):
+def test_auto_level_keeps_channel_within_limits(bench):
     def driven(*changes: str) -> float:
         plant = Recording(lambda hz: 0.5)
         controller = bench(plant=plant, **NOISELESS)
@@ -133,7 +133,7 @@ def test_auto_level_holds_its_channel_within_both_limits(bench):
 # Calibration
 
 
-def test_autocalibration_comes_in_the_middle_of_a_sweep_or_pause(bench):
+def test_autocalibration_occurs_in_sweep_or_pause(bench):
     controller = bench(calibrations_s=(5.0,))
     controller.instrument.power_on()
     controller.write("INIT:CONT OFF", "CAL:AUTO ON", "INST:SEL SINE;:FREQ:RES:AUTO OFF",
@@ -172,7 +172,7 @@ def points(controller) -> np.ndarray:
     return gains[np.concatenate(([True], np.diff(gains) != 0))]
 
 
-def test_noise_is_as_stated_and_falls_with_the_cycles(bench):
+def test_noise_is_as_stated_per_cycle(bench):
     for cycles, expected in ((30, 0.5e-3), (120, 0.25e-3)):
         controller = bench(seed=cycles)
         controller.sweep("FREQ:RES 401 PNT/SWP", f"SWE:DWEL {cycles} CYCLE", "SOUR:VOLT 2 VPK")
@@ -185,7 +185,7 @@ def test_noise_is_as_stated_and_falls_with_the_cycles(bench):
             assert abs(part.mean()) < 4 * expected / math.sqrt(401)
 
 
-def test_the_normalised_variance_answers_to_noise_level_and_cycles(bench):
+def test_normalised_variance_follows_noise_and_cycles(bench):
     def variance(level: float, cycles: int, noise: float) -> float:
         controller = bench(noise_v=noise)
         controller.sweep("CALC1:FEED 'XFR:POW:VAR 2'", "CALC1:FORM REAL", "FREQ:RES 100 PNT/SWP",
@@ -200,7 +200,7 @@ def test_the_normalised_variance_answers_to_noise_level_and_cycles(bench):
     assert variance(1.0, 1, 1e-3) == 0
 
 
-def test_the_same_seed_gives_the_same_readings_and_another_does_not(bench):
+def test_seed_reproduces_readings_and_others_differ(bench):
     def read(seed: int, again: bool = False) -> np.ndarray:
         controller = bench(seed=seed)
         controller.sweep()
@@ -217,7 +217,7 @@ def test_the_same_seed_gives_the_same_readings_and_another_does_not(bench):
 # The device behind
 
 
-def test_channel_1_sees_the_source_and_channel_2_the_response(bench):
+def test_channel_1_sees_source_channel_2_response(bench):
     controller = bench(**NOISELESS, source_ohm=50.0, device_ohm=950.0)
     controller.sweep("CALC1:FEED 'XFR:POW:LIN 1'", "CALC2:FEED 'XFR:POW:LIN 2'", "CALC1:FORM MLIN",
                      "CALC2:FORM MLIN", "SOUR:VOLT 2 VPK")  # fmt: skip
@@ -242,7 +242,7 @@ def test_the_offset_takes_up_range(bench):
     assert controller.number("VOLT2:RANG?") <= -1
 
 
-def test_a_device_that_runs_away_is_reported_and_not_served(bench):
+def test_unstable_device_is_reported_not_served(bench):
     from daq.errors import AnalysisError
 
     class Wild:

@@ -31,7 +31,7 @@ def test_device_errors_set_theirs(bench):
     assert controller.integer("STAT:QUES:COND?") & 256 == 0
 
 
-def test_the_status_byte_sums_up_and_stb_clears_nothing(controller):
+def test_status_byte_summarises_and_stb_clears_nothing(controller):
     controller.write("*ESE 32;*SRE 32", "JUNK")
     assert controller.integer("*STB?") == 32 | 64
     assert controller.integer("*STB?") == 32 | 64
@@ -65,7 +65,7 @@ def test_enabling_a_set_bit_requests_service(controller):
     assert controller.instrument.service_request
 
 
-def test_bit_6_of_the_request_enable_is_ignored(controller):
+def test_request_enable_ignores_bit_6(controller):
     controller.write("*SRE 96")
     assert controller.integer("*SRE?") == 32
 
@@ -141,7 +141,7 @@ def test_the_bits_of_a_sweep(bench):
     assert seen.index(272 + SETTLING) < seen.index(272 + RANGING)
 
 
-def test_opc_comes_at_the_end_of_the_whole_sweep(swept):
+def test_opc_comes_at_end_of_sweep(swept):
     swept.write("*CLS", "ABOR;:INIT;*OPC")
     points = 0
     while swept.instrument.agenda.has_work:
@@ -152,7 +152,7 @@ def test_opc_comes_at_the_end_of_the_whole_sweep(swept):
     assert swept.integer("*ESR?") == 1
 
 
-def test_the_loop_that_waits_for_a_service_request(swept):
+def test_service_request_loop_works(swept):
     swept.write("*CLS;*ESE 61;*SRE 32", "ABOR;:INIT;*OPC")
     assert not swept.instrument.service_request
     swept.run()
@@ -175,7 +175,7 @@ def test_a_wait_can_be_cancelled_by_accident(swept, killer):
         assert swept.instrument.measurement.points_begun == 5
 
 
-def test_display_ready_comes_with_each_point_or_with_the_sweep(swept):
+def test_display_ready_follows_point_or_sweep(swept):
     for fast, expected in (("OFF", 5), ("ON", 1)):
         swept.write(f"AVER:IRES {fast}", "STAT:DEV?", "ABOR;:INIT")
         swept.errors()
@@ -187,7 +187,7 @@ def test_display_ready_comes_with_each_point_or_with_the_sweep(swept):
 
 
 @pytest.mark.parametrize("clears", [False, True])
-def test_whether_reading_a_condition_clears_it_is_a_choice(bench, clears):
+def test_clearing_by_condition_read_is_choice(bench, clears):
     controller = bench(condition_reads_clear=clears)
     controller.write("CAL:AUTO OFF")
     assert controller.integer("STAT:DEV:COND?") == 1

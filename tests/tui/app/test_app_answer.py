@@ -50,7 +50,8 @@ def shown(tmp_path, step, estimate, diagnosis=None, unit=None):
     return seen[0]
 
 
-def test_a_refuted_plain_model_is_shown_without_advice_stage_or_number(tmp_path):
+def test_refuted_plain_model_shows_no_numbers(tmp_path):
+    """Neither advice nor stage nor number is shown."""
     text = shown(tmp_path, 5, REFUTED, unit=limited(0.3, 0.001))
     assert text.startswith("No advice before a diagnosis")
     assert "warning: the model leaves 5.4 standard deviations" in text
@@ -59,7 +60,7 @@ def test_a_refuted_plain_model_is_shown_without_advice_stage_or_number(tmp_path)
 
 
 @pytest.mark.parametrize("step", [5, 6])
-def test_after_the_diagnosis_both_steps_follow_the_model_that_it_accepts(tmp_path, step):
+def test_both_steps_follow_the_accepted_model(tmp_path, step):
     text = shown(tmp_path, step, REFUTED, EXPLAINED)
     assert "Adjust stage 1 first: 62 % of the backlash" in text
     assert "r = 0.620 +- 0.040  (95 %: 0.540 to 0.700); extended by shaft-stiffness" in text
@@ -68,7 +69,7 @@ def test_after_the_diagnosis_both_steps_follow_the_model_that_it_accepts(tmp_pat
 
 
 @pytest.mark.parametrize("step", [5, 6])
-def test_a_tie_is_undecided_where_its_models_disagree(tmp_path, step):
+def test_tied_models_that_disagree_are_undecided(tmp_path, step):
     text = shown(tmp_path, step, ESTIMATE, DIAGNOSIS)
     assert "Undecided, adjust no stage yet: 23 to 70 %" in text
     assert "first:" not in text
@@ -80,7 +81,7 @@ def test_limits_decide_on_the_screen_as_well(tmp_path):
     assert "Adjust stage 1" not in text
 
 
-def test_how_likely_nothing_is_hidden_is_on_the_screen(tmp_path):
+def test_probability_of_nothing_hidden_is_shown(tmp_path):
     plain = MODEL | {"causes": [], "probability": 0.62}
     consistent = EXPLAINED | {
         "verdict": "consistent",

@@ -52,7 +52,7 @@ def db(tmp_path):
     return path
 
 
-def test_no_file_of_the_bench_is_opened_in_the_event_loop(db, tmp_path, monkeypatch):
+def test_event_loop_opens_no_bench_file(db, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     unit = tmp_path / "own.toml"
     unit.write_text(config_path("units", "adss").read_text())
@@ -92,7 +92,8 @@ def test_no_file_of_the_bench_is_opened_in_the_event_loop(db, tmp_path, monkeypa
     run(way)
 
 
-def test_work_of_a_kind_is_done_one_at_a_time_and_the_latest_counts():
+def test_similar_work_runs_one_at_a_time():
+    """Of requests that wait, the latest counts."""
     told, shown, errors, begun, may_end = [], [], [], [], threading.Event()
     app = SimpleNamespace(
         post_message=told.append, show_error=lambda title, error: errors.append((title, error))

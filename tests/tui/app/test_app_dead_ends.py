@@ -23,7 +23,7 @@ def weak_bench(tmp_path):
     return path
 
 
-def test_what_is_typed_after_a_unit_is_its_serial_number(tmp_path):
+def test_text_after_unit_is_its_serial_number(tmp_path):
     async def way():
         async with operated(tmp_path / "bench.db") as op:
             await op.press("enter")
@@ -52,7 +52,7 @@ def test_a_digit_after_connecting_is_a_step(tmp_path):
     run(way)
 
 
-def test_what_was_typed_and_not_taken_is_not_passed_over(tmp_path, weak_bench):
+def test_unconfirmed_input_blocks_the_next_step(tmp_path, weak_bench):
     async def way():
         async with operated(tmp_path / "bench.db") as op:
             await op.types("#file", "no.toml")
@@ -75,7 +75,7 @@ def test_what_was_typed_and_not_taken_is_not_passed_over(tmp_path, weak_bench):
     run(way)
 
 
-def test_the_bench_file_limits_the_sweep_and_goes_into_the_history(tmp_path, weak_bench):
+def test_bench_file_limits_sweep_and_is_stored(tmp_path, weak_bench):
     db = tmp_path / "bench.db"
 
     async def way():
@@ -105,12 +105,12 @@ def test_the_bench_file_limits_the_sweep_and_goes_into_the_history(tmp_path, wea
     assert kept == weak_bench.read_text(encoding="utf-8")
 
 
-def test_a_bench_file_that_is_not_there_is_refused_before_the_screen(capsys):
+def test_missing_bench_file_is_refused_before_screen(capsys):
     assert main(["bench", "--bench", "nowhere.toml"]) == 2
     assert "nowhere.toml" in capsys.readouterr().err
 
 
-def test_a_refused_plan_stays_in_the_dialog_and_the_recipe_can_be_left(tmp_path):
+def test_refused_plan_keeps_dialog_and_recipe_optional(tmp_path):
     async def way():
         async with operated(tmp_path / "bench.db") as op:
             await op.connects("sim:")
@@ -147,7 +147,7 @@ def test_three_levels_are_proposed_within_the_recipe(tmp_path, unit):
     assert min(b / a for a, b in zip(plan.levels_vpk, plan.levels_vpk[1:], strict=False)) > 1.18
 
 
-def test_a_unit_without_a_recipe_gets_a_sweep_that_it_may_be_given(tmp_path):
+def test_unit_without_recipe_gets_allowed_sweep(tmp_path):
     text = config_path("units", "adss").read_text(encoding="utf-8")
     text = text.replace('name = "ADSS"', 'name = "own"').replace(
         "source_vpk = 5.0", "source_vpk = 0.5"
@@ -162,7 +162,7 @@ def test_a_unit_without_a_recipe_gets_a_sweep_that_it_may_be_given(tmp_path):
     assert (plan.frequencies_hz[0], plan.frequencies_hz[-1]) == (50.0, 180.0)
 
 
-def test_a_bench_that_hides_a_cause_is_chosen_measured_and_revealed(tmp_path):
+def test_hidden_cause_is_chosen_measured_and_revealed(tmp_path):
     async def way():
         async with operated(tmp_path / "bench.db", (100, 30)) as op:
             await op.goes_to(2)
@@ -184,7 +184,7 @@ def test_a_bench_that_hides_a_cause_is_chosen_measured_and_revealed(tmp_path):
     run(way)
 
 
-def test_an_address_that_hides_something_does_not_tell_it_too():
+def test_address_with_hidden_cause_states_no_other():
     assert read_loopback_settings("?hidden=7").hidden == 7
     assert read_loopback_settings("?seed=7").hidden is None
     for wrong in ("?hidden=7&ratio=0.3", "?hidden=1&effect=amplifier-gain:k_a=5", "?hidden=x"):

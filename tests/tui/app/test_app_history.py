@@ -60,7 +60,7 @@ def test_trend_overlay_and_opening(db):
         assert set(store.latest_estimates()) == {1, 2}
 
 
-def test_the_trend_leaves_out_an_estimate_of_points_that_were_measured_again(db):
+def test_trend_omits_estimate_of_remeasured_points(db):
     words = ["measure", "--unit", "adss", "--db", str(db), "--instrument", "sim:"]
     assert main([*words, "--resume", "1", "--remeasure", "100:200"]) == 0
 
@@ -72,7 +72,7 @@ def test_the_trend_leaves_out_an_estimate_of_points_that_were_measured_again(db)
     run(way)
 
 
-def test_a_diagnosis_is_there_again_after_a_restart(db):
+def test_diagnosis_is_restored_after_restart(db):
     async def diagnosed():
         async with operated(db, (120, 40)) as op:
             await op.press("7", "down", "enter")
@@ -104,7 +104,7 @@ def test_a_diagnosis_is_there_again_after_a_restart(db):
     run(measured_again)
 
 
-def test_a_correction_on_the_screen_is_kept_with_its_trail(db):
+def test_correction_is_stored_with_its_trail(db):
     async def way():
         async with operated(db) as op:
             await op.press("7", "down", "c")
@@ -124,7 +124,7 @@ def test_a_correction_on_the_screen_is_kept_with_its_trail(db):
         assert store.measurement(2).header.serial == "SN 7"
 
 
-def test_the_report_is_written_where_the_operator_is(db, tmp_path, monkeypatch):
+def test_report_is_written_to_working_folder(db, tmp_path, monkeypatch):
     async def way():
         analyses = Analyses(quick_analyses().estimate, quick_analyses().diagnose)
         async with operated(db, analyses=analyses) as op:
@@ -158,7 +158,7 @@ def test_an_earlier_session_stands_behind_the_sweep(db):
     run(way)
 
 
-def test_another_unit_takes_results_of_the_first_off_the_desk(db):
+def test_another_unit_clears_earlier_results(db):
     async def way():
         async with operated(db) as op:
             await op.press("7", "enter")
@@ -174,7 +174,7 @@ def test_another_unit_takes_results_of_the_first_off_the_desk(db):
     run(way)
 
 
-def test_a_plan_changed_after_the_checks_is_the_one_that_is_swept(db):
+def test_plan_changed_after_checks_is_swept(db):
     async def way():
         async with operated(db) as op:
             await op.connects("sim:")
@@ -191,7 +191,7 @@ def test_a_plan_changed_after_the_checks_is_the_one_that_is_swept(db):
     assert (plan.frequencies_hz[0], len(plan.frequencies_hz)) == (125.0, 6)
 
 
-def test_the_palette_leads_to_every_step_and_copies(db):
+def test_palette_reaches_every_step_and_copies(db):
     async def way():
         async with operated(db) as op:
             await op.press("ctrl+p", *"report", "enter")
@@ -204,7 +204,7 @@ def test_the_palette_leads_to_every_step_and_copies(db):
     run(way)
 
 
-def test_the_log_has_the_trace_that_the_screen_leaves_out(db, tmp_path, monkeypatch):
+def test_log_has_trace_that_screen_omits(db, tmp_path, monkeypatch):
     def broken(response, unit, progress):
         raise ZeroDivisionError("by design")
 

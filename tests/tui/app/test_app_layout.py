@@ -70,7 +70,7 @@ def test_the_history_shows_every_answer_whole(db, size):
     run(way)
 
 
-def test_a_diagnosis_is_drawn_and_its_models_lie_under_the_points(db):
+def test_diagnosis_draws_models_below_points(db):
     async def way():
         async with operated(db, (140, 40), analyses=judged()) as op:
             await op.press("7")
@@ -95,7 +95,7 @@ def test_a_diagnosis_is_drawn_and_its_models_lie_under_the_points(db):
     run(way)
 
 
-def test_on_a_small_screen_a_key_changes_between_words_and_plots(db):
+def test_key_switches_text_and_plots_when_small(db):
     async def way():
         async with operated(db, (80, 24), analyses=judged()) as op:
             await op.press("7")

@@ -25,7 +25,7 @@ def history(tmp_path_factory):
     return db
 
 
-def test_a_session_is_read_in_order_with_points_that_were_superseded(history):
+def test_session_replays_in_order_with_superseded_points(history):
     recording = read_recording(history)
     with Store(history, read_only=True) as store:
         every = store.points(1, superseded=True)
@@ -38,7 +38,7 @@ def test_a_session_is_read_in_order_with_points_that_were_superseded(history):
     assert any(entry.text.startswith("check: source") for entry in recording.entries)
 
 
-def test_a_response_file_takes_as_long_as_its_cycles():
+def test_response_replay_takes_its_cycle_time():
     recording = read_recording(sample_path("adss-sweep"))
     hertz = np.array([entry.point.point.frequency_hz for entry in recording.entries])
     steps = np.diff([0.0, *(entry.at_s for entry in recording.entries)])
@@ -57,7 +57,7 @@ def test_what_is_no_recording_is_refused(tmp_path, name, text):
         read_recording(tmp_path / "not-there.db")
 
 
-def test_a_measurement_that_is_not_there_is_refused(history, capsys):
+def test_missing_measurement_is_refused(history, capsys):
     assert main(["replay", str(history), "--id", "9"]) == 2
     assert main(["replay", str(history), "--speed", "0"]) == 2
     assert main(["replay", str(history)]) == 2

@@ -190,7 +190,7 @@ def driving(db, within_s=40.0):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
-def test_a_signal_ends_session_and_screen_with_the_source_off(tmp_path, on_terminal, number):
+def test_signal_ends_screen_with_source_off(tmp_path, on_terminal, number):
     db = tmp_path / "bench.db"
     terminal = on_terminal(str(db), "sim:?ratio=0.3&seed=1")
     driving(db)
@@ -200,9 +200,8 @@ def test_a_signal_ends_session_and_screen_with_the_source_off(tmp_path, on_termi
     assert begun(db).source_state is SourceState.CONFIRMED_OFF
 
 
-def test_a_source_that_a_signal_could_not_switch_off_is_told_after_the_screen(
-    tmp_path, on_terminal
-):
+def test_failed_switch_off_is_reported_after_screen(tmp_path, on_terminal):
+    """The message follows when a signal has ended the screen."""
     db = tmp_path / "bench.db"
     terminal = on_terminal(str(db), "sim:?fault=silence:point=5")
     driving(db)
@@ -212,7 +211,7 @@ def test_a_source_that_a_signal_could_not_switch_off_is_told_after_the_screen(
     assert b"error: SOURCE UNKNOWN: switch it off by hand" in terminal.seen.splitlines()[-1]
 
 
-def test_who_quits_reads_first_that_the_source_could_not_be_switched_off(tmp_path, monkeypatch):
+def test_quitting_first_reports_failed_switch_off(tmp_path, monkeypatch):
     monkeypatch.setattr("daq.hp35670a.safe._BUDGET_S", 2.0)
     db = tmp_path / "bench.db"
 
@@ -233,7 +232,7 @@ def test_who_quits_reads_first_that_the_source_could_not_be_switched_off(tmp_pat
     assert begun(db).source_state is SourceState.UNKNOWN
 
 
-def test_a_screen_that_is_taken_away_ends_the_session(tmp_path, on_terminal):
+def test_lost_screen_ends_the_session(tmp_path, on_terminal):
     db = tmp_path / "bench.db"
     terminal = on_terminal(str(db), "sim:?ratio=0.3&seed=1", "3")
     assert terminal.ended() == 0, terminal.seen[-2000:]
@@ -242,7 +241,7 @@ def test_a_screen_that_is_taken_away_ends_the_session(tmp_path, on_terminal):
     assert begun(db).points < 2500
 
 
-def test_a_terminal_that_goes_away_without_a_signal_ends_session_and_screen(tmp_path, on_terminal):
+def test_lost_terminal_without_signal_ends_session(tmp_path, on_terminal):
     db = tmp_path / "bench.db"
     terminal = on_terminal(str(db), "sim:?ratio=0.3&seed=1")
     driving(db)
@@ -256,7 +255,7 @@ def test_a_terminal_that_goes_away_without_a_signal_ends_session_and_screen(tmp_
     replay.ends_by_signal()
 
 
-def test_a_lost_terminal_with_the_source_on_exits_1(tmp_path, on_terminal):
+def test_lost_terminal_with_source_on_exits_1(tmp_path, on_terminal):
     db = tmp_path / "bench.db"
     terminal = on_terminal(str(db), "sim:?fault=silence:point=5")
     driving(db)
@@ -265,7 +264,7 @@ def test_a_lost_terminal_with_the_source_on_exits_1(tmp_path, on_terminal):
     assert begun(db).source_state is SourceState.UNKNOWN
 
 
-def test_a_terminal_that_takes_no_more_holds_no_signal_up_and_is_drawn_anew(tmp_path, on_terminal):
+def test_blocked_terminal_delays_no_signal_and_redraws(tmp_path, on_terminal):
     db, crowd = tmp_path / "bench.db", tmp_path / "bench.db-crowd"
     terminal = on_terminal(str(db), SLOW, program=CROWDED)
     driving(db)
@@ -285,7 +284,7 @@ def test_a_terminal_that_takes_no_more_holds_no_signal_up_and_is_drawn_anew(tmp_
 
 
 @pytest.mark.parametrize("way", ["ctrl+x", "SIGTERM"])
-def test_the_source_is_stopped_whatever_the_event_loop_does(tmp_path, on_terminal, way):
+def test_source_stops_whatever_the_event_loop_does(tmp_path, on_terminal, way):
     db, stuck = tmp_path / "bench.db", tmp_path / "bench.db-stuck"
     terminal = on_terminal(str(db), SLOW, program=STUCK)
     driving(db, within_s=90.0)

@@ -78,7 +78,7 @@ async def holds(op, words=SHOWN, within_s=20.0):
 
 
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
-def test_a_history_of_hostile_texts_is_plain_text_on_every_screen(tmp_path, monkeypatch, size):
+def test_hostile_history_is_plain_text_on_screens(tmp_path, monkeypatch, size):
     folder = tmp_path / "[b]bench[/x]"
     folder.mkdir(parents=True)
     monkeypatch.chdir(folder)
@@ -121,7 +121,9 @@ def test_a_history_of_hostile_texts_is_plain_text_on_every_screen(tmp_path, monk
         assert {m.header.serial for m in store.measurements()} == {HOSTILE}
 
 
-def test_what_instrument_session_and_analyses_say_is_plain_text(tmp_path):
+def test_hostile_messages_are_plain_text(tmp_path):
+    """Of the instrument, the session and the analyses."""
+
     async def way():
         async with operated(tmp_path / "bench.db", (138, 40)) as op:
             post = op.app.post_message
@@ -160,7 +162,7 @@ def test_what_instrument_session_and_analyses_say_is_plain_text(tmp_path):
     run(way)
 
 
-def test_a_replay_of_hostile_texts_is_plain_text(tmp_path):
+def test_hostile_replay_is_plain_text(tmp_path):
     recording = read_recording(hostile_history(tmp_path / "bench.db"), 1)
 
     async def way():
@@ -174,7 +176,7 @@ def test_a_replay_of_hostile_texts_is_plain_text(tmp_path):
     asyncio.run(way())
 
 
-def test_a_file_whose_name_is_markup_is_named_as_it_is(tmp_path):
+def test_markup_in_file_name_is_shown_literally(tmp_path):
     async def way():
         async with operated(tmp_path / "bench.db", (138, 40)) as op:
             await op.types("#file", f"/no/{HOSTILE}.toml")
@@ -217,7 +219,7 @@ _PIECES = st.sampled_from(
 
 @settings(max_examples=10, deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.lists(_PIECES, min_size=1, max_size=9).map("".join))
-def test_every_widget_shows_any_text_as_it_is(text):
+def test_every_widget_shows_text_literally(text):
     async def way():
         app = Shown(text)
         async with app.run_test(size=(120, 40)) as pilot:
@@ -234,7 +236,7 @@ def test_every_widget_shows_any_text_as_it_is(text):
     asyncio.run(way())
 
 
-def test_the_command_line_shows_what_is_not_seen(tmp_path, capsys):
+def test_command_line_shows_invisible_characters(tmp_path, capsys):
     db = hostile_history(tmp_path / "bench.db")
     assert main(["history", "--db", str(db), "--estimate", "none"]) == 0
     assert main(["export", "1", "--db", str(db), "--out", str(tmp_path / f"{HOSTILE}.x")]) == 2

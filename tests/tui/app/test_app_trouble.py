@@ -28,7 +28,7 @@ from tui.app.dialogs.dialogs import ErrorDialog
 
 
 @pytest.mark.parametrize("place", ["sweep", "field", "dialog"])
-def test_one_key_stops_the_source_from_every_screen(tmp_path, place):
+def test_one_key_stops_source_from_every_screen(tmp_path, place):
     db = tmp_path / "bench.db"
 
     async def way(url):
@@ -55,7 +55,7 @@ def test_one_key_stops_the_source_from_every_screen(tmp_path, place):
     assert 3 <= measurement.points < 2800
 
 
-def test_pause_goes_off_and_on_and_abort_is_for_good(tmp_path):
+def test_pause_is_reversible_and_abort_is_final(tmp_path):
     db = tmp_path / "bench.db"
 
     async def way(url):
@@ -79,7 +79,7 @@ def test_pause_goes_off_and_on_and_abort_is_for_good(tmp_path):
     assert begun(db).state == "aborted"
 
 
-def test_a_dropped_connection_is_a_dialog_and_can_be_resumed(tmp_path):
+def test_dropped_connection_opens_dialog_and_resumes(tmp_path):
     db = tmp_path / "bench.db"
 
     async def way(url):
@@ -105,7 +105,7 @@ def test_a_dropped_connection_is_a_dialog_and_can_be_resumed(tmp_path):
     assert (measurement.id, measurement.state, measurement.points) == (1, "complete", 16)
 
 
-def test_a_killed_program_is_offered_for_resume_first(tmp_path):
+def test_resume_of_killed_program_is_offered_first(tmp_path):
     db = tmp_path / "bench.db"
 
     async def way(url):
@@ -131,7 +131,7 @@ def test_a_killed_program_is_offered_for_resume_first(tmp_path):
     assert (begun(db).id, begun(db).state) == (1, "complete")
 
 
-def test_an_overload_is_marked_by_shape_and_in_words(tmp_path):
+def test_overload_is_marked_by_shape_and_words(tmp_path):
     db = tmp_path / "bench.db"
 
     async def way(url):
@@ -151,7 +151,8 @@ def test_an_overload_is_marked_by_shape_and_in_words(tmp_path):
     assert sum(bool(f & PointFlag.OVERLOAD) for f in flags) == 1
 
 
-def test_measure_this_next_starts_the_proposed_sweep_by_one_key_and_both_are_diagnosed(tmp_path):
+def test_proposed_sweep_starts_by_one_key(tmp_path):
+    """Both sweeps are then diagnosed together."""
     db, diagnosed = tmp_path / "bench.db", []
 
     def diagnose(responses, unit, progress):
@@ -183,7 +184,7 @@ def test_measure_this_next_starts_the_proposed_sweep_by_one_key_and_both_are_dia
     assert plan.settle_cycles == 4
 
 
-def test_a_band_picked_on_the_plot_is_measured_again(tmp_path):
+def test_band_picked_on_plot_is_remeasured(tmp_path):
     db = tmp_path / "bench.db"
 
     async def way(url):
@@ -246,7 +247,7 @@ def test_no_instrument_says_what_to_try(tmp_path):
     run(way)
 
 
-def test_a_refused_plan_is_said_in_its_dialog_and_the_old_one_stays(tmp_path):
+def test_refused_plan_keeps_the_old_one(tmp_path):
     async def way():
         async with operated(tmp_path / "bench.db") as op:
             await op.connects("sim:")
@@ -299,7 +300,7 @@ def test_letters_do_the_same_with_shift(tmp_path):
     run(way)
 
 
-def test_points_stay_on_the_screen_where_going_on_with_them_fails(tmp_path):
+def test_points_stay_visible_when_resuming_fails(tmp_path):
     async def way(url):
         async with operated(tmp_path / "bench.db") as op:
             await sweeping(op, url, **LONG)
@@ -337,7 +338,7 @@ def test_quitting_ends_a_session_safe(tmp_path):
     assert begun(db).source_state is SourceState.CONFIRMED_OFF
 
 
-def test_a_fault_of_an_analysis_is_told_and_leaves_the_rest(tmp_path):
+def test_failed_analysis_is_reported_and_isolated(tmp_path):
     def broken(response, unit, progress):
         raise ZeroDivisionError("by design")
 

@@ -34,7 +34,7 @@ def test_z_undoes_entries_one_by_one(tmp_path):
     run(way)
 
 
-def test_a_plan_is_undone_and_a_session_under_way_keeps_its_own(tmp_path):
+def test_plan_undo_leaves_running_session_alone(tmp_path):
     async def way():
         async with operated(tmp_path / "bench.db") as op:
             await op.connects("sim:")
@@ -57,7 +57,7 @@ def test_a_plan_is_undone_and_a_session_under_way_keeps_its_own(tmp_path):
     run(way)
 
 
-def test_the_command_of_a_step_does_the_same(tmp_path, monkeypatch, capsys):
+def test_printed_command_repeats_the_screen_step(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     db = tmp_path / "of the screen.db"
     lines = {}

@@ -48,7 +48,7 @@ def test_the_trial_point_is_not_called_off():
     assert held.source_text == "SOURCE OFF (confirmed)"
 
 
-def test_the_time_left_after_a_pause_is_said_to_come_after_the_run_in(tmp_path):
+def test_time_left_after_pause_follows_run_in(tmp_path):
     first = kinds.PointStored(stored(), 1, 6, 2.0, 65.0)
     again = kinds.RunIn(1.5, first.stored.point, first.stored.point)
     second = kinds.PointStored(stored(110.0, number=2), 2, 6, 9.0, 60.0)
@@ -71,15 +71,15 @@ def test_the_time_left_after_a_pause_is_said_to_come_after_the_run_in(tmp_path):
 
 
 @pytest.mark.parametrize("state", [SourceState.UNCONFIRMED, SourceState.UNKNOWN])
-def test_a_source_that_is_not_proven_off_says_what_to_do(state):
+def test_unproven_source_off_states_the_remedy(state):
     assert "switch it off by hand" in told(OPENED, kinds.SourceSafe(state)).source_text
 
 
-def test_a_source_found_on_names_no_level_but_a_remedy():
+def test_source_found_on_states_remedy_without_level():
     assert source_words(SourceState.ON) == "SOURCE ON: switch it off by hand"
 
 
-def test_a_session_that_dies_while_driving_leaves_the_source_unknown():
+def test_session_lost_while_driving_leaves_source_unknown():
     view = told(OPENED, SOURCE_OFF, kinds.LevelStarted(2.5, 3))
     assert view.source_text == "SOURCE ON at 2.5 V peak"
     view.end(RuntimeError("gone"))
@@ -87,7 +87,7 @@ def test_a_session_that_dies_while_driving_leaves_the_source_unknown():
     assert not view.live
 
 
-def test_a_pause_in_the_sweep_is_no_hold_before_it():
+def test_pause_in_sweep_is_not_initial_hold():
     view = told(
         OPENED, SOURCE_OFF, kinds.Paused(SourceState.CONFIRMED_OFF), kinds.GoingOn(),
         kinds.LevelStarted(1.5, 3), kinds.PointStored(stored(), 1, 6, 0.5, 2.0),
@@ -97,20 +97,21 @@ def test_a_pause_in_the_sweep_is_no_hold_before_it():
     assert view.done == 1
 
 
-def test_a_stop_that_was_asked_for_is_said_until_it_is_done():
+def test_requested_stop_is_shown_until_done():
     view = told(OPENED, SOURCE_OFF, kinds.LevelStarted(2.5, 3))
     view.stop_asked = True
     assert view.source_text == "STOP REQUESTED, SOURCE ON at 2.5 V peak"
 
 
-def test_a_point_measured_again_takes_the_place_of_the_old_one():
+def test_remeasured_point_replaces_the_old_one():
     view = told(OPENED)
     view.preload([stored(gain=0.1 + 0j)])
     view.take(kinds.PointStored(stored(gain=0.9 + 0j, number=9), 1, 6, 0.5, 2.0))
     assert [point.id for point in view.points.values()] == [9]
 
 
-def test_traces_never_bridge_a_spoilt_point_and_mark_flags_by_shape():
+def test_traces_break_at_spoilt_points_and_flags():
+    """A trace does not cross a spoilt point. Flags differ by their shape."""
     points = [
         stored(100.0), stored(110.0, flags=PointFlag.OVERLOAD), stored(120.0, gain=complex("nan"),
         flags=PointFlag.SPOILT), stored(130.0, flags=PointFlag.NOT_PERIODIC), stored(140.0),
@@ -126,7 +127,7 @@ def test_traces_never_bridge_a_spoilt_point_and_mark_flags_by_shape():
     assert "coarse" not in words
 
 
-def test_a_response_is_drawn_with_its_levels_and_as_a_reference():
+def test_response_is_drawn_alone_and_as_reference():
     response = FrequencyResponse.from_arrays(
         [100.0, 110.0, 100.0, 110.0], [1.0, 1.0, 2.0, 2.0], [1, 10, 1, 1], unit="ADSS"
     )
@@ -137,7 +138,7 @@ def test_a_response_is_drawn_with_its_levels_and_as_a_reference():
     assert "line #3 1 V" in legend(traces_of_response(response, "#3"))
 
 
-def test_a_proposed_plan_is_read_in_both_forms_and_refused_in_others():
+def test_proposed_plan_is_read_in_both_forms():
     whole = dataclasses.asdict(PLAN)
     assert plan_of_document(whole) == PLAN
     band = {"levels_vpk": [2.0], "start_hz": 100.0, "stop_hz": 120.0, "points": 3}
@@ -162,7 +163,7 @@ def test_what_to_do_next_is_one_sentence():
     assert "departures" in next_sentence(consistent | {"verdict": "unexplained"})
 
 
-def test_departures_are_a_grid_of_levels_and_bands():
+def test_departures_form_level_by_band_grid():
     parts = [
         {"band_hz": [120.0, 126.0], "source_vpk": 1.5, "quantity": "gain", "mean": 1.44,
          "sigma": 7.0},
@@ -176,7 +177,7 @@ def test_departures_are_a_grid_of_levels_and_bands():
     assert lines[head + 2].split() == ["3", "V,", "deg", "\u00b7", "-12.3!"]
 
 
-def test_a_diagnosis_is_told_with_causes_rivals_and_what_next():
+def test_diagnosis_states_causes_rivals_and_next_sweep():
     text = told_of(DIAGNOSIS)
     assert "\nRivals\n" in text
     for words in (

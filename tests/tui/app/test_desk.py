@@ -48,7 +48,7 @@ def with_unit_text(measurement, text):
 
 
 @pytest.mark.parametrize("name", ["ADSS", "gär"])
-def test_a_measurement_is_opened_with_the_unit_file_it_was_made_with(measured, db, name):
+def test_measurement_opens_with_its_unit_file(measured, db, name):
     measurement, text = measured(name, "--serial", "7")
     desk = Desk(db)
     desk.choose_unit_of(measurement)
@@ -65,7 +65,7 @@ def test_a_measurement_is_opened_with_the_unit_file_it_was_made_with(measured, d
     assert "2.75e-3" in desk.request().header.configurations["unit"]
 
 
-def test_the_screen_says_which_of_two_units_of_a_name_it_is(measured, db, tmp_path):
+def test_origin_tells_units_of_one_name_apart(measured, db, tmp_path):
     _, text = measured("ADSS")
     own, same = tmp_path / "own.toml", tmp_path / "same.toml"
     own.write_text(text.replace("R_m = 4.10", "R_m = 4.5"), encoding="utf-8")
@@ -99,7 +99,7 @@ def test_the_screen_says_which_of_two_units_of_a_name_it_is(measured, db, tmp_pa
     run_screen(way)
 
 
-def test_a_unit_as_it_is_shipped_keeps_its_recipe(run, db):
+def test_shipped_unit_keeps_its_recipe(run, db):
     run(*measuring())
     with Store(db, read_only=True) as store:
         measurement = store.measurement(1)
@@ -109,7 +109,7 @@ def test_a_unit_as_it_is_shipped_keeps_its_recipe(run, db):
         assert (desk.unit_name, desk.unit, desk.recipe) == ("adss", SHIPPED, "adss")
 
 
-def test_a_unit_that_the_history_does_not_hold_leaves_the_desk_as_it_is(measured, db):
+def test_unit_missing_from_history_changes_nothing(measured, db):
     measurement, text = measured("gär", "--serial", "7")
     desk = Desk(db)
     desk.choose_unit("edss")
@@ -119,7 +119,7 @@ def test_a_unit_that_the_history_does_not_hold_leaves_the_desk_as_it_is(measured
     assert (desk.unit.name, desk.serial) == ("EDSS", "")
 
 
-def test_going_on_keeps_what_was_noted_and_refuses_anything_else(measured, db):
+def test_resuming_keeps_notes_and_refuses_changes(measured, db):
     measurement, _ = measured("gär", "--operator", "anna", "--notes", "one", "--serial", "7")
     desk = Desk(db, operator="bob", serial="7")
     assert desk.take_up(measurement) == (
@@ -138,7 +138,7 @@ def test_going_on_keeps_what_was_noted_and_refuses_anything_else(measured, db):
     assert desk.request().header.operator == "bob"
 
 
-def test_remarks_can_be_changed_for_a_new_measurement_only(run, db):
+def test_remarks_change_only_for_new_measurements(run, db):
     assert run(*measuring("--operator", "anna", "--serial", "7"))[0] == 0
     with Store(db) as store:
         store.reopen(1)
@@ -168,7 +168,7 @@ def test_remarks_can_be_changed_for_a_new_measurement_only(run, db):
     run_screen(way)
 
 
-def test_a_proposed_plan_that_the_analyser_cannot_be_set_to_is_refused(db):
+def test_plan_beyond_analyser_settings_is_refused(db):
     desk = Desk(db)
     desk.choose_unit("adss")
     desk.given_plan = SweepPlan((100.0, 100.005, 110.0), (2.0,))
@@ -176,7 +176,7 @@ def test_a_proposed_plan_that_the_analyser_cannot_be_set_to_is_refused(db):
         desk.request()
 
 
-def test_a_unit_from_the_history_is_measured_anew_on_the_screen(measured, db):
+def test_stored_unit_is_measured_anew_on_screen(measured, db):
     _, text = measured("gär")
 
     async def way():
@@ -196,7 +196,7 @@ def test_a_unit_from_the_history_is_measured_anew_on_the_screen(measured, db):
     assert (header.unit, header.configurations["unit"]) == ("gär", text)
 
 
-def test_no_stage_passes_by_a_response_that_is_in_doubt():
+def test_doubtful_response_passes_no_stage():
     whole = read_response(sample_path("adss-sweep"))
     cut = replace(whole, provenance={**whole.provenance, "state": "interrupted"})
     content = load_unit("adss").model_dump(by_alias=True)

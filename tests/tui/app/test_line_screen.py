@@ -48,7 +48,7 @@ async def scans(op, text):
     await op.press("enter")
 
 
-def test_units_are_judged_in_large_letters_and_counted(bench):
+def test_units_are_judged_in_large_letters(bench):
     async def way():
         async with at_the_line(bench) as op:
             screen = await op.sees("scan a serial number", "no unit yet")
@@ -79,7 +79,7 @@ def test_units_are_judged_in_large_letters_and_counted(bench):
     assert not bench.drives
 
 
-def test_a_stopped_unit_is_not_judged_and_gone_on_with(bench):
+def test_stopped_unit_is_not_judged_but_resumed(bench):
     async def way():
         async with at_the_line(bench, (140, 40)) as op:
             bench.unit.wait_s = 0.5
@@ -103,7 +103,7 @@ def test_a_stopped_unit_is_not_judged_and_gone_on_with(bench):
     assert bench.points(1) == 21
 
 
-def test_a_killed_screen_loses_no_unit_and_judges_none_twice(bench):
+def test_killed_screen_judges_every_unit_once(bench):
     words = [*bench.words("--out", bench.out, "--screen")]
     near, far = pty.openpty()
     bench.unit.wait_s = 0.5
@@ -151,7 +151,7 @@ def _read(terminal):
         return False
 
 
-def test_without_a_terminal_it_says_so_and_drives_nothing(bench, capsys):
+def test_missing_terminal_is_reported_and_nothing_driven(bench, capsys):
     assert cli.main(list(map(str, bench.words("--screen")))) == 2
     assert "needs a terminal" in capsys.readouterr().err
     assert bench.measurements() == 0

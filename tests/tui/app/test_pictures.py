@@ -49,7 +49,7 @@ def pictured(tmp_path):
     return tmp_path / "bench.db"
 
 
-def test_result_and_diagnosis_are_pictured_as_they_are(pictured):
+def test_pictures_match_result_and_diagnosis_screens(pictured):
     async def look():
         async with operated(pictured, SIZE) as op:
             await op.press("7")

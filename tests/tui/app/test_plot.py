@@ -61,7 +61,7 @@ def shown(steps, size=(90, 30), **options):
     st.sampled_from([linear_scale, degree_scale, frequency_scale]),
 )  # fmt: skip
 @settings(max_examples=200, deadline=None)
-def test_a_scale_holds_its_range_with_even_ticks(low, span, cells, scale):
+def test_scale_covers_range_with_even_ticks(low, span, cells, scale):
     if scale is frequency_scale:
         low = abs(low) + 0.01
     high = low + span
@@ -95,7 +95,7 @@ def test_phase_ticks_are_parts_of_a_turn():
     assert set(np.diff(degree_scale(-190, -20, 12).ticks)) <= {30.0, 45.0, 90.0}
 
 
-def test_phase_has_no_jumps_of_a_turn_and_levels_lie_on_the_same_one():
+def test_phase_is_continuous_and_levels_share_branch():
     true = np.linspace(-100.0, -800.0, 60)
     wrapped = (true + 180.0) % 360.0 - 180.0
     gap = wrapped.copy()
@@ -145,7 +145,7 @@ def test_without_known_colours_nothing_is_hidden():
     shown(steps, theme="ansi-dark")
 
 
-def test_units_stand_at_the_axes_and_the_cursor_reads_values():
+def test_axes_show_units_and_cursor_reads_values():
     async def steps(app, pilot):
         screen = text_of(app)
         for words in (
@@ -190,7 +190,8 @@ def test_keys_zoom_and_pan():
     shown(steps)
 
 
-def test_a_prediction_is_a_dashed_line_in_a_band_and_errors_are_bars():
+def test_prediction_has_dashed_line_and_error_bars():
+    """The prediction lies in a band, and stated errors are bars."""
     gain = response().at_level(1.5)
     model = Prediction(
         "plain model", HERTZ, gain.gain_db - 6.0, np.full(41, 2.0), gain.phase_deg,
@@ -207,7 +208,7 @@ def test_a_prediction_is_a_dashed_line_in_a_band_and_errors_are_bars():
     shown(steps, predictions=(model,))
 
 
-def test_a_band_ends_on_eighths_and_data_lie_above_it():
+def test_band_ends_on_eighths_below_the_data():
     x = Scale(0.0, 10.0, 10, ())
     y = Scale(0.0, 4.0, 4, ())
     canvas = Canvas(x, y, "#000000")

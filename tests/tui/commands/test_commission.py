@@ -33,7 +33,7 @@ def load_unit_text():
     return config_path("units", "adss").read_text()
 
 
-def test_a_drive_is_identified_and_judged_by_its_own_file(tmp_path, sweep, capsys):
+def test_unit_file_from_commission_is_judged(tmp_path, sweep, capsys):
     own = tmp_path / "a7.toml"
     words = ["commission", str(sweep), "--unit", str(unit_file(tmp_path)), "--out", str(own)]
     assert cli.main([*words, "--json"]) == 0
@@ -73,7 +73,7 @@ def test_what_cannot_be_identified_is_refused(tmp_path, sweep, capsys, tolerance
         (["--minutes", "0.01"], "the shortest useful sweep"),
     ],
 )
-def test_a_time_that_is_no_use_is_refused(words, said, tmp_path, capsys):
+def test_unusable_time_is_refused(words, said, tmp_path, capsys):
     out = tmp_path / "r.toml"
     assert cli.main(["plan", "--unit", "adss", *words, "--out", str(out)]) == 2
     assert said in capsys.readouterr().err

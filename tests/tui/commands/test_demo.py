@@ -112,7 +112,7 @@ def test_the_whole_way_over_a_socket(quick, tmp_path, capsys):
         assert len(judged[0]) == len(store.response(1)) == 27
 
 
-def test_twice_the_same_points_and_one_json_document(quick, tmp_path, capsys):
+def test_repeated_run_prints_same_points_and_json(quick, tmp_path, capsys):
     judged, demo = quick("load-inertia")
     for name in ("a", "b"):
         assert demo(["demo", "--json", "--out", str(tmp_path / name)]) == 0
@@ -124,7 +124,7 @@ def test_twice_the_same_points_and_one_json_document(quick, tmp_path, capsys):
     assert result["report"] == str(tmp_path / "b" / "report.html")
 
 
-def test_a_surprise_is_another_one_and_the_same_for_its_seed(quick, tmp_path, capsys):
+def test_surprise_differs_by_seed_and_can_repeat(quick, tmp_path, capsys):
     _, demo = quick("load-inertia")
     results = []
     for seed in ("4", "4", "5"):
@@ -212,7 +212,7 @@ class Person:
         (["nonsense", ""], None),
     ],
 )
-def test_a_guess_is_a_number_or_a_name(answers, guess):
+def test_guess_is_number_or_effect_name(answers, guess):
     person = Person(*answers)
     assert verb._guess(person) == guess
     assert person.answers == []
@@ -221,7 +221,8 @@ def test_a_guess_is_a_number_or_a_name(answers, guess):
 
 @pytest.mark.parametrize("unit", ["adss", "edss"])
 @pytest.mark.parametrize("name", CATALOGUE)
-def test_what_is_drawn_is_in_its_range_and_differs_from_the_datasheet(unit, name):
+def test_drawn_effect_is_in_range_and_visible(unit, name):
+    """A drawn value lies in its range and at least a tenth off the datasheet."""
     subject = load_unit(unit)
     for seed in range(30):
         setting = draw_effect(subject, (40.0, 90.0), np.random.default_rng(seed), [name])
@@ -244,7 +245,7 @@ def points(level):
     return [(f, level * 10 ** (-f / 100) * np.exp(-1j * f / 50)) for f in hertz.tolist()]
 
 
-def test_the_plot_has_every_point_where_it_belongs():
+def test_plot_shows_every_point_at_its_position():
     lines = bode_lines({1.5: [(100.0, 1.0), (200.0, 0.01j)]}, (100.0, 200.0))
     assert lines[1] == "     0 |o"
     assert lines[11] == "   -40 |" + " " * 69 + "o"
@@ -253,7 +254,7 @@ def test_the_plot_has_every_point_where_it_belongs():
     assert lines[-1].split() == ["Hz", "100", "118.9", "141.4", "168.2", "200"]
 
 
-def test_the_plot_keeps_its_size_whatever_is_in_it():
+def test_plot_size_does_not_depend_on_data():
     nothing = bode_lines({}, (100.0, 200.0))
     sizes = {len(nothing)}
     for levels in ({1.5: points(1.0)}, {1.5: points(1.0), 4.0: points(1e-3)},
@@ -268,7 +269,7 @@ def test_the_plot_keeps_its_size_whatever_is_in_it():
     assert both.count("x") > 15
 
 
-def test_on_a_terminal_the_plot_is_drawn_in_place():
+def test_terminal_plot_is_redrawn_in_place():
     program = (
         "from tui.text.output import Console; c = Console()\n"
         "for n in range(3):\n"

@@ -38,9 +38,7 @@ SWEEP = str(PRACTICE / "practice-09.csv")
         (["missing.csv", "--unit", "adss"], "missing.csv"),
     ],
 )
-def test_what_cannot_be_diagnosed_is_refused_in_one_line(
-    words, said, capsys, tmp_path, monkeypatch
-):
+def test_undiagnosable_input_is_refused_in_one_line(words, said, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["diagnose", *words]) == 2
     caught = capsys.readouterr()
@@ -49,7 +47,7 @@ def test_what_cannot_be_diagnosed_is_refused_in_one_line(
     assert said in line
 
 
-def test_the_papers_rows_are_not_put_to_a_unit_of_ones_own(capsys, tmp_path):
+def test_paper_rows_are_refused_for_another_unit(capsys, tmp_path):
     own = tmp_path / "own.toml"
     own.write_text(config_path("units", "adss").read_text().replace('"ADSS"', '"OWN"'))
     assert main(["diagnose", "--unit", str(own), "--paper"]) == 2
@@ -88,9 +86,7 @@ def calls():
     return made
 
 
-def test_the_whole_response_is_handed_on_and_runs_are_kept_where_caches_are(
-    calls, capsys, monkeypatch, tmp_path
-):
+def test_whole_response_is_diagnosed_with_run_cache(calls, capsys, monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert main(["diagnose", SWEEP, "--unit", "adss", "--json"], calls.compute) == 0
     assert json.loads(capsys.readouterr().out) == {"verdict": "consistent"}
@@ -101,7 +97,7 @@ def test_the_whole_response_is_handed_on_and_runs_are_kept_where_caches_are(
     assert said.startswith("ADSS: consistent.\n  nothing\n  No advice: the backlash by the models")
 
 
-def test_a_response_of_another_unit_is_said_to_be_one(calls, capsys, tmp_path):
+def test_response_of_another_unit_gives_warning(calls, capsys, tmp_path):
     few = tmp_path / "few.csv"
     write_response(read_response(Path(SWEEP)).take(np.arange(0, 183, 30)), few)
     assert main(["diagnose", str(few), "--unit", "edss"], calls.compute) == 0
@@ -128,7 +124,7 @@ def proposed():
 
 
 @pytest.mark.parametrize("asked", ["response", "paper"])
-def test_the_command_that_is_proposed_finds_a_unit_by_its_path(proposed, capsys, tmp_path, asked):
+def test_proposed_command_names_unit_by_its_path(proposed, capsys, tmp_path, asked):
     own = tmp_path / "my gimbal.toml"
     own.write_text(config_path("units", "adss").read_text(encoding="utf-8"), encoding="utf-8")
     measured = SWEEP if asked == "response" else "--paper"
@@ -137,9 +133,8 @@ def test_the_command_that_is_proposed_finds_a_unit_by_its_path(proposed, capsys,
     assert words[words.index("--unit") + 1] == str(own)
 
 
-def test_the_command_that_is_proposed_runs_as_printed_on_the_bench_that_was_measured(
-    proposed, capsys, monkeypatch, tmp_path
-):
+def test_proposed_command_runs_on_measured_bench(proposed, capsys, monkeypatch, tmp_path):
+    """The proposed command runs as printed, on the instrument of the measurement."""
     monkeypatch.chdir(tmp_path)
     bench = "sim:?ratio=0.3&seed=1&effect=load-viscous-damping:B_L=0.05"
     plan = ["--level", "1", "--start", "100", "--stop", "140", "--points", "8"]
@@ -166,7 +161,7 @@ def test_the_command_that_is_proposed_runs_as_printed_on_the_bench_that_was_meas
         (["prologix:/dev/ttyUSB0?addr=11"], "prologix:/dev/ttyUSB0?addr=11"),
     ],
 )
-def test_who_says_last_where_it_was_measured_is_believed(said, asked):
+def test_proposed_command_uses_last_stated_instrument(said, asked):
     plan = SweepPlan((100.0, 120.0), (1.0,))
     measured = [
         FrequencyResponse.from_arrays(
@@ -180,9 +175,7 @@ def test_who_says_last_where_it_was_measured_is_believed(said, asked):
     assert "--serial" not in words
 
 
-def test_a_figure_that_cannot_be_made_does_not_cost_the_answer(
-    calls, capsys, monkeypatch, tmp_path
-):
+def test_failed_figure_does_not_lose_the_answer(calls, capsys, monkeypatch, tmp_path):
     def full(result, folder):
         raise LashbenchError("a.png: could not be written (No space left on device)")
 
@@ -194,7 +187,7 @@ def test_a_figure_that_cannot_be_made_does_not_cost_the_answer(
     assert told.err.splitlines()[-1].startswith("error: a.png: could not be written")
 
 
-def test_who_reads_no_answer_may_still_want_its_figures(calls, capfd, monkeypatch, tmp_path):
+def test_closed_stdout_still_writes_the_figures(calls, capfd, monkeypatch, tmp_path):
     reading, writing = os.pipe()
     os.close(reading)
     calls.compute = replace(calls.compute, draw_diagnosis=lambda result, folder: [folder / "a.png"])
@@ -206,7 +199,7 @@ def test_who_reads_no_answer_may_still_want_its_figures(calls, capfd, monkeypatc
 
 
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="no folder that nobody may fill")
-def test_a_folder_that_cannot_be_filled_is_refused_before_the_work(calls, capsys):
+def test_unwritable_folder_is_refused_before_diagnosing(calls, capsys):
     assert main(["diagnose", SWEEP, "--unit", "adss", "--plots", "/proc"], calls.compute) == 2
     assert not calls
     (line,) = capsys.readouterr().err.strip().splitlines()
@@ -222,7 +215,7 @@ def test_figures_go_where_they_are_asked_for(calls, capsys, monkeypatch, tmp_pat
     assert "a.png" in capsys.readouterr().err
 
 
-def test_the_papers_row_is_answered_with_json_and_a_picture(capsys, tmp_path):
+def test_paper_row_gives_json_and_picture(capsys, tmp_path):
     class Drawn(Told):
         def plot(self, folder):
             return [folder / "adss.png"]
@@ -240,9 +233,7 @@ def test_the_papers_row_is_answered_with_json_and_a_picture(capsys, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_large_effect_hidden_behind_the_simulated_analyser_is_found(
-    tmp_path, monkeypatch, capsys
-):
+def test_large_effect_behind_simulated_analyser_is_found(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     compiled = code_folder()
     compiled.mkdir(parents=True, exist_ok=True)
@@ -303,7 +294,8 @@ def diagnose_a_large_effect(capsys):
     return found["verdict"]
 
 
-def test_further_sweeps_are_handed_on_together_and_none_if_one_is_bad(calls, capsys, tmp_path):
+def test_several_sweeps_are_diagnosed_together_or_refused(calls, capsys, tmp_path):
+    """Sweeps are handed on together, and none of them if one is bad."""
     other = str(PRACTICE / "practice-05.csv")
     assert main(["diagnose", SWEEP, other, "--unit", "adss"], calls.compute) == 0
     assert [response.provenance for response, _, _ in calls] == [
@@ -317,14 +309,14 @@ def test_further_sweeps_are_handed_on_together_and_none_if_one_is_bad(calls, cap
     assert "spoilt.csv" in capsys.readouterr().err
 
 
-def test_sweeps_of_different_units_are_not_diagnosed_together(capsys):
+def test_sweeps_of_different_units_are_refused(capsys):
     other = str(PRACTICE / "practice-10.csv")
     assert main(["diagnose", SWEEP, other, "--unit", "adss"]) == 2
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert line.startswith("error: the responses are of different units, ADSS and EDSS;")
 
 
-def test_a_foreign_file_that_names_no_unit_goes_with_any():
+def test_file_without_unit_fits_any_unit():
     first, other = (read_response(PRACTICE / f"practice-{n}.csv") for n in ("09", "05"))
     check_together([first, replace(other, unit="unknown")])
     with pytest.raises(InputError, match="different specimens, SN 7 and SN 8"):

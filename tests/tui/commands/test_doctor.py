@@ -41,7 +41,7 @@ def spoilt(monkeypatch, tmp_path):
     return spoil
 
 
-def test_the_exit_code_tells_a_failure_from_a_note(spoilt, capsys):
+def test_exit_code_separates_failure_from_note(spoilt, capsys):
     spoilt("STATE")
     assert main(["doctor"]) == 0
     out = capsys.readouterr().out
@@ -57,7 +57,7 @@ def test_the_exit_code_tells_a_failure_from_a_note(spoilt, capsys):
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="no bash, which tells each exit code")
 @pytest.mark.parametrize(("words", "reader"), [("", "head -n 1"), ("", "true"), ("--json", "true")])
-def test_who_reads_a_line_or_none_does_not_hide_that_something_failed(tmp_path, words, reader):
+def test_closed_pipe_does_not_hide_failure(tmp_path, words, reader):
     """Through a real pipe: who is gone before the first line, and who leaves after it."""
     (tmp_path / "file").write_text("")
     lashbench = f"{shlex.quote(sys.executable)} -m tui.cli"
@@ -87,7 +87,7 @@ def test_json_is_one_document_with_every_remedy(spoilt, capsys):
     assert [c["name"] for c in document["checks"] if c["state"] == "failed"] == ["history"]
 
 
-def test_install_commands_survive_a_space_in_the_path(
+def test_install_commands_quote_spaces_in_path(
     monkeypatch,
 ):
     python = "/home/a b/.venv/bin/python"
@@ -110,13 +110,13 @@ def test_this_installation_is_well(capsys):
     assert {"Python", "compiled engine", "terminal", "history", "VISA on a LAN"} <= set(checks)
 
 
-def test_a_finding_that_is_not_well_must_say_what_to_do():
+def test_bad_finding_must_state_its_remedy():
     for state in ("note", "failed"):
         with pytest.raises(ValueError, match="what to do"):
             Finding("x", state, "is wrong")
 
 
-def test_a_check_that_breaks_does_not_end_the_others():
+def test_failing_check_does_not_end_others():
     def breaks():
         yield passed("first half", "fine")
         raise RuntimeError("the bus\nis on fire")
@@ -185,7 +185,7 @@ class NowhereToCache:
             raise RuntimeError("cannot cache function 'agree':\n no locator available")
 
 
-def test_an_engine_that_is_not_compiled_not_kept_or_not_there(monkeypatch, tmp_path):
+def test_engine_not_compiled_or_missing_is_reported(monkeypatch, tmp_path):
     from numba import config
 
     with monkeypatch.context() as patch:
@@ -310,7 +310,7 @@ def test_a_port_on_windows_needs_no_group(monkeypatch):
     assert "prologix:COM3?addr=11" in finding.found
 
 
-def test_visa_without_a_back_end_and_with_a_makers_library(monkeypatch):
+def test_visa_back_ends_are_reported(monkeypatch):
     import pyvisa
     from pyvisa.ctwrapper import IVIVisaLibrary
 
@@ -343,7 +343,7 @@ def test_visa_without_a_back_end_and_with_a_makers_library(monkeypatch):
         ("&options=AY6", "the session failed"),
     ],
 )
-def test_a_self_test_that_reads_wrong_or_cannot_run(changed, said):
+def test_wrong_or_impossible_self_test_is_reported(changed, said):
     finding = only(check_itself(f"sim:?ratio=0.3&seed=1{changed}"))
     assert finding.state == "failed"
     assert re.search(said, finding.found)
@@ -351,5 +351,5 @@ def test_a_self_test_that_reads_wrong_or_cannot_run(changed, said):
 
 
 @pytest.mark.parametrize("seed", [2, 3, 4])
-def test_the_self_test_does_not_hang_on_one_seed(seed):
+def test_self_test_does_not_depend_on_seed(seed):
     assert only(check_itself(f"sim:?ratio=0.3&seed={seed}")).state == "ok"

@@ -50,7 +50,7 @@ def first_line(page):
     return found[1]
 
 
-def test_a_report_says_it_first_and_holds_no_number_of_it(tmp_path, capsys):
+def test_report_warns_first_and_gives_no_number(tmp_path, capsys):
     sweep, page = tmp_path / "sweep.csv", tmp_path / "page.html"
     write_response(radians(read_response(sample_path("adss-sweep"))), sweep)
     assert cli.main(["report", str(sweep), "--unit", "adss", "--out", str(page)]) == 0
@@ -63,7 +63,9 @@ def test_a_report_says_it_first_and_holds_no_number_of_it(tmp_path, capsys):
     assert CURE in data["remarks"]["input"]
 
 
-def test_the_screen_refuses_it_with_the_cure_and_a_takes_it_as_it_is(mistaken):
+def test_screen_refuses_with_remedy_until_accepted(mistaken):
+    """Key A accepts the response as it is."""
+
     async def way():
         async with operated(mistaken, size=(120, 40)) as op:
             desk = op.app.desk
@@ -82,7 +84,7 @@ def test_the_screen_refuses_it_with_the_cure_and_a_takes_it_as_it_is(mistaken):
     assert CURE in kept["warnings"][0]
 
 
-def test_the_screen_diagnoses_it_only_as_it_is(mistaken):
+def test_screen_diagnoses_doubtful_response_only_if_accepted(mistaken):
     async def way():
         async with operated(mistaken, size=(120, 40)) as op:
             desk = op.app.desk
@@ -110,7 +112,7 @@ def test_the_history_passes_no_features_of_it(mistaken, loose, capsys):
     assert (item["verdict"], CURE in item["reason"]) == ("UNDECIDED", True)
 
 
-def test_extract_passes_nothing_of_another_excitation_or_of_half_a_sweep(loose, tmp_path, capsys):
+def test_extract_passes_no_noise_or_half_sweep(loose, tmp_path, capsys):
     whole = read_response(sample_path("adss-sweep"))
     path = tmp_path / "sweep.h5"
     for said, code in [

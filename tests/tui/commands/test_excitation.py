@@ -70,7 +70,7 @@ def test_a_report_shows_it_without_an_estimate(more, tmp_path):
 
 
 @pytest.mark.parametrize("said", ["a stepped sine", "Swept Sine", "", None])
-def test_a_stepped_sine_or_nothing_said_is_taken(said, tmp_path, capsys):
+def test_stepped_or_unstated_excitation_is_accepted(said, tmp_path, capsys):
     """What else there is to say of it is said: it is no response of the unit."""
     path = tmp_path / "r.csv"
     write_response(response_to("noise"), path)

@@ -20,7 +20,7 @@ def first_day(url, folder, *words):
 
 
 @pytest.mark.parametrize("driver", CHECKED, ids=lambda driver: driver.scheme or "preset")
-def test_every_check_of_a_driver_runs_on_its_simulated_instrument(tmp_path, capsys, driver):
+def test_all_checks_run_on_simulated_instruments(tmp_path, capsys, driver):
     url = f"{driver.scheme}:sim:?noise=0.00001".removeprefix(":")
     assert first_day(url, tmp_path / "one", "--json") == 0
     document = json.loads(capsys.readouterr().out)
@@ -39,7 +39,7 @@ def test_every_check_of_a_driver_runs_on_its_simulated_instrument(tmp_path, caps
     assert first_day(url, tmp_path / "one") == 2
 
 
-def test_what_differs_is_told_with_where_to_change_it(tmp_path, capsys):
+def test_difference_names_the_setting_to_change(tmp_path, capsys):
     box = simulated("sr785", LinearPlant(known_gain), noise_v=1e-4)
     # An instrument whose displays lose their data when another quantity is chosen.
     box.choices = type(box.choices)(
@@ -52,7 +52,8 @@ def test_what_differs_is_told_with_where_to_change_it(tmp_path, capsys):
     assert "differs         change of MEAS" in said
 
 
-def test_a_connection_that_breaks_ends_it_with_the_source_off_over_a_new_one(tmp_path, capsys):
+def test_lost_connection_ends_with_source_off(tmp_path, capsys):
+    """A new connection switches the source off."""
     box = simulated("", LinearPlant(known_gain), ["dropped-connection:phase=prepare,skip=30"])
     with served(box) as url:
         assert first_day(url, tmp_path, "--yes") == 3
@@ -73,7 +74,7 @@ def test_what_is_not_there_leaves_no_folder(tmp_path, capsys, made):
     assert not list(tmp_path.iterdir())
 
 
-def test_what_the_driver_cannot_drive_is_driven_by_no_check(tmp_path, capsys):
+def test_missing_option_ends_checks_without_driving(tmp_path, capsys):
     box = simulated("", LinearPlant(known_gain), ["missing-option"])
     with served(box) as url:
         assert first_day(url, tmp_path, "--yes") == 1
@@ -84,7 +85,7 @@ def test_what_the_driver_cannot_drive_is_driven_by_no_check(tmp_path, capsys):
     assert "- ended: early" in report
 
 
-def test_no_check_drives_more_than_the_level_that_was_given(tmp_path):
+def test_no_check_exceeds_the_given_level(tmp_path):
     assert first_day("sim:?noise=0.00001", tmp_path, "--level", "0.004") == 0
     acts = (tmp_path / "transcript.jsonl").read_text().splitlines()
     lines = [json.loads(act).get("line", "") for act in acts]

@@ -89,7 +89,7 @@ def ended(program, terminal, seconds=60.0):
 
 
 @pytest.mark.parametrize("driver", [driver.scheme for driver in CHECKED])
-def test_a_source_that_is_seen_to_drive_ends_it_at_once(tmp_path, driver):
+def test_driving_source_ends_the_checks_at_once(tmp_path, driver):
     box = simulated(driver, LinearPlant(known_gain))
     with served(box, driver=driver) as url, first_day(url, tmp_path) as (program, terminal):
         terminal.wait("may")
@@ -115,7 +115,7 @@ def test_a_source_that_is_seen_to_drive_ends_it_at_once(tmp_path, driver):
 
 
 @pytest.mark.parametrize("signals", [1, 3])
-def test_an_interrupt_while_the_source_drives_ends_it_safe_with_a_report(tmp_path, signals):
+def test_interrupt_while_driving_ends_safe_with_report(tmp_path, signals):
     box = simulated("sr785", LinearPlant(known_gain))
     with (
         served(box, driver="sr785") as url,
@@ -141,7 +141,7 @@ def test_an_interrupt_while_the_source_drives_ends_it_safe_with_a_report(tmp_pat
     assert "| levels | **holds** |" in report
 
 
-def test_what_is_typed_before_a_question_answers_nothing(monkeypatch):
+def test_input_before_question_is_discarded(monkeypatch):
     with terminal_of_this_process(monkeypatch) as (terminal, say):
         terminal.type("no\n")
         time.sleep(0.1)
@@ -159,7 +159,7 @@ def test_what_is_typed_before_a_question_answers_nothing(monkeypatch):
 
 @settings(max_examples=25, deadline=None)
 @given(st.lists(st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=12)))
-def test_only_an_answer_that_is_offered_is_taken(tries):
+def test_only_offered_answers_are_accepted(tries):
     offered = {"y": True, "yes": True, "n": False, "no": False, "not watched": None}
     strays = [one for one in tries if " ".join(one.split()).lower() not in offered]
     with pytest.MonkeyPatch.context() as patch, terminal_of_this_process(patch) as (terminal, say):
@@ -181,7 +181,7 @@ def test_only_an_answer_that_is_offered_is_taken(tries):
     ("scheme", "asks"),
     [("", "after the last point"), ("sr785", "output switch"), ("sampled", "ramp")],
 )
-def test_a_question_that_nobody_answers_does_not_keep_the_source_driving(monkeypatch, scheme, asks):
+def test_unanswered_question_switches_source_off(monkeypatch, scheme, asks):
     """The check is given up, the source made safe, and that is said."""
     (driver,) = [driver for driver in DRIVERS if driver.scheme == scheme]
     checks = [check for check in driver.first_day() if check.name == asks]
@@ -201,7 +201,7 @@ def test_a_question_that_nobody_answers_does_not_keep_the_source_driving(monkeyp
     assert box.driven_v == 0
 
 
-def test_a_pulled_cable_is_told_as_such_and_loudly(tmp_path):
+def test_pulled_cable_ends_with_clear_error(tmp_path):
     """Exit code 3; the report tells what is known of the source."""
     box = simulated("sr785", LinearPlant(known_gain))
     with ExitStack() as cable:

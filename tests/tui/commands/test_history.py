@@ -19,7 +19,7 @@ from tui.measurements.stored_answers import keep_estimate
 from tui.text.layout import columns_of
 
 
-def test_an_empty_history_and_one_that_is_not_there(run, db):
+def test_empty_and_missing_history_are_told_apart(run, db):
     assert run("history")[0] == 2
     Store(db, create=True).close()
     code, out, _ = run("history", "--json")
@@ -98,7 +98,7 @@ def test_history_shows_the_trend_with_error_bars(run, db):
     assert "differ by more than their errors" not in out
 
 
-def test_an_alarm_tells_when_a_limit_will_be_reached(run, db, tmp_path):
+def test_alarm_tells_when_limit_is_reached(run, db, tmp_path):
     for _ in range(3):
         run(*measuring("--serial", "S"))
     with Store(db) as store:
@@ -131,7 +131,7 @@ def flowed(text):
     return " ".join(text.split())
 
 
-def test_history_of_a_day_and_of_a_state(run, db, monkeypatch):
+def test_history_filters_by_day_and_state(run, db, monkeypatch):
     stopped(run, monkeypatch)
     run(*measuring())
     with closing(sqlite3.connect(db)) as raw:
@@ -156,7 +156,7 @@ def test_history_of_a_day_and_of_a_state(run, db, monkeypatch):
     assert "--since yesterday: give a day such as 2026-11-01" in err
 
 
-def test_values_that_do_not_agree_are_not_passed_off_as_one(run, db):
+def test_disagreeing_values_are_not_combined_silently(run, db):
     for _ in range(2):
         run(*measuring("--serial", "S"))
     with Store(db) as store:
@@ -173,7 +173,7 @@ LONG = "Seeker gimbal of the second prototype, batch 2026-11, reworked"
 
 
 @pytest.mark.parametrize("serial", ["SN 7", "2026-11-" + 60 * "0" + "17 B", "歯車装置 七号機"])
-def test_every_line_fits_a_terminal_and_nothing_is_lost(run, db, tmp_path, serial):
+def test_lines_fit_terminal_without_loss(run, db, tmp_path, serial):
     own = tmp_path / "own.toml"
     text = config_path("units", "adss").read_text(encoding="utf-8")
     own.write_text(re.sub("(?m)^name = .*", f'name = "{LONG}"', text), encoding="utf-8")
@@ -197,7 +197,7 @@ def test_every_line_fits_a_terminal_and_nothing_is_lost(run, db, tmp_path, seria
         assert said in out
 
 
-def test_long_numbers_leave_less_room_for_the_bar(run, db):
+def test_long_numbers_shorten_the_bar(run, db):
     run(*measuring())
     long, ratio = {"value": 123.4, "std": 123.4}, {"value": 0.5, "std": 0.1, "interval95": [0, 1]}
     with Store(db) as store:
@@ -250,7 +250,7 @@ def test_missing_estimates_are_made_once_and_kept(run, db):
     assert len(calls) == 3
 
 
-def test_an_estimate_of_points_that_were_measured_again_does_not_count(run, db):
+def test_remeasured_points_invalidate_the_estimate(run, db):
     compute = Computations(estimate_response=lambda *_, **__: Result())
     run(*measuring())
     with Store(db) as store:
@@ -262,7 +262,7 @@ def test_an_estimate_of_points_that_were_measured_again_does_not_count(run, db):
 
 
 @pytest.mark.parametrize("failed", [False, True])
-def test_what_was_said_of_half_a_measurement_is_not_said_of_all_of_it(run, db, monkeypatch, failed):
+def test_resumed_measurement_invalidates_its_earlier_estimate(run, db, monkeypatch, failed):
     compute = Computations(estimate_response=lambda *_, **__: Result())
     stopped(run, monkeypatch)
     with Store(db) as store:
@@ -275,7 +275,7 @@ def test_what_was_said_of_half_a_measurement_is_not_said_of_all_of_it(run, db, m
     assert ratios(run, compute=compute) == [0.3]
 
 
-def test_an_estimate_is_not_kept_of_points_that_were_replaced_while_it_was_made(run, db):
+def test_points_replaced_during_estimate_discard_it(run, db):
     run(*measuring())
     with Store(db, read_only=True) as store:
         before = store.measurement(1)
@@ -288,7 +288,7 @@ def test_an_estimate_is_not_kept_of_points_that_were_replaced_while_it_was_made(
     assert ratios(run, "--estimate", "none") == [0.3]
 
 
-def test_a_lost_cluster_says_nothing_of_a_measurement(run, db):
+def test_lost_cluster_stores_no_failed_estimate(run, db):
     def lost(*_, **__):
         raise LinkError("the Dask scheduler was lost")
 

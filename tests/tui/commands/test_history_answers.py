@@ -44,7 +44,7 @@ def told(run, *words):
     return json.loads(out)
 
 
-def test_a_refuted_model_gives_no_number_and_no_trend(run, db):
+def test_refuted_model_gives_no_number_or_trend(run, db):
     for _ in range(3):
         run(*measuring("--serial", "S"))
     for number, document in ((1, ESTIMATE), (2, REFUTED), (3, ESTIMATE)):
@@ -95,7 +95,7 @@ def test_a_diagnosis_decides_whose_numbers_are_told(run, db, diagnosis, state, r
     assert ("load-inertia (0.55)" in out) == bool(diagnosis["causes"])
 
 
-def test_a_number_of_one_model_of_several_says_what_is_still_open(run, db):
+def test_several_models_left_widen_the_interval(run, db):
     """Two models left at 0.55 and 0.41: the trend knows the ratio as badly as both together."""
     first, second = DIAGNOSIS["models"]
     for serial in ("S", "S"):
@@ -135,7 +135,8 @@ def test_a_ratio_that_cannot_be_is_refused(run, db, value):
     assert "cannot be read" in err
 
 
-def test_what_was_told_before_points_were_measured_again_is_not_told_whatever_the_clock(run, db):
+def test_remeasured_points_invalidate_answers_despite_clock(run, db):
+    """The date of the answer does not count, not even one in the future."""
     run(*measuring("--serial", "S"))
     estimated(db, 1, ESTIMATE)
     diagnosed(db, 1, EXPLAINED)
@@ -152,7 +153,7 @@ def test_what_was_told_before_points_were_measured_again_is_not_told_whatever_th
         assert kept_diagnosis(store, 1, load_unit("adss")) is None
 
 
-def test_a_diagnosis_counts_for_the_unit_and_the_software_that_made_it(run, db, tmp_path):
+def test_diagnosis_counts_for_its_unit_and_software(run, db, tmp_path):
     run(*measuring())
     diagnosed(db, 1, EXPLAINED)
     adss = load_unit("adss")
@@ -172,7 +173,7 @@ def test_a_diagnosis_counts_for_the_unit_and_the_software_that_made_it(run, db, 
     assert told(run)["measurements"][0]["diagnosis"]["software"] == "lashbench 0.0.1"
 
 
-def test_a_diagnosis_with_other_numbers_of_the_unit_is_not_that_of_the_measurement(run, db):
+def test_diagnosis_with_other_unit_values_is_ignored(run, db):
     run(*measuring())
     diagnosed(db, 1, EXPLAINED, "edss")
     assert told(run)["measurements"][0]["diagnosis"] is None
@@ -180,7 +181,7 @@ def test_a_diagnosis_with_other_numbers_of_the_unit_is_not_that_of_the_measureme
         assert kept_diagnosis(store, 1, load_unit("edss")) is not None
 
 
-def test_an_estimate_of_an_earlier_edition_is_told_as_one(run, db):
+def test_estimate_of_earlier_edition_is_marked(run, db):
     run(*measuring())
     with Store(db) as store:
         store.add_estimate(1, "lashbench 0.0.1", ESTIMATE)
@@ -193,7 +194,7 @@ def test_an_estimate_of_an_earlier_edition_is_told_as_one(run, db):
         assert store.lacking(edition="2") == [1]
 
 
-def test_the_newest_are_listed_and_the_trend_is_of_all(run, db):
+def test_list_shows_newest_and_trend_uses_all(run, db):
     for number in (1, 2, 3):
         run(*measuring("--serial", "S"))
         estimated(db, number, ESTIMATE)
@@ -209,7 +210,7 @@ def test_the_newest_are_listed_and_the_trend_is_of_all(run, db):
     assert run("history", "--last", "0")[0] == 2
 
 
-def test_a_report_takes_the_diagnosis_of_the_history_and_says_so(run, db, tmp_path):
+def test_report_states_use_of_stored_diagnosis(run, db, tmp_path):
     run(*measuring())
     estimated(db, 1, ESTIMATE)
     diagnosed(db, 1, EXPLAINED)

@@ -16,7 +16,7 @@ SWEEP += ["--settle-cycles", "3", "--integrate-cycles", "4"]
 
 
 @pytest.mark.parametrize("stages", [1, 2])
-def test_what_it_writes_is_a_unit_with_every_number_explained(stages, tmp_path, capsys):
+def test_written_unit_explains_every_number(stages, tmp_path, capsys):
     path = tmp_path / "my drive.toml"
     words = ["new-unit", "--out", str(path), "--stages", str(stages), "--name", 'A "1" \\ ü']
     assert cli.main(words) == 0
@@ -31,7 +31,7 @@ def test_what_it_writes_is_a_unit_with_every_number_explained(stages, tmp_path, 
 
 
 @pytest.mark.parametrize("stages", [1, 2])
-def test_the_limits_it_proposes_are_allowed_where_they_stand(stages):
+def test_proposed_limits_are_allowed_as_written(stages):
     name = {1: "one-stage", 2: "two-stage"}[stages]
     text = config_path("templates", name).read_text(encoding="utf-8")
     limits = tomllib.loads(re.sub(r"(?m)^# (b[12]_deg)", r"\1", text))["limits"]
@@ -39,7 +39,7 @@ def test_the_limits_it_proposes_are_allowed_where_they_stand(stages):
 
 
 @pytest.mark.parametrize(("stages", "ratio"), [(1, "1"), (2, "0.4")])
-def test_a_drive_of_ones_own_needs_no_code(stages, ratio, tmp_path, monkeypatch, capsys):
+def test_own_drive_needs_no_code(stages, ratio, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert cli.main(["new-unit", "--out", "mine.toml", "--stages", str(stages)]) == 0
     text = (tmp_path / "mine.toml").read_text(encoding="utf-8")
@@ -78,7 +78,7 @@ def test_the_commands_in_the_file_run(tmp_path, monkeypatch):
         (["--out", "x.toml", "--name", "n" * 65], "1 to 64"),
     ],
 )
-def test_what_it_refuses_leaves_everything_as_it_was(words, said, tmp_path, monkeypatch, capsys):
+def test_refused_unit_changes_no_file(words, said, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "there.toml").write_text("mine")
     assert cli.main(["new-unit", *words]) == 2

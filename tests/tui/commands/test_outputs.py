@@ -102,7 +102,7 @@ def test_no_verb_writes_over_what_it_reads(verb, way, tmp_path, capsys):
     assert path.read_bytes() == before
 
 
-def test_a_diagnosis_that_is_interrupted_leaves_no_empty_folder(tmp_path):
+def test_interrupted_diagnosis_leaves_no_empty_folder(tmp_path):
     response = a_response(tmp_path / "r.csv")
     plots = tmp_path / "some" / "plots"
     words = ["diagnose", str(response), "--unit", "adss", "--as-is", "--plots", str(plots)]
@@ -130,7 +130,7 @@ def test_a_folder_of_somebody_else_stays(tmp_path):
     assert {one.name for one in tmp_path.rglob("*")} == {"mine", "r.csv"}
 
 
-def test_a_response_in_which_nothing_is_found_is_told(tmp_path, capsys):
+def test_response_without_features_is_reported(tmp_path, capsys):
     path = tmp_path / "one.csv"
     path.write_text(
         '# unit = "X"\nfrequency_hz,source_vpk,gain_db,phase_deg,gain_std_db\n100,2.5,-10,,0.1\n'

@@ -65,7 +65,8 @@ def test_files_and_identifiers_in_one_picture(run, db, short, tmp_path, suffix, 
         assert out.read_bytes() == first
 
 
-def test_a_model_beside_a_file_and_the_answer_beside_an_identifier(run, db, short, tmp_path):
+def test_model_or_stored_answer_is_drawn_beside(run, db, short, tmp_path):
+    """A model is drawn beside a file, the stored answer beside an identifier."""
     bare, beside = tmp_path / "bare.svg", tmp_path / "beside.svg"
     assert run("plot", short, "--out", bare, history=False)[0] == 0
     words = ["--model", "--unit", "adss", "--ratio", "0.3"]

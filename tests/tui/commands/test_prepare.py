@@ -28,7 +28,7 @@ def cache(tmp_path, monkeypatch):
     return tmp_path / "cache" / "lashbench"
 
 
-def test_a_sweep_that_was_prepared_is_estimated_without_simulating(run, cache, tmp_path):
+def test_prepared_sweep_is_estimated_without_simulation(run, cache, tmp_path):
     words = ["--unit", "adss", *SHORT, *QUICK, "--offset", "0.5", "--json"]
     code, out, _ = run("prepare", *words, history=False)
     assert code == 0
@@ -93,7 +93,7 @@ def test_one_that_was_interrupted_goes_on(tmp_path):
         (["--unit", "adss", "--recipe", "nosuch"], "nosuch"),
     ],
 )
-def test_what_is_no_sweep_is_refused_in_one_line(words, said, capsys, cache, tmp_path, monkeypatch):
+def test_invalid_sweep_is_refused_in_one_line(words, said, capsys, cache, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["prepare", *words]) == 2
     (line,) = capsys.readouterr().err.strip().splitlines()
@@ -101,7 +101,7 @@ def test_what_is_no_sweep_is_refused_in_one_line(words, said, capsys, cache, tmp
     assert not cache.exists()
 
 
-def test_a_cache_that_cannot_be_written_is_refused_before_anything_is_simulated(capsys, cache):
+def test_unwritable_cache_is_refused_before_simulation(capsys, cache):
     cache.parent.write_text("no folder")
     with counting() as effort:
         assert main(["prepare", "--unit", "adss", *SHORT]) == 2
@@ -116,7 +116,7 @@ ONE_STAGE = ["prepare", "--unit", str(config_path("templates", "one-stage")), "-
              "--integrate-cycles", "2", "--json"]  # fmt: skip
 
 
-def test_what_a_full_disk_did_not_keep_is_told(small_disk, monkeypatch, capsys):
+def test_runs_lost_to_full_disk_are_reported(small_disk, monkeypatch, capsys):
     monkeypatch.setenv("XDG_CACHE_HOME", str(small_disk))
     assert main(ONE_STAGE) == 0
     out, err = capsys.readouterr()
@@ -134,7 +134,7 @@ def test_what_a_full_disk_did_not_keep_is_told(small_disk, monkeypatch, capsys):
     assert err.count("\n") == 1
 
 
-def test_on_a_disk_without_room_nothing_is_simulated(small_disk, monkeypatch, capsys):
+def test_full_disk_is_refused_before_simulation(small_disk, monkeypatch, capsys):
     monkeypatch.setenv("XDG_CACHE_HOME", str(small_disk))
     (small_disk / "filler").write_bytes(bytes(60 << 10))
     assert main(ONE_STAGE) == 1
@@ -144,7 +144,7 @@ def test_on_a_disk_without_room_nothing_is_simulated(small_disk, monkeypatch, ca
     assert err.count("\n") == 1
 
 
-def test_the_posterior_of_a_unit_is_trained_for_every_sweep(run, cache):
+def test_posterior_is_trained_for_every_sweep(run, cache):
     """Of one with fewer stages and effects; a second call finds it and trains no further."""
     pytest.importorskip("jax", reason="training needs the extra `train`")
     unit = config_path("templates", "one-stage")

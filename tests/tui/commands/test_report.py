@@ -89,7 +89,7 @@ def test_a_report_on_a_file(calls, tmp_path, capsys):
     assert calls["diagnose"] == []
 
 
-def test_a_diagnosis_that_cannot_be_made_is_no_reason_for_no_report(calls, tmp_path, capsys):
+def test_report_is_written_without_possible_diagnosis(calls, tmp_path, capsys):
     out = tmp_path / "r.html"
     assert cli.main(["report", SAMPLE, "--unit", "adss", "--out", str(out)], calls.compute) == 0
     assert len(calls["diagnose"]) == 1
@@ -109,7 +109,7 @@ def test_a_diagnosis_stands_in_the_report(found, calls, tmp_path):
     assert data_of(out)["diagnosis"]["verdict"] == "explained"
 
 
-def test_the_command_on_a_report_finds_a_unit_by_its_path(found, calls, tmp_path, capsys):
+def test_printed_command_names_unit_by_its_path(found, calls, tmp_path, capsys):
     plan = SweepPlan((100.0, 120.0), (1.0,), settle_cycles=3, integrate_cycles=4)
     # The name of the unit is that of one that comes with lashbench, and would pass for it.
     proposal = NextMeasurement("ADSS", plan, ("a", "b"), 3.0)
@@ -145,13 +145,13 @@ def test_a_report_on_a_stored_measurement(calls, bench, tmp_path):
         assert len(data["response"]["frequency_hz"]) == len(store.response(1))
 
 
-def test_another_unit_than_was_measured_is_told_at_once(calls, bench, tmp_path, capsys):
+def test_other_unit_than_measured_is_reported_first(calls, bench, tmp_path, capsys):
     words = ["report", "1", "--db", str(bench), "--unit", "edss", "--no-diagnose"]
     assert cli.main([*words, "--out", str(tmp_path / "r.html")], calls.compute) == 0
     assert "warning: the response is of unit ADSS, not of EDSS" in capsys.readouterr().err
 
 
-def test_the_history_is_the_users_own_if_none_is_named(calls, bench, tmp_path, monkeypatch):
+def test_default_history_is_the_users_own(calls, bench, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     (tmp_path / "lashbench").mkdir()
     (tmp_path / "lashbench" / "lashbench.db").write_bytes(bench.read_bytes())
@@ -165,7 +165,7 @@ def test_the_history_is_the_users_own_if_none_is_named(calls, bench, tmp_path, m
     assert data_of(out)["origin"]["name"] == "measurement 1 of lashbench.db"
 
 
-def test_an_estimate_of_the_history_is_taken_while_it_holds(calls, bench, tmp_path):
+def test_stored_estimate_is_used_while_valid(calls, bench, tmp_path):
     db, out = tmp_path / "copy.db", tmp_path / "r.html"
     db.write_bytes(bench.read_bytes())
     adss, edss = load_unit("adss"), load_unit("edss")
@@ -200,7 +200,7 @@ def test_an_estimate_of_the_history_is_taken_while_it_holds(calls, bench, tmp_pa
         (["9" * 30, "--out", "r.html", "--db", "BENCH"], "cannot read files"),
     ],
 )
-def test_what_cannot_be_reported_on_ends_with_2_and_no_file(
+def test_unreportable_input_exits_2_without_file(
     calls, bench, tmp_path, monkeypatch, capsys, words, said
 ):
     monkeypatch.chdir(tmp_path)
@@ -222,7 +222,7 @@ def test_the_bench_screen_writes_the_same_report(found, bench, tmp_path):
     assert data_of(tmp_path / "r.html")["diagnosis"] is None
 
 
-def test_digits_that_are_a_file_here_are_that_file(calls, tmp_path, monkeypatch, capsys):
+def test_existing_file_named_by_digits_is_read(calls, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "5").write_text("x")
     assert cli.main(["report", "5", "--unit", "adss", "--out", "r.html"], calls.compute) == 2

@@ -15,7 +15,7 @@ IDENTITY = "HEWLETT-PACKARD,35670A,LASHSIM001,A.01.11"
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_the_verb_prints_one_ready_line_and_ends_on_a_signal(number):
+def test_serve_prints_ready_and_ends_on_signal(number):
     process = subprocess.Popen(
         [sys.executable, "-m", "tui.cli", "serve", "--unit", "adss", "--ratio", "0.25",
          "--tcp", "0", "--prologix-tcp", "0", "--prologix-pty", "--speed", "fast",
@@ -44,14 +44,14 @@ def test_the_verb_prints_one_ready_line_and_ends_on_a_signal(number):
         process.wait()
 
 
-def test_an_instrument_without_rs232_is_not_served_on_it(capsys):
+def test_instrument_without_rs232_is_refused_on_it(capsys):
     from tui.cli import main
 
     assert main(["serve", "--unit", "adss", "--ratio", "0.25", "--serial-pty"]) == 2
     assert "model 35670A cannot be measured with over RS-232" in capsys.readouterr().err
 
 
-def test_an_sr785_is_served_beside_its_own_serial_port():
+def test_sr785_is_served_on_its_serial_port():
     process = subprocess.Popen(
         [sys.executable, "-m", "tui.cli", "serve", "--model", "SR785", "--unit", "adss",
          "--ratio", "0.25", "--tcp", "0", "--serial-pty", "--speed", "fast"],

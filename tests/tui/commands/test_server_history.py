@@ -41,7 +41,8 @@ def measured(verb, *more):
     return json.loads(out)["id"]
 
 
-def test_one_bench_measures_and_others_read_correct_and_export(verb, postgres, tmp_path):
+def test_one_bench_measures_while_others_work(verb, postgres, tmp_path):
+    """Others read, correct and export the history meanwhile."""
     number = measured(verb, "--serial", "7")
     code, out, _ = verb("history", "--unit", "ADSS", "--estimate", "none", "--json")
     (row,) = json.loads(out)["measurements"]
@@ -56,7 +57,7 @@ def test_one_bench_measures_and_others_read_correct_and_export(verb, postgres, t
     assert SHOWN not in file.read_text() + page.read_text()
 
 
-def test_what_is_wrong_with_the_server_is_one_line_and_its_exit_code(verb, postgres):
+def test_server_faults_give_one_line_and_code(verb, postgres):
     for db, code, said in (
         (postgres.url("bench"), 2, "no history in that database"),
         (postgres.url("bench", password="guess4"), 2, "password authentication failed"),
@@ -71,7 +72,7 @@ def test_what_is_wrong_with_the_server_is_one_line_and_its_exit_code(verb, postg
         assert "guess4" not in err
 
 
-def test_a_session_that_loses_the_server_ends_with_the_source_off(verb, postgres):
+def test_lost_server_ends_session_with_source_off(verb, postgres):
     with serving("--unit", "adss", "--ratio", "0.3", "--tcp", "0", "--speed", "fast") as places:
         words = [*LASHBENCH, "measure", "--unit", "adss", "--instrument", places["tcp"], "--yes",
                  "--level", "2", "--start", "100", "--stop", "200", "--points", "400",
@@ -96,7 +97,7 @@ def test_a_session_that_loses_the_server_ends_with_the_source_off(verb, postgres
         assert found >= 3
 
 
-def test_the_watchdog_of_a_killed_session_writes_to_the_server(postgres, postgres_url):
+def test_watchdog_of_killed_session_writes_to_server(postgres, postgres_url):
     with serving("--unit", "adss", "--ratio", "0.3", "--tcp", "0", "--speed", "fast") as places:
         words = [*LASHBENCH, "measure", "--unit", "adss", "--instrument", places["tcp"], "--yes",
                  "--level", "2", "--start", "100", "--stop", "200", "--points", "400",

@@ -24,7 +24,7 @@ def simulated(path, extra="--level 2.5"):
     return read_response(path)
 
 
-def test_the_file_holds_the_sweep_that_was_asked_for(tmp_path, capsys):
+def test_file_holds_the_requested_sweep(tmp_path, capsys):
     response = simulated(
         tmp_path / "r.csv", "--level 2.5 --level 1.5 --direction down --spacing log --from-rest"
     )
@@ -64,13 +64,13 @@ def test_each_option_changes_the_response(tmp_path, extra):
     assert np.abs(other.gain - plain.gain).max() > 1e-6
 
 
-def test_a_parameter_and_its_effect_mean_the_same(tmp_path):
+def test_parameter_and_its_effect_are_equivalent(tmp_path):
     by_set = simulated(tmp_path / "set.csv", "--level 2.5 --set k_ts=0.08")
     by_effect = simulated(tmp_path / "effect.csv", "--level 2.5 --effect tachometer-gain:k_ts=0.08")
     np.testing.assert_allclose(by_set.gain, by_effect.gain, rtol=1e-9)
 
 
-def test_a_unit_of_ones_own_is_taken_by_path(tmp_path):
+def test_own_unit_is_read_by_path(tmp_path):
     from daq.configs import config_path
 
     own = tmp_path / "own.toml"
@@ -115,7 +115,7 @@ BAD = [
 
 
 @pytest.mark.parametrize("extra", BAD)
-def test_a_bad_value_is_refused_and_nothing_is_written(tmp_path, capsys, extra):
+def test_bad_value_is_refused_and_nothing_written(tmp_path, capsys, extra):
     assert main([*sweep_with(extra), "--out", str(tmp_path / "r.csv")]) == 2
     out, err = capsys.readouterr()
     assert out == ""
@@ -125,13 +125,13 @@ def test_a_bad_value_is_refused_and_nothing_is_written(tmp_path, capsys, extra):
 
 
 @pytest.mark.parametrize("name", ["", "r.txt", "folder.csv", "gone/r.csv"])
-def test_a_place_that_cannot_be_written_is_refused_before_the_work(tmp_path, capsys, name):
+def test_unwritable_place_is_refused_before_simulation(tmp_path, capsys, name):
     (tmp_path / "folder.csv").mkdir()
     assert main([*SWEEP.split(), "--level", "1", "--out", f"{tmp_path}/{name}"]) == 2
     assert "simulating" not in capsys.readouterr().err
 
 
-def test_a_dc_offset_acts_and_is_written_down(tmp_path):
+def test_dc_offset_acts_and_is_recorded(tmp_path):
     plain = simulated(tmp_path / "plain.csv")
     leaning = simulated(tmp_path / "leaning.csv", "--level 2.5 --offset 1.5")
     assert (plain.dc_offset_v, leaning.dc_offset_v) == (0.0, 1.5)

@@ -107,7 +107,7 @@ FUZZ = settings(
 
 @FUZZ
 @given(data=st.data())
-def test_any_value_in_any_column_is_read_or_refused_in_one_line(whole, tmp_path, capsys, data):
+def test_any_column_value_is_read_or_refused(whole, tmp_path, capsys, data):
     path = tmp_path / "bench.db"
     fresh(path, whole)
     table = data.draw(st.sampled_from(TABLES))
@@ -140,7 +140,7 @@ def with_other(document, place, value):
 
 @FUZZ
 @given(data=st.data())
-def test_any_document_is_read_or_refused_in_one_line(whole, tmp_path, capsys, data):
+def test_any_document_is_read_or_refused(whole, tmp_path, capsys, data):
     path = tmp_path / "bench.db"
     fresh(path, whole)
     table, column = data.draw(st.sampled_from(DOCUMENTS))
@@ -172,7 +172,8 @@ LAYOUTS = [
 
 
 @pytest.mark.parametrize("statement", LAYOUTS)
-def test_any_other_layout_is_refused_before_anything_in_it_runs(whole, tmp_path, capsys, statement):
+def test_any_other_layout_is_refused_unexecuted(whole, tmp_path, capsys, statement):
+    """Nothing that the file holds is executed."""
     path = tmp_path / "bench.db"
     path.write_bytes(whole)
     with closing(sqlite3.connect(path)) as raw:
@@ -186,7 +187,7 @@ def test_any_other_layout_is_refused_before_anything_in_it_runs(whole, tmp_path,
     assert path.read_bytes() == before
 
 
-def test_a_virtual_table_in_the_place_of_ours_is_refused(whole, tmp_path, capsys):
+def test_virtual_table_instead_of_table_is_refused(whole, tmp_path, capsys):
     path = tmp_path / "bench.db"
     path.write_bytes(whole)
     with closing(sqlite3.connect(path)) as raw:
@@ -247,7 +248,7 @@ def test_absurd_sizes_cost_bounded_memory(whole, tmp_path, statement):
         "UPDATE plans SET levels = '{}'",
     ],
 )
-def test_the_screen_says_that_the_history_cannot_be_read(whole, tmp_path, statement):
+def test_screen_reports_unreadable_history(whole, tmp_path, statement):
     path = tmp_path / "bench.db"
     path.write_bytes(whole)
     altered(path, statement)

@@ -78,7 +78,7 @@ def test_every_answer_says_what_was_believed(estimate, silent, capsys):
         ["prepare", "--level", "1", "--start", "100", "--stop", "120", "--points", "3"],
     ],
 )
-def test_what_is_no_tolerance_is_refused_by_every_verb_before_any_work(verb, words, said, capsys):
+def test_invalid_tolerance_is_refused_by_every_verb(verb, words, said, capsys):
     assert main([*verb, "--unit", "adss", *words]) == 2
     error = capsys.readouterr().err
     assert said in error
