@@ -58,7 +58,7 @@ def test_the_front_page_loads_no_parser(words):
     assert max(map(len, run.stdout.splitlines())) <= 80
 
 
-def test_a_front_page_that_stdout_does_not_take_is_an_error():
+def test_help_to_full_stdout_is_an_error():
     script = Path(sys.executable).with_name("lashbench")
     with open("/dev/full", "w") as full:
         run = subprocess.run([script, "--help"], stdout=full, stderr=subprocess.PIPE, text=True,
@@ -68,7 +68,7 @@ def test_a_front_page_that_stdout_does_not_take_is_an_error():
 
 
 @pytest.mark.parametrize("verb", cli.VERBS)
-def test_every_verb_explains_itself_and_all_its_options(verb, capsys):
+def test_every_verb_explains_all_its_options(verb, capsys):
     assert cli.main([verb, "--help"]) == 0
     text = capsys.readouterr().out
     assert cli.VERBS[verb][1] in text
@@ -117,7 +117,7 @@ def broken_verb(monkeypatch):
         (ZeroDivisionError("division\nby zero"), 1),
     ],
 )
-def test_an_error_is_one_line_and_its_exit_code(broken_verb, capsys, error, code):
+def test_error_is_one_line_with_exit_code(broken_verb, capsys, error, code):
     broken_verb(error)
     assert cli.main(["broken", "--quiet"]) == code
     out, err = capsys.readouterr()
@@ -144,13 +144,13 @@ def wrapped(error):
     ("root", "said", "code"),
     [(KeyboardInterrupt(), "interrupted", 130), (ValueError("x"), "internal error: SystemErr", 1)],
 )
-def test_an_interrupt_that_meets_compiled_code_is_one(broken_verb, capsys, root, said, code):
+def test_interrupt_in_compiled_code_is_interrupt(broken_verb, capsys, root, said, code):
     broken_verb(wrapped(root))
     assert cli.main(["broken", "--quiet"]) == code
     assert capsys.readouterr().err.startswith(f"error: {said}")
 
 
-def test_what_goes_wrong_on_the_way_out_of_an_interrupt_is_told(broken_verb, capsys):
+def test_error_while_handling_interrupt_is_reported(broken_verb, capsys):
     error = errors.LinkError("the source may be on")
     error.__context__ = KeyboardInterrupt()
     broken_verb(error)
@@ -178,7 +178,7 @@ def test_what_goes_wrong_on_the_way_out_of_an_interrupt_is_told(broken_verb, cap
         "reproduce --json=maybe",
     ],
 )
-def test_a_usage_error_is_one_line_and_exit_2(line, capsys):
+def test_usage_error_is_one_line_exit_2(line, capsys):
     assert cli.main(line.split()) == 2
     out, err = capsys.readouterr()
     assert out == ""
@@ -213,7 +213,7 @@ def talking(body):
     return [sys.executable, "-c", program]
 
 
-def test_a_reader_that_has_seen_enough_is_no_error():
+def test_closed_stdout_is_no_error():
     with subprocess.Popen(
         talking('console.data("x" * 10**6)'), stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as run:
@@ -225,7 +225,7 @@ def test_a_reader_that_has_seen_enough_is_no_error():
 NARRATION = '[console.note("n" * 100) for _ in range(5000)]; console.data("the answer")'
 
 
-def test_nobody_listening_to_the_narration_does_not_stop_the_work():
+def test_closed_stderr_does_not_stop_the_work():
     with subprocess.Popen(
         talking(NARRATION), stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as run:
@@ -246,7 +246,7 @@ def test_a_full_disk_is_said_in_words():
     )
 
 
-def test_json_has_null_for_what_is_no_number():
+def test_json_has_null_for_not_a_number():
     np = pytest.importorskip("numpy")
     content = {
         "a": float("nan"),
@@ -273,7 +273,7 @@ def test_a_terminal_without_the_character_shows_another():
     assert run.stdout == b"1 ? 2\n"
 
 
-def test_nothing_that_is_read_somewhere_reaches_a_terminal_as_an_order(capsys):
+def test_foreign_text_sends_no_terminal_sequences(capsys):
     console = output.Console()
     console.note("unit \x1b[31mred\x00, serial a\tb")
     console.error("no \x1b]0;title\x07 here")
@@ -284,7 +284,7 @@ def test_nothing_that_is_read_somewhere_reaches_a_terminal_as_an_order(capsys):
 
 
 @pytest.mark.parametrize("verb", ["export", "replay", "measure --unit adss --resume"])
-def test_an_identifier_that_no_history_can_hold_is_a_usage_error(verb, tmp_path, capsys):
+def test_impossible_identifier_is_a_usage_error(verb, tmp_path, capsys):
     db = tmp_path / "m.db"
     place = "replay {db} --id {id}" if verb == "replay" else f"{verb} {{id}} --db {{db}}"
     words = place.format(db=db, id="9" * 20).split()

@@ -39,13 +39,13 @@ def test_bash_completes_verbs_options_and_choices(script):
 
 
 @pytest.mark.parametrize(("shell", "mark"), [("zsh", "#compdef lashbench"), ("fish", "complete")])
-def test_other_shells_have_a_script_with_every_verb(shell, mark, capsys):
+def test_other_shells_complete_every_verb(shell, mark, capsys):
     assert main(["completion", shell]) == 0
     text = capsys.readouterr().out
     assert mark in text
     assert all(verb in text for verb in VERBS)
 
 
-def test_a_shell_that_is_not_known_is_a_usage_error(capsys):
+def test_unknown_shell_is_a_usage_error(capsys):
     assert main(["completion", "tcsh"]) == 2
     assert "tcsh" in capsys.readouterr().err

@@ -19,7 +19,7 @@ ROOT = Path(entry.__file__).parents[1]
     [("tui.verbs", "--version"), ("tui.cli", "doctor"), ("cyclopts", "doctor"),
      ("tui.text.output", "doctor")],
 )  # fmt: skip
-def test_an_interrupt_while_the_command_line_is_loaded_is_told_in_one_line(module, word):
+def test_interrupt_while_loading_is_one_line(module, word):
     program = f"""
 import sys
 
@@ -83,7 +83,7 @@ def test_nothing_in_the_working_directory_is_run(tmp_path, command, added):
     assert not (tmp_path / "ran").exists()
 
 
-def test_what_pythonpath_adds_stands_in_for_nothing_that_is_installed(tmp_path):
+def test_pythonpath_replaces_no_installed_module(tmp_path):
     beside(tmp_path, *NAMES)
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
     run = subprocess.run(
@@ -94,7 +94,8 @@ def test_what_pythonpath_adds_stands_in_for_nothing_that_is_installed(tmp_path):
     assert not (tmp_path / "ran").exists()
 
 
-def test_what_python_loaded_from_the_working_directory_before_is_told(tmp_path):
+def test_modules_from_working_directory_are_reported(tmp_path):
+    """Modules that Python loads before the program."""
     (tmp_path / "usercustomize.py").write_text("")
     (tmp_path / "sitecustomize.py").write_text("")
     run = subprocess.run(
@@ -108,7 +109,7 @@ def test_what_python_loaded_from_the_working_directory_before_is_told(tmp_path):
 
 @pytest.mark.parametrize("name", ["daq", "sim", "analysis"])
 @pytest.mark.parametrize("way", ["before", "over"])
-def test_a_package_of_another_distribution_is_told_in_one_line(tmp_path, name, way):
+def test_package_of_another_distribution_is_reported(tmp_path, name, way):
     """It lies where it is found first, or its files were written over ours."""
     root, other = tmp_path / "ours", tmp_path / "other"
     for package in ("daq", "sim", "analysis", "tui"):
@@ -126,7 +127,7 @@ def test_a_package_of_another_distribution_is_told_in_one_line(tmp_path, name, w
     assert f"another distribution owns the package '{name}' ({foreign}" in run.stderr
 
 
-def test_an_interrupt_that_meets_code_made_of_text_ends_with_its_exit_code(tmp_path):
+def test_interrupt_in_generated_code_keeps_exit_code(tmp_path):
     """Methods of dataclasses are such; Python would end by the signal though it was caught."""
     shutil.copy(config_path("units", "adss"), tmp_path / "unit.toml")
     with (tmp_path / "unit.toml").open("a") as file:

@@ -92,7 +92,7 @@ def test_what_was_meant_to_go_wrong_did(outcomes):
     assert by_kind["loopback", "hardware-error", None] == 1
 
 
-def test_a_level_that_another_program_set_ends_it_before_a_point_is_stored(tmp_path, monkeypatch):
+def test_foreign_level_ends_session_before_storing_point(tmp_path, monkeypatch):
     instrument, _ = instrument_of(None)
     connected = HP35670A(Loopback(instrument))
     monkeypatch.setattr("tui.bench.connect", lambda *_: connected)
@@ -120,7 +120,7 @@ def test_a_level_that_another_program_set_ends_it_before_a_point_is_stored(tmp_p
         assert point.gain == pytest.approx(true_gain(point.frequency_hz, 1.0), rel=1e-6)
 
 
-def test_the_judge_sees_a_source_that_drives_and_is_called_off(tmp_path):
+def test_judge_sees_driving_source_called_off(tmp_path):
     run = Run(None, case(1, "", "tcp", None, "sigint"), tmp_path)
     run.instrument.source.offset_v = 1.0
     verdict = {"code": 0, "said": "", "source": "confirmed-off", "driving": None, "struck": False}
@@ -128,7 +128,7 @@ def test_the_judge_sees_a_source_that_drives_and_is_called_off(tmp_path):
     assert "the source was called off and drives" in run.outcome.wrongs
 
 
-def test_the_judge_sees_points_that_are_lost_changed_or_wrong(tmp_path):
+def test_judge_sees_lost_changed_or_wrong_points(tmp_path):
     run = Run(None, case(1, "", "loopback", None, None), tmp_path)
     right = SweepPoint(150.0, true_gain(150.0, 1.0))
     spoilt = SweepPoint(160.0, 9.0 + 0j, flags=PointFlag.SPOILT)
@@ -149,7 +149,7 @@ def test_the_judge_sees_points_that_are_lost_changed_or_wrong(tmp_path):
     assert "150 Hz and 2 V peak is wrong by a factor of" in third
 
 
-def test_the_judge_counts_no_waiting_for_a_processor_but_every_other():
+def test_judge_excludes_only_waiting_for_processor():
     accounts = iter([2.0, 5.0, 0.0])  # the last: the program has ended
     program = SimpleNamespace(starved_s=lambda: next(accounts))
     watch = Stopwatch(program, SimpleNamespace(starved_s=lambda: 1.0))
@@ -158,7 +158,7 @@ def test_the_judge_counts_no_waiting_for_a_processor_but_every_other():
     assert watch.starved_s == 3.0
 
 
-def test_eight_hundred_runs_go_through_everything_and_are_the_same_again():
+def test_campaign_draws_every_fault_reproducibly():
     cases = list(draw_cases(800, 3))
     assert cases == list(draw_cases(800, 3)) != list(draw_cases(800, 4))
     struck = {(c.driver, c.wire, c.fault_name, c.disturbance) for c in cases}

@@ -46,13 +46,13 @@ def test_the_page_says_what_happens(outcomes):
 
 
 @pytest.mark.slow
-def test_the_page_says_what_happens_to_an_sr785(tmp_path):
+def test_page_lists_outcomes_of_an_sr785(tmp_path):
     made = provoke_all(tmp_path, {name: ordered(name) for name in OWN}, "sr785")
     assert rows(made, "sr785") == written_rows("sr785")
     assert {outcome.source for outcome in made.values()} == {"confirmed-off"}
 
 
-def test_every_end_is_one_of_those_that_are_documented(outcomes):
+def test_every_outcome_is_a_documented_one(outcomes):
     for (name, wire), outcome in outcomes.items():
         assert outcome.code in (0, 1, 3, 4), (name, wire)
         assert (outcome.code == 0) == (outcome.state == "complete"), (name, wire)

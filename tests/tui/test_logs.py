@@ -25,7 +25,7 @@ def test_nothing_is_written_unless_asked_for(capsys):
 
 @pytest.mark.parametrize("words", [["--log-level", "info"], ["--log-level=info"]])
 @pytest.mark.parametrize("place", [0, 1, 2])
-def test_a_command_its_error_and_its_end_are_written(words, place, capsys):
+def test_command_error_and_end_are_logged(words, place, capsys):
     line = ["extract", "nowhere.csv"]
     assert main([*line[:place], *words, *line[place:]]) == 2
     out, err = capsys.readouterr()
@@ -38,7 +38,7 @@ def test_a_command_its_error_and_its_end_are_written(words, place, capsys):
     assert "Traceback" not in text
 
 
-def test_debug_keeps_the_trace_and_error_keeps_little(capsys):
+def test_debug_logs_trace_and_error_logs_little(capsys):
     main(["extract", "nowhere.csv", "--log-level", "error"])
     assert "INFO" not in log_path().read_text()
     main(["extract", "nowhere.csv", "--log-level", "debug"])
@@ -55,7 +55,7 @@ def test_a_level_that_is_none_is_refused(words, capsys):
     assert not log_path().exists()
 
 
-def test_a_log_that_cannot_be_written_stops_nothing(monkeypatch, tmp_path, capsys):
+def test_unwritable_log_stops_nothing(monkeypatch, tmp_path, capsys):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "file"))
     assert main(["--log-level", "info", "completion", "bash"]) == 0
@@ -64,7 +64,7 @@ def test_a_log_that_cannot_be_written_stops_nothing(monkeypatch, tmp_path, capsy
     assert "_lashbench" in out
 
 
-def test_a_block_inside_of_another_leaves_the_outer_ones_level():
+def test_inner_log_block_keeps_outer_level():
     logger = logging.getLogger("lashbench")
     silence()
     before = (logger.level, list(logger.handlers))
@@ -75,7 +75,7 @@ def test_a_block_inside_of_another_leaves_the_outer_ones_level():
     assert (logger.level, logger.handlers) == before
 
 
-def test_a_log_of_a_megabyte_is_turned_over():
+def test_log_of_one_megabyte_is_rotated():
     with logging_to_file():
         for number in range(120):
             logging.getLogger("lashbench").info("line %d of many: %s", number, 10_000 * "x")
@@ -83,7 +83,7 @@ def test_a_log_of_a_megabyte_is_turned_over():
     assert log_path().with_name("lashbench.log.1").exists()
 
 
-def test_what_libraries_warn_of_is_for_the_log_alone(tmp_path):
+def test_library_warnings_go_only_to_log(tmp_path):
     program = "\n".join(
         [
             "import warnings",
@@ -104,7 +104,7 @@ def test_what_libraries_warn_of_is_for_the_log_alone(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["symlink_to", "hardlink_to"])
-def test_a_log_is_not_written_through_a_link(kind, tmp_path, capsys):
+def test_log_is_not_written_through_link(kind, tmp_path, capsys):
     theirs = tmp_path / "colleague.txt"
     theirs.write_text("results")
     log_path().parent.mkdir(parents=True)

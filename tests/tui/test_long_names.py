@@ -40,7 +40,7 @@ LINES = [
 
 
 @pytest.mark.parametrize("words", LINES, ids=lambda words: " ".join(words)[:20])
-def test_a_name_that_is_too_long_is_one_line(words, tmp_path, monkeypatch, capsys):
+def test_too_long_name_is_one_line(words, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert cli.main(words) == 2
     out, err = capsys.readouterr()
@@ -52,9 +52,7 @@ def test_a_name_that_is_too_long_is_one_line(words, tmp_path, monkeypatch, capsy
 
 
 @pytest.mark.parametrize("variable", ["XDG_DATA_HOME", "XDG_CACHE_HOME", "XDG_STATE_HOME"])
-def test_folders_of_ones_own_with_such_a_name_are_no_internal_error(
-    variable, tmp_path, monkeypatch, capsys
-):
+def test_too_long_folder_is_no_internal_error(variable, tmp_path, monkeypatch, capsys):
     monkeypatch.setenv(variable, f"/tmp/{LONG}")
     monkeypatch.chdir(tmp_path)
     for words in (["history", "--log-level", "info"], ["prepare", *SIMULATE[1:3], *SIMULATE[5:]]):

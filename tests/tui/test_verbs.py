@@ -33,7 +33,7 @@ def text(words, capsys, compute=None):
     return capsys.readouterr().out
 
 
-def test_extract_gives_every_level_with_the_fields_that_scripts_use(capsys):
+def test_extract_gives_levels_with_agreed_fields(capsys):
     levels = document(["extract", SWEEP], capsys)["levels"]
     assert [level["source_vpk"] for level in levels] == [1.5, 2.5, 4.0]
     for level in levels:
@@ -44,7 +44,7 @@ def test_extract_gives_every_level_with_the_fields_that_scripts_use(capsys):
         assert 120 < level["arf"]["frequency_hz"] < level["rf"]["frequency_hz"] < 160
 
 
-def test_extract_has_null_and_a_reason_for_what_is_not_there(tmp_path, capsys):
+def test_extract_gives_null_with_reason(tmp_path, capsys):
     lines = Path(SWEEP).read_text().splitlines(keepends=True)
     cut = tmp_path / "cut.csv"
     cut.write_text("".join(lines[:15]))
@@ -138,7 +138,7 @@ def test_estimate_hands_several_responses_on_together(calls, capsys, tmp_path):
     assert result["warnings"] == ["the response is of unit OTHER, not of ADSS", "a warning"]
 
 
-def test_estimate_is_told_that_the_total_is_unknown(calls, capsys):
+def test_estimate_states_that_total_is_unknown(calls, capsys):
     document(
         ["estimate", SWEEP, "--unit", "adss", "--total-backlash-unknown"], capsys, calls.compute
     )
@@ -153,7 +153,7 @@ def test_estimate_hands_two_frequencies_on(calls, capsys):
     assert (arf, rf, unit.name) == (40.0, 75.5, "EDSS")
 
 
-def test_estimate_warns_where_the_response_is_of_another_unit(calls, capsys, tmp_path):
+def test_estimate_warns_of_another_units_response(calls, capsys, tmp_path):
     few = str(tmp_path / "few.csv")
     write_response(read_response(Path(SWEEP)).take(np.arange(0, 183, 30)), few)
     result = document(["estimate", few, "--unit", "edss"], capsys, calls.compute)

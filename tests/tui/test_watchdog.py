@@ -90,7 +90,8 @@ def db(tmp_path):
     return tmp_path / "bench.db"
 
 
-def test_what_lies_beside_the_users_work_does_not_stand_in_for_the_watchdog(tmp_path, db):
+def test_files_beside_work_replace_no_watchdog(tmp_path, db):
+    """Modules in the working folder."""
     ran = tmp_path / "ran"
     for name in ("daq", "sim", "tui"):
         (tmp_path / name).mkdir()
@@ -106,7 +107,7 @@ def test_what_lies_beside_the_users_work_does_not_stand_in_for_the_watchdog(tmp_
     assert not ran.exists(), ran.read_text()
 
 
-def test_a_watchdog_that_dies_is_replaced_and_it_is_said(db):
+def test_dead_watchdog_is_replaced_and_reported(db):
     instrument = linear_analyser(known_gain)
     with served(instrument) as url, measuring(url, db) as process:
         wait_for(lambda: drives(instrument))
@@ -144,7 +145,7 @@ def test_a_watchdog_that_stands_still_is_replaced(db):
     assert source(db) is SourceState.CONFIRMED_OFF
 
 
-def test_without_a_sign_of_life_of_a_watchdog_nothing_is_driven(db):
+def test_silent_watchdog_allows_no_driving(db):
     instrument = linear_analyser(known_gain)
     with served(instrument) as url, measuring(url, db) as process:
         seen = set()
@@ -164,7 +165,7 @@ def test_without_a_sign_of_life_of_a_watchdog_nothing_is_driven(db):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("driver", [driver.scheme for driver in DRIVERS])
-def test_a_session_that_stands_still_loses_the_bench_and_learns_it(db, driver):
+def test_stopped_session_loses_bench_and_learns_it(db, driver):
     instrument = simulated(driver, LinearPlant(known_gain))
     with served(instrument, driver=driver) as url, measuring(url, db) as process:
         wait_for(lambda: drives(instrument))
@@ -187,7 +188,7 @@ def test_a_session_that_stands_still_loses_the_bench_and_learns_it(db, driver):
 
 
 @pytest.mark.slow
-def test_a_session_that_stands_still_and_holds_the_only_wire_is_ended(db):
+def test_stopped_session_on_only_wire_is_ended(db):
     instrument = linear_analyser(known_gain)
     with (
         served(instrument) as url,
@@ -252,7 +253,7 @@ def one_at_a_time(url):
 @needs_holding
 @pytest.mark.slow
 @pytest.mark.parametrize("told", [signal.SIGTERM, None])
-def test_a_history_that_stops_answering_holds_neither_source_nor_signal(tmp_path, told):
+def test_blocked_history_delays_neither_source_nor_signal(tmp_path, told):
     folder = tmp_path / "share"
     folder.mkdir()
     db = folder / "bench.db"
@@ -285,7 +286,7 @@ def test_a_history_that_stops_answering_holds_neither_source_nor_signal(tmp_path
 
 
 @needs_holding
-def test_a_history_that_does_not_answer_at_the_start_can_be_left(tmp_path):
+def test_history_blocked_at_start_can_be_interrupted(tmp_path):
     folder = tmp_path / "share"
     folder.mkdir()
     instrument = linear_analyser(known_gain)
@@ -307,7 +308,7 @@ def test_a_history_that_does_not_answer_at_the_start_can_be_left(tmp_path):
 
 @needs_holding
 @pytest.mark.slow
-def test_a_transcript_that_stops_answering_ends_and_the_measurement_goes_on(tmp_path):
+def test_blocked_transcript_ends_and_measurement_continues(tmp_path):
     folder = tmp_path / "share"
     folder.mkdir()
     db = tmp_path / "bench.db"
@@ -372,7 +373,7 @@ print(sorted(set(sys.modules) - before), state)
 
 
 @pytest.mark.parametrize(("driver", "wire"), EVERY_WIRE)
-def test_a_watchdog_loads_nothing_when_it_is_needed(tmp_path, driver, wire):
+def test_watchdog_loads_no_module_when_needed(tmp_path, driver, wire):
     db = tmp_path / "bench.db"
     with served(simulated(driver, LinearPlant(known_gain)), wire, driver) as url:
         short = ["--level", "1", "--start", "130", "--stop", "170", "--points", "2", *QUICK]

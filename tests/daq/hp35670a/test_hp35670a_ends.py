@@ -87,7 +87,7 @@ def test_the_response_comes_over_every_wire(wire, dialect):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_the_error_bar_is_that_of_the_simulated_noise(seed):
+def test_stated_error_is_that_of_simulated_noise(seed):
     choices = Choices(seed=seed, noise_v=5e-3)
     analyser = HP35670A(Loopback(Analyser35670A(LinearPlant(gain), choices)))
     points = measured(analyser, np.linspace(60.0, 190.0, 60))
@@ -115,7 +115,7 @@ def test_a_recorded_session_replays_without_an_instrument(tmp_path):
     assert transport.unused == 0
 
 
-def test_a_replay_with_other_settings_is_told_apart(tmp_path):
+def test_replay_detects_other_settings(tmp_path):
     path = tmp_path / "run.jsonl"
     wire = Loopback(Analyser35670A(LinearPlant(gain)))
     analyser = HP35670A(open_transport("sim:", {"sim": lambda _: wire}, record=path))
@@ -132,7 +132,7 @@ def test_a_replay_with_other_settings_is_told_apart(tmp_path):
 
 @pytest.mark.parametrize("count", [401, 801])
 @pytest.mark.parametrize("upward", [True, False])
-def test_a_sweep_on_the_box_gives_every_point_once(count, upward):
+def test_on_box_sweep_gives_every_point_once(count, upward):
     instrument = Analyser35670A(LinearPlant(gain), Choices(both_ends=True))
     analyser = HP35670A(Loopback(instrument), method="on-box")
     analyser.identify()
@@ -146,7 +146,7 @@ def test_a_sweep_on_the_box_gives_every_point_once(count, upward):
     assert instrument.source.target_vpk == 0.0
 
 
-def test_a_sweep_on_the_box_in_even_decades():
+def test_on_box_sweep_has_even_decades():
     analyser = HP35670A(Loopback(Analyser35670A(LinearPlant(gain))), method="on-box")
     analyser.identify()
     analyser.prepare(50.0, 200.0, SETTINGS)
@@ -156,7 +156,7 @@ def test_a_sweep_on_the_box_in_even_decades():
     assert np.ptp(ratio) < 1e-9
 
 
-def test_points_of_a_sweep_on_the_box_come_while_it_runs():
+def test_on_box_points_come_while_running():
     instrument = Analyser35670A(LinearPlant(gain))
     analyser = HP35670A(Loopback(instrument), method="on-box")
     analyser.identify()
@@ -169,7 +169,7 @@ def test_points_of_a_sweep_on_the_box_come_while_it_runs():
     assert instrument.source.target_vpk == 0.0
 
 
-def test_an_overload_on_the_box_flags_the_points_around_it_and_not_all():
+def test_on_box_overload_flags_nearby_points_only():
     instrument = Analyser35670A(
         LinearPlant(gain), Choices(), FaultBoard([parse_fault("overload-burst:point=200")])
     )
@@ -196,7 +196,7 @@ def test_an_unsuitable_fixed_range_is_flagged():
     assert point.flags == PointFlag.HALF_RANGE_MISSED
 
 
-def test_an_offset_is_driven_with_the_sweep_and_gone_after_it():
+def test_offset_is_driven_with_sweep_only():
     instrument = Analyser35670A(LinearPlant(gain))
     analyser = HP35670A(Loopback(instrument))
     analyser.identify()
@@ -208,7 +208,7 @@ def test_an_offset_is_driven_with_the_sweep_and_gone_after_it():
     assert instrument.settings.get("SOUR:VOLT:OFFS").value == 0.0
 
 
-def test_a_plan_of_one_frequency_can_be_measured():
+def test_plan_of_one_frequency_is_measured():
     analyser = HP35670A(Loopback(Analyser35670A(LinearPlant(gain))))
     analyser.identify()
     analyser.prepare(123.0, 123.0, SETTINGS)
@@ -241,7 +241,7 @@ def test_a_plan_of_one_frequency_can_be_measured():
         ("tcp", "missing-option", InstrumentError, SourceState.CONFIRMED_OFF),
     ],
 )
-def test_a_fault_ends_in_its_own_error_and_an_honest_state(wire, fault, error, state):
+def test_fault_gives_its_error_and_true_state(wire, fault, error, state):
     with (
         serving(fault) as (instrument, addresses),
         closing(HP35670A(open_transport(url_of(wire, addresses)), timing=IMPATIENT)) as analyser,
@@ -257,7 +257,7 @@ def test_a_fault_ends_in_its_own_error_and_an_honest_state(wire, fault, error, s
     assert time.monotonic() - started < 10.0
 
 
-def test_a_reply_later_than_the_adapters_patience_is_kept():
+def test_reply_after_adapter_timeout_is_kept():
     # 1.2 s is more than two of the adapter's own time-outs, and less than the driver's.
     with serving("slow-reply:phase=sweep,seconds=1.2") as (instrument, addresses):
         analyser = HP35670A(open_transport(url_of("prologix_tcp", addresses)))
@@ -266,7 +266,7 @@ def test_a_reply_later_than_the_adapters_patience_is_kept():
         assert "No error" in instrument.errors.pop()
 
 
-def test_an_overload_flags_its_point_and_the_sweep_goes_on():
+def test_overload_flags_its_point_only():
     with serving("overload-burst:point=3") as (_, addresses):
         analyser = HP35670A(open_transport(url_of("tcp", addresses)))
         points = measured(analyser, np.linspace(60.0, 190.0, 6))
@@ -276,7 +276,7 @@ def test_an_overload_flags_its_point_and_the_sweep_goes_on():
 
 
 @pytest.mark.parametrize("wire", WIRES)
-def test_after_a_fault_the_measurement_can_be_taken_again_over_the_same_wire(wire):
+def test_same_wire_measures_again_after_fault(wire):
     with serving("garbage-bytes:point=2") as (_, addresses):
         analyser = HP35670A(open_transport(url_of(wire, addresses)), timing=IMPATIENT)
         with pytest.raises(LashbenchError):
@@ -286,7 +286,7 @@ def test_after_a_fault_the_measurement_can_be_taken_again_over_the_same_wire(wir
         analyser.close()
 
 
-def test_the_driver_costs_less_than_five_milliseconds_a_point():
+def test_driver_costs_under_five_milliseconds_per_point():
     costs = []
     for _ in range(3):
         analyser = HP35670A(Loopback(Analyser35670A(LinearPlant(gain))))

@@ -19,7 +19,7 @@ def axis(start_hz, stop_hz, whole):
 
 
 @given(EDGES, EDGES, st.booleans())
-def test_both_ends_of_any_band_have_a_row(one, other, whole):
+def test_both_ends_of_band_have_row(one, other, whole):
     low, high = min(one, other), max(one, other) + 1
     shown = axis(low * GRID_HZ, high * GRID_HZ, whole)
     assert nearest_row(shown, low * GRID_HZ) == 0
@@ -35,7 +35,7 @@ def test_the_band_that_lost_its_last_point():
 
 
 @pytest.mark.parametrize("beyond_hz", [0.2, 1.0, 50.0])
-def test_a_frequency_beyond_the_axis_has_no_row(beyond_hz):
+def test_frequency_beyond_axis_has_no_row(beyond_hz):
     shown = axis(110.0, 175.0, True)
     assert nearest_row(shown, 175.0 + beyond_hz) is None
     assert nearest_row(shown, 110.0 - beyond_hz) is None

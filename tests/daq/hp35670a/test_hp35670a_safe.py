@@ -61,7 +61,7 @@ def test_the_recipe_in_order_with_proof():
     assert script.paused_s == pytest.approx(5.0 / 10.0 + 0.1)
 
 
-def test_no_ramp_is_waited_for_where_there_is_none():
+def test_missing_ramp_is_not_awaited():
     script = Script(QUIET.format(mode="FFT", ramp="") + PROOF + EMPTY)
     assert make_safe(script).state is SourceState.CONFIRMED_OFF
     none = QUIET.format(mode="SINE", ramp=RAMP.replace("+1.0E+001", "+0.0E+000"))
@@ -70,7 +70,7 @@ def test_no_ramp_is_waited_for_where_there_is_none():
     assert script.paused_s == script_2.paused_s == 0.0
 
 
-def test_a_slow_ramp_is_waited_for_only_so_long():
+def test_slow_ramp_is_awaited_within_bound():
     slow = FROM_SINE.replace("+1.0E+001", "+1.0E-003")
     script = Script(slow + PROOF + EMPTY)
     assert make_safe(script).state is SourceState.CONFIRMED_OFF
@@ -88,7 +88,7 @@ def test_a_slow_ramp_is_waited_for_only_so_long():
         ("> OUTP?\n< +0", "> OUTP?\n< FFT"),
     ],
 )
-def test_a_proof_that_fails_resets_and_then_says_unconfirmed(old, new):
+def test_failed_proof_resets_then_reports_unconfirmed(old, new):
     failed = PROOF.replace(old, new)
     assert failed != PROOF
     script = Script(FROM_SINE + failed + RESET + failed + EMPTY)
@@ -131,7 +131,7 @@ class Broken:
     [LinkError("gone"), BenchTimeout("silent"), ProtocolError("rubbish"), OSError("cable"),
      RuntimeError("a bug")],
 )  # fmt: skip
-def test_every_step_is_tried_and_nothing_is_raised(fault):
+def test_every_step_is_tried_without_raising(fault):
     wire = Broken(fault)
     done = make_safe(wire)
     assert done.state is SourceState.UNKNOWN
@@ -143,7 +143,7 @@ def test_every_step_is_tried_and_nothing_is_raised(fault):
     assert str(fault) in str(done)
 
 
-def test_it_does_not_depend_on_what_the_driver_believes_and_may_be_run_twice():
+def test_make_safe_ignores_driver_state_and_repeats():
     instrument = Analyser35670A(LinearPlant(lambda hz: 0.5 + 0j))
     analyser = HP35670A(Loopback(instrument))
     assert analyser.make_safe() is SourceState.CONFIRMED_OFF
@@ -177,7 +177,7 @@ def test_both_modes_are_quiet_afterwards(mode):
     assert instrument.source.offset_v == 0.0
 
 
-def test_entering_swept_sine_never_drives_what_an_earlier_program_left_there():
+def test_entering_swept_sine_drives_no_earlier_level():
     instrument = Analyser35670A(LinearPlant(lambda hz: 0.5 + 0j))
     wire = Loopback(instrument)
 
@@ -196,7 +196,7 @@ def test_entering_swept_sine_never_drives_what_an_earlier_program_left_there():
     assert set(seen) == {(0.0, 0.0)}
 
 
-def test_going_safe_from_another_thread_ends_the_sweep_and_leaves_the_source_off():
+def test_make_safe_from_thread_ends_the_sweep():
     instrument = Analyser35670A(LinearPlant(lambda hz: 0.5 + 0j))
     analyser = HP35670A(Loopback(instrument))
     analyser.identify()

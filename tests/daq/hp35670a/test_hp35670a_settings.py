@@ -55,7 +55,7 @@ def samples(setting) -> tuple:
 
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=IDS)
-def test_every_setting_is_sent_whole_and_reads_back(dialogue, setting):
+def test_every_setting_reads_back_as_sent(dialogue, setting):
     if setting.name == "manual frequency (Hz)":
         dialogue.send("FREQ:STAR 50 HZ;:FREQ:STOP 200 HZ")
     for value in samples(setting):
@@ -77,7 +77,7 @@ def test_the_first_channel_cannot_be_switched_off(dialogue):
 @pytest.mark.parametrize(
     "setting", [setting for setting in SETTINGS if isinstance(setting, Number)], ids=NAME
 )
-def test_every_number_carries_its_unit_and_refuses_what_is_outside(setting):
+def test_number_has_unit_and_refuses_range(setting):
     beyond = [math.nextafter(setting.low, -math.inf), math.nextafter(setting.high, math.inf)]
     for value in (*beyond, math.nan, math.inf, -math.inf, True, "1", None):
         with pytest.raises(LimitError, match=re.escape(setting.name)):
@@ -92,7 +92,7 @@ def test_every_number_carries_its_unit_and_refuses_what_is_outside(setting):
 @pytest.mark.parametrize(
     "setting", [setting for setting in SETTINGS if isinstance(setting, Number)], ids=NAME
 )
-def test_no_number_takes_a_read_back_that_is_elsewhere(setting):
+def test_read_back_elsewhere_is_never_accepted(setting):
     for value in SAMPLES[setting.name]:
         if value <= 0:
             continue
@@ -116,7 +116,8 @@ def test_names_and_headers_are_unique():
     assert len({setting.header for setting in SETTINGS}) == len(SETTINGS)
 
 
-def test_what_reset_and_preset_leave_different_is_always_set():
+def test_settings_differing_after_preset_are_sent():
+    """Reset and preset leave them different."""
     always = {setting.header: value for setting, value in standing_settings()}
     assert always["FREQ:RES:AUTO"] is False
     assert always["CAL:AUTO"] is False
@@ -124,7 +125,7 @@ def test_what_reset_and_preset_leave_different_is_always_set():
     assert always["FREQ:SPAN:LINK"] == "STAR"
 
 
-def test_an_amplitude_shown_in_another_unit_is_converted(dialogue):
+def test_amplitude_in_another_unit_is_converted(dialogue):
     dialogue.send("SOUR:VOLT 1 VRMS")
     reply, unit = dialogue.read_back(LEVEL)
     assert unit == "VRMS"
@@ -154,7 +155,7 @@ def test_an_amplitude_shown_in_another_unit_is_converted(dialogue):
         ({"input_range_vpk": (None, 1e-3)}, "channel 2 range"),
     ],
 )
-def test_point_settings_are_refused_before_anything_is_sent(changes, fault):
+def test_bad_point_settings_are_refused_unsent(changes, fault):
     settings = PointSettings(**({"source_vpk": 2.5, "settle_cycles": 5, "integrate_cycles": 30}
                                 | changes))  # fmt: skip
     with pytest.raises(LimitError, match=fault):
@@ -167,7 +168,7 @@ def test_bands_are_refused_before_anything_is_sent(band):
         planned_settings(*band, PointSettings(2.5, 5, 30))
 
 
-def test_level_and_offset_at_the_bound_are_taken():
+def test_level_and_offset_at_bound_are_accepted():
     check_drive(PointSettings(5.0, 5, 30, dc_offset_v=-5.0))
 
 

@@ -33,7 +33,7 @@ def after_begin(text: str) -> str:
     return DRIVE + BEGIN[: BEGIN.index("= 0")] + text
 
 
-def test_a_level_of_zero_in_the_instrument_is_no_endless_wait():
+def test_zero_level_in_instrument_ends_the_wait():
     parked = after_begin(
         '= 96\n> *ESR?\n< +16\n> SYST:ERR?\n< -221,"Settings conflict; SOURCE LEVEL is 0 Volts, '
         'measurement paused."\n' + EMPTY + QUIET
@@ -44,7 +44,7 @@ def test_a_level_of_zero_in_the_instrument_is_no_endless_wait():
     script.finish()
 
 
-def test_power_that_failed_is_noticed_although_the_status_byte_says_nothing():
+def test_power_failure_without_status_is_noticed():
     polls = "= 0\n" * 11
     analyser, script = prepared(after_begin(polls + "= 0\n> *ESR?\n< +128\n" + QUIET))
     with pytest.raises(InstrumentError, match="switched off and on"):
@@ -52,7 +52,7 @@ def test_power_that_failed_is_noticed_although_the_status_byte_says_nothing():
     script.finish()
 
 
-def test_an_end_that_is_never_reported_is_noticed_by_the_second_witness():
+def test_unreported_end_is_noticed_by_condition_register():
     # Every twelfth poll the events are read, and then the operation register.
     dozen = "= 0\n" * 12 + "> *ESR?\n< +0\n> STAT:OPER:COND?\n< +0\n"
     lost = after_begin(dozen * 3 + "> *ESR?\n< +0\n" + QUIET)
@@ -62,7 +62,7 @@ def test_an_end_that_is_never_reported_is_noticed_by_the_second_witness():
     script.finish()
 
 
-def test_a_measurement_that_runs_long_is_waited_for():
+def test_long_measurement_is_awaited():
     dozen = "= 0\n" * 12 + "> *ESR?\n< +0\n> STAT:OPER:COND?\n< +272\n"
     rest = STATUS + PICTURE + "> STAT:DEV?\n< +32\n" + EMPTY + UNMOVED + END
     analyser, script = prepared(after_begin(dozen * 5 + "= 96\n> *ESR?\n< +1\n" + rest))
@@ -70,7 +70,7 @@ def test_a_measurement_that_runs_long_is_waited_for():
     script.finish()
 
 
-def test_a_wire_without_serial_poll_asks_for_the_events():
+def test_wire_without_poll_reads_event_register():
     def without_poll(text: str) -> str:
         """The same dialogue where every fruitless poll is an event register of 0."""
         fruitless = text.replace("= 0\n", "= none\n> *ESR?\n< +0\n")
@@ -128,7 +128,7 @@ def test_bytes_in_the_other_order_are_recognised():
 
 
 @pytest.mark.parametrize("axis", ["50 100 90 200", "1 2 3 4", "50", "50 50 50 50", "nan 1 2 3"])
-def test_an_axis_that_is_no_ramp_is_not_believed(axis):
+def test_axis_that_is_no_ramp_is_rejected(axis):
     analyser, _ = driver(PREPARE.replace("# 50 100 150 200", f"# {axis}"))
     with pytest.raises(ProtocolError, match="no ramp"):
         analyser.prepare(50.01, 200.01, SETTINGS)
@@ -146,7 +146,7 @@ def test_an_axis_that_is_no_ramp_is_not_believed(axis):
         ("< DBVRMS", "< VPK", EMPTY, "channel 2 range .* was set to 2.0 and reads back 5 VPK"),
     ],
 )
-def test_what_does_not_read_back_stops_the_set_up(old, new, then, fault):
+def test_wrong_read_back_stops_the_setup(old, new, then, fault):
     before = PREPARE[: PREPARE.index(old)]
     analyser, script = driver(f"{before}{new}\n{then}")
     with pytest.raises((InstrumentError, ProtocolError), match=fault):
@@ -173,7 +173,7 @@ def test_a_key_pressed_has_everything_read_again():
         (UNMOVED.replace("+0.0", "+2.0"), "source offset .* was set to 0.0 and reads back 2"),
     ],
 )
-def test_a_point_driven_otherwise_than_asked_is_not_given(moved, fault):
+def test_point_driven_otherwise_is_not_returned(moved, fault):
     lines = moved.split("> SOUR:VOLT:OFFS?")[0] if "+4.0" in moved else moved
     analyser, script = prepared(DRIVE + POINT.removesuffix(UNMOVED) + lines + EMPTY + QUIET)
     with pytest.raises(InstrumentError, match=fault):

@@ -69,7 +69,7 @@ def test_a_missing_option_is_said_at_once():
     script.finish()
 
 
-def test_prepare_sets_and_reads_back_everything_but_level_and_offset():
+def test_prepare_leaves_only_level_and_offset():
     analyser, script = driver(PREPARE)
     read_back = analyser.prepare(50.01, 200.01, SETTINGS)
     script.finish()
@@ -80,12 +80,12 @@ def test_prepare_sets_and_reads_back_everything_but_level_and_offset():
     assert not any("level (V peak)" in name or "offset" in name for name in read_back)
 
 
-def test_no_message_ever_reaches_the_end_of_the_input_queue():
+def test_no_message_fills_the_input_queue():
     messages = [act[2:] for act in Script(IDENTIFY + PREPARE + DRIVE + POINT).acts if act[0] == ">"]
     assert max(len(message) for message in messages) < 120
 
 
-def test_a_second_level_needs_no_reset_and_no_calibration():
+def test_second_level_needs_no_reset_or_calibration():
     again = (
         "> INST:SEL?\n< SINE\n> *CLS\n> STAT:PRES\n> *ESE 61\n> *SRE 32\n" + EMPTY
         + SET + READ_BACK + TRACES + AXIS + EMPTY
@@ -123,7 +123,7 @@ def test_a_point():
         (12, 768, PointFlag(0)),
     ],
 )
-def test_overload_and_half_range_come_from_both_registers(event, condition, flags):
+def test_overload_and_half_range_use_both_registers(event, condition, flags):
     status = f"> STAT:QUES:VOLT?\n< +{event}\n> STAT:QUES:VOLT:COND?\n< +{condition}\n"
     analyser, script = prepared(DRIVE + POINT.replace(STATUS, status) + END)
     (point,) = analyser.sweep([100.3])
@@ -132,7 +132,7 @@ def test_overload_and_half_range_come_from_both_registers(event, condition, flag
 
 
 @pytest.mark.parametrize("pair", ["0 0", "9.91e37 1", "1 -3.40282346639e38", "9.9e37 9.9e37"])
-def test_a_displayed_point_that_holds_filler_is_spoilt_and_stays(pair):
+def test_displayed_filler_marks_point_spoilt(pair):
     analyser, script = prepared(DRIVE + POINT.replace("0.3 -0.4", pair) + END)
     (point,) = analyser.sweep([100.3])
     script.finish()
@@ -142,7 +142,7 @@ def test_a_displayed_point_that_holds_filler_is_spoilt_and_stays(pair):
 
 
 @pytest.mark.parametrize("variance", ["9.91e37", "-0.1", "-3.40282346639e38"])
-def test_a_variance_that_is_none_gives_no_error_bar(variance):
+def test_invalid_variance_gives_no_error_bar(variance):
     analyser, script = prepared(DRIVE + POINT.replace("0 0.06 0 0", f"0 {variance} 0 0") + END)
     (point,) = analyser.sweep([100.3])
     script.finish()
@@ -150,7 +150,7 @@ def test_a_variance_that_is_none_gives_no_error_bar(variance):
     assert (point.variances, point.gain_std_db, point.phase_std_deg) == (None, None, None)
 
 
-def test_lengths_that_do_not_agree_are_read_again_and_else_refused():
+def test_unequal_lengths_are_reread_then_refused():
     other_axis = PICTURE.replace(
         "# 0 0 0.3 -0.4 0 0 9.91e37 0\n", "# 0 0 0.3 -0.4\n> TRAC:X? D1\n# 50 100\n"
     )
@@ -163,7 +163,7 @@ def test_lengths_that_do_not_agree_are_read_again_and_else_refused():
     script.finish()
 
 
-def test_a_sweep_closed_early_aborts_and_goes_quiet():
+def test_sweep_closed_early_aborts_and_goes_quiet():
     analyser, script = prepared(DRIVE + POINT + "! clear\n" + QUIET)
     points = analyser.sweep([100.3, 150.0])
     next(points)
@@ -173,7 +173,7 @@ def test_a_sweep_closed_early_aborts_and_goes_quiet():
         analyser.sweep([100.3])
 
 
-def test_a_wait_that_is_ended_from_above_goes_quiet():
+def test_externally_ended_wait_goes_quiet():
     class Enough(Exception):
         pass
 
@@ -216,7 +216,7 @@ def test_settings_out_of_range_are_refused():
 
 
 @pytest.mark.parametrize("count", [2, 101, 400, 402])
-def test_a_sweep_on_the_box_has_as_many_points_as_its_display(count):
+def test_on_box_points_equal_display_lines(count):
     analyser, script = prepared("", method="on-box")
     step = 100.0 / count
     with pytest.raises(InputError, match="401 or 801 points"):
@@ -224,7 +224,7 @@ def test_a_sweep_on_the_box_has_as_many_points_as_its_display(count):
     script.finish()
 
 
-def test_a_sweep_on_the_box_is_evenly_spaced():
+def test_on_box_sweep_is_evenly_spaced():
     analyser, script = prepared("", method="on-box")
     with pytest.raises(InputError, match="spaced evenly"):
         analyser.sweep([60.0 + 100.0 * (k / 400) ** 2 for k in range(401)])
@@ -248,7 +248,7 @@ def test_a_sweep_on_the_box_is_evenly_spaced():
         ("> INST:SEL?\n< SINE\n> SOUR:VOLT?\n< 2.5\n> SOUR:VOLT? UNIT\n< VPK", SourceState.ON),
     ],
 )  # fmt: skip
-def test_what_a_read_back_says_of_the_source(text, state):
+def test_read_back_gives_source_state(text, state):
     analyser, script = driver(text)
     assert analyser.source_state() is state
     script.finish()

@@ -17,7 +17,7 @@ def test_a_setting_is_sent_and_read_back():
     script.finish()
 
 
-def test_a_setting_that_reads_back_as_another_is_an_error_with_the_queue():
+def test_wrong_read_back_is_error_with_queue():
     script = Script(
         '> VOLT 2 V\n> VOLT?\n< +1.0E+000\n> SYST:ERR?\n< -222,"Data out of range"\n' + QUIET
     )
@@ -28,7 +28,7 @@ def test_a_setting_that_reads_back_as_another_is_an_error_with_the_queue():
     script.finish()
 
 
-def test_the_queue_is_read_until_it_is_empty():
+def test_error_queue_is_read_until_empty():
     script = Script('> SYST:ERR?\n< -113,"A"\n> SYST:ERR?\n< -350,"Too many"\n' + QUIET)
     with pytest.raises(InstrumentError, match="block 7: the instrument reports: -113 A, -350"):
         Dialogue(script).check("block 7")
@@ -62,7 +62,7 @@ class Trouble(Script):
         return reply
 
 
-def test_after_a_time_out_come_clear_and_drain_and_the_state_is_unknown():
+def test_timeout_clears_drains_and_makes_state_unknown():
     script = Trouble('> X?\n< TIMEOUT\n! clear\n> SYST:ERR?\n< -410,"Query interrupted"\n' + QUIET)
     dialogue = Dialogue(script)
     dialogue.trusted = True
@@ -80,7 +80,7 @@ def test_after_a_time_out_come_clear_and_drain_and_the_state_is_unknown():
     ("ask", "reply"),
     [("ask_integer", "1.5"), ("ask_number", "FFT"), ("ask", "CUT"), ("ask_integer", "")],
 )
-def test_a_damaged_reply_is_followed_by_the_same(ask, reply):
+def test_damaged_reply_clears_and_drains(ask, reply):
     script = Trouble(f"> X?\n< {reply}\n! clear\n" + QUIET)
     with pytest.raises(ProtocolError, match="its state is unknown"):
         getattr(Dialogue(script), ask)("X?")
@@ -104,7 +104,7 @@ def test_a_recovery_that_fails_is_said():
     script.finish()
 
 
-def test_without_device_clear_old_replies_are_dropped_until_the_new_one():
+def test_old_replies_are_dropped_without_device_clear():
     script = Trouble(
         """
         > X?
@@ -127,7 +127,7 @@ def test_without_device_clear_old_replies_are_dropped_until_the_new_one():
     script.finish()
 
 
-def test_the_number_that_proves_the_step_is_never_the_same_twice_running():
+def test_synchronising_number_differs_from_the_last():
     once = "! drops only\n> STAT:USER:ENAB {0}\n> STAT:USER:ENAB?\n< +{0}\n> STAT:USER:ENAB 0\n"
     script = Script(once.format(17) + once.format(34))
     dialogue = Dialogue(script)

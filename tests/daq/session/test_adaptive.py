@@ -40,7 +40,7 @@ def run(sweep: AdaptiveSweep) -> list[tuple[float, ...]]:
     return rounds
 
 
-def test_coarse_first_then_around_the_features_until_they_are_known():
+def test_sweep_is_coarse_then_refines_features():
     sweep = AdaptiveSweep(plan(), Refinement(0.4, 200), judge)
     rounds = run(sweep)
     assert rounds[0] == plan().frequencies_hz
@@ -52,7 +52,7 @@ def test_coarse_first_then_around_the_features_until_they_are_known():
     assert len(sweep.points) < 60
 
 
-def test_the_same_accuracy_costs_an_even_grid_more():
+def test_even_grid_needs_more_points():
     sweep = AdaptiveSweep(plan(), Refinement(0.25, 400), judge)
     run(sweep)
 
@@ -63,7 +63,7 @@ def test_the_same_accuracy_costs_an_even_grid_more():
     assert len(sweep.points) < 0.5 * next(filter(enough, range(17, 1000)))
 
 
-def test_the_budget_is_spent_to_the_point_and_not_beyond():
+def test_point_budget_is_used_exactly():
     sweep = AdaptiveSweep(plan(), Refinement(1e-6, 30), judge)
     run(sweep)
     assert len(sweep.points) == 30
@@ -71,7 +71,7 @@ def test_the_budget_is_spent_to_the_point_and_not_beyond():
     assert sweep.ask() == ()
 
 
-def test_a_budget_of_the_coarse_sweep_refines_nothing():
+def test_budget_of_coarse_sweep_refines_nothing():
     sweep = AdaptiveSweep(plan(), Refinement(1e-6, 17), judge)
     assert [len(frequencies) for frequencies in run(sweep)] == [17]
     assert sweep.reason == "budget spent"
@@ -83,7 +83,7 @@ def test_known_at_once_is_over_at_once():
     assert sweep.reason == "target reached"
 
 
-def test_while_a_feature_is_missing_the_whole_band_is_closed_in():
+def test_missing_feature_refines_the_whole_band():
     def blind(points):
         return judge(points, (ARF,)) if len(points) < 40 else judge(points)
 
@@ -95,7 +95,7 @@ def test_while_a_feature_is_missing_the_whole_band_is_closed_in():
     assert max(early) > 165.0
 
 
-def test_a_judge_that_finds_nothing_ends_with_an_even_net():
+def test_no_features_gives_an_even_grid():
     sweep = AdaptiveSweep(plan(), Refinement(0.1, 33), lambda points: [])
     run(sweep)
     places = sorted(point.frequency_hz for point in sweep.points)
@@ -103,7 +103,7 @@ def test_a_judge_that_finds_nothing_ends_with_an_even_net():
     assert not sweep.settled
 
 
-def test_a_judge_that_knows_no_numbers_does_no_harm():
+def test_non_finite_features_do_no_harm():
     odd = [(math.nan, math.nan, math.nan), (140.0, math.nan, math.nan), (1e9, math.inf, -1.0)]
     sweep = AdaptiveSweep(plan(), Refinement(0.1, 60), lambda points: odd)
     run(sweep)
@@ -111,7 +111,7 @@ def test_a_judge_that_knows_no_numbers_does_no_harm():
     assert all(100.0 <= point.frequency_hz <= 180.0 for point in sweep.points)
 
 
-def test_where_the_grid_is_closed_the_least_visited_place_comes_again():
+def test_closed_grid_repeats_least_visited_point():
     narrow = SweepPlan((100.0, 100.0 + 1 / 64), (1.0,))
     sweep = AdaptiveSweep(narrow, Refinement(1e-9, 10), lambda points: [(100.0, 1.0, 0.001)] * 2)
     run(sweep)
@@ -119,7 +119,7 @@ def test_where_the_grid_is_closed_the_least_visited_place_comes_again():
     assert sorted(visits.count(hz) for hz in set(visits)) == [5, 5]
 
 
-def test_new_points_come_in_the_direction_of_the_sweep():
+def test_new_points_follow_sweep_direction():
     for direction in ("up", "down"):
         sweep = AdaptiveSweep(plan(direction=direction), Refinement(0.3, 100), judge)
         for frequencies in run(sweep):

@@ -25,7 +25,7 @@ def test_links_to_one_history_are_one_bench(tmp_path):
     assert sorted(path.name for path in tmp_path.rglob("*-lock")) == []
 
 
-def test_a_link_to_a_history_that_is_still_to_be_made_is_that_bench(tmp_path):
+def test_link_to_future_history_locks_same_bench(tmp_path):
     history = tmp_path / "bench.db"
     link = tmp_path / "link.db"
     link.symlink_to(history)
@@ -38,7 +38,7 @@ def test_two_histories_are_two_benches(tmp_path):
         pass
 
 
-def test_a_lock_that_cannot_be_made_is_told(tmp_path):
+def test_lock_that_cannot_be_made_is_reported(tmp_path):
     with pytest.raises(InputError, match="lock cannot be made"):
         BenchLock(tmp_path / "nowhere" / "bench.db")
 
@@ -50,7 +50,7 @@ def kept_of(place):
 
 
 @pytest.mark.parametrize("kind", ["link", "hard link", "text", "folder", "pipe"])
-def test_what_is_no_lock_of_ours_is_left_as_it_is(tmp_path, kind):
+def test_foreign_lock_file_is_unchanged(tmp_path, kind):
     theirs, place = tmp_path / "colleague.txt", tmp_path / "bench.db-lock"
     theirs.write_text("the colleague's results")
     if kind == "link":
@@ -79,19 +79,19 @@ def test_a_link_to_nothing_makes_no_file(tmp_path):
 
 
 @pytest.mark.parametrize("left", ["", "999999999\n"])
-def test_a_lock_that_was_left_is_taken_over(tmp_path, left):
+def test_abandoned_lock_is_taken_over(tmp_path, left):
     (tmp_path / "bench.db-lock").write_text(left)
     with BenchLock(tmp_path / "bench.db", patience_s=0.2):
         assert (tmp_path / "bench.db-lock").read_text() == f"{os.getpid()}\n"
 
 
-def test_a_full_disk_is_told_and_leaves_no_lock(tmp_path, small_disk):
+def test_full_disk_is_reported_without_lock(tmp_path, small_disk):
     (small_disk / "filler").write_bytes(bytes(64 << 10))
     with pytest.raises(MeasurementError, match=r"bench\.db-lock: .*No space left.*make room"):
         BenchLock(small_disk / "bench.db")
     assert [path.name for path in small_disk.iterdir()] == ["filler"]
 
 
-def test_a_name_that_is_too_long_is_told(tmp_path):
+def test_too_long_name_is_reported(tmp_path):
     with pytest.raises(InputError, match=r"lock cannot be made \(File name too long\)"):
         BenchLock(tmp_path / ("x" * 250 + ".db"))

@@ -36,7 +36,7 @@ sys.stdin.read(1)
         ("sim:", "sim:?ratio=0.3", "replay:x.jsonl", "sr785:sim:"),
     ],
 )  # fmt: skip
-def test_every_way_to_write_an_address_is_one_instrument(same):
+def test_address_spellings_claim_one_instrument(same):
     assert len({wire_name(url) for url in same}) == 1
 
 
@@ -50,7 +50,7 @@ def test_other_instruments_are_others():
     assert len({wire_name(url) for url in urls}) == len(urls)
 
 
-def test_another_history_on_the_same_instrument_is_refused(tmp_path):
+def test_other_history_on_same_instrument_is_refused(tmp_path):
     url = URL.format(1)
     with BenchLock(tmp_path / "one.db", instrument=url):
         with pytest.raises(MeasurementError, match=rf"process {os.getpid()}.*one\.db.*measuring"):
@@ -69,7 +69,7 @@ def test_simulated_instruments_are_as_many_as_wanted(tmp_path):
         pass
 
 
-def test_the_watchdog_of_a_killed_session_holds_the_instrument(tmp_path):
+def test_watchdog_of_killed_session_holds_instrument(tmp_path):
     url = URL.format(3)
     with subprocess.Popen(
         [sys.executable, "-c", HOLDER, str(tmp_path / "one.db"), url],
@@ -93,7 +93,7 @@ def test_notes_lie_where_nobody_else_may_write(tmp_path):
     assert folder.st_mode & 0o077 == 0
 
 
-def test_a_wrong_address_is_refused_and_leaves_no_lock(tmp_path):
+def test_wrong_address_is_refused_without_lock(tmp_path):
     with pytest.raises(InputError, match="has the unknown scheme"):
         BenchLock(tmp_path / "one.db", instrument="gopher:x")
     assert list(tmp_path.iterdir()) == []

@@ -16,7 +16,7 @@ from daq.session_request import SessionRequest
 from daq.store import Store
 
 
-def test_a_measurement_is_complete_and_holds_the_response(store):
+def test_measurement_is_complete_with_its_response(store):
     events = measured(store)
     finished = events[-1]
     assert (finished.state, finished.source_state) == ("complete", SourceState.CONFIRMED_OFF)
@@ -69,7 +69,7 @@ def test_downwards_is_downwards(store):
     assert [f for _, f in analyser.driven[1:]] == sorted(PLAN.frequencies_hz, reverse=True)
 
 
-def test_every_point_is_on_disk_before_it_is_told(store):
+def test_point_is_on_disk_before_its_event(store):
     with Store(store.path, read_only=True) as reader:
         for event in Session(FakeAnalyser(), store, new()).run():
             if isinstance(event, PointStored):
@@ -78,7 +78,7 @@ def test_every_point_is_on_disk_before_it_is_told(store):
                 assert reader.measurement(1).source_state is SourceState.ON
 
 
-def test_progress_counts_up_and_its_estimate_down_to_nothing(store):
+def test_progress_rises_and_its_estimate_falls(store):
     told = of(PointStored, measured(store, analyser=FakeAnalyser(point_s=0.004)))
     assert [event.done for event in told] == list(range(1, 19))
     assert {event.total for event in told} == {18}
@@ -88,7 +88,7 @@ def test_progress_counts_up_and_its_estimate_down_to_nothing(store):
     np.testing.assert_allclose(estimates, actual, atol=0.06)
 
 
-def test_a_limit_is_checked_before_anything_is_sent_or_stored(store):
+def test_limit_is_checked_before_sending_or_storing(store):
     analyser = FakeAnalyser()
     session = Session(analyser, store, new(SweepPlan((100.0,), (2.5,))))
     with pytest.raises(LimitError, match="source level 2.5 V peak is above the 2 V peak"):
@@ -97,7 +97,7 @@ def test_a_limit_is_checked_before_anything_is_sent_or_stored(store):
     assert store.measurements() == []
 
 
-def test_a_resumed_measurement_is_held_to_the_limits_of_now(store):
+def test_resumed_measurement_obeys_present_limits(store):
     measured(store, new())
     tight = SessionRequest(None, (Limits("bench", source_vpk=0.7),), resume=1)
     analyser = FakeAnalyser()
@@ -106,7 +106,7 @@ def test_a_resumed_measurement_is_held_to_the_limits_of_now(store):
     assert analyser.log == []
 
 
-def test_a_request_that_makes_no_sense_is_refused():
+def test_invalid_request_is_refused():
     with pytest.raises(InputError, match="either a new measurement or one to resume"):
         SessionRequest(None, LIMITS)
     with pytest.raises(InputError, match="lower frequency first"):

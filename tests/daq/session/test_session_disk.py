@@ -15,7 +15,7 @@ from daq.session_events import PointStored
 from daq.store import Store
 
 
-def test_a_full_disk_stops_the_source_and_keeps_the_points(tmp_path):
+def test_full_disk_stops_source_and_keeps_points(tmp_path):
     path = tmp_path / "bench.db"
     analyser = FakeAnalyser()
     store = Store(path, create=True)
@@ -47,7 +47,7 @@ def test_a_full_disk_stops_the_source_and_keeps_the_points(tmp_path):
         assert again.measurement(1).state == "interrupted"
 
 
-def test_a_store_that_fails_at_the_end_does_not_hide_what_came_first(store, monkeypatch):
+def test_failing_store_does_not_hide_first_error(store, monkeypatch):
     def refuse(*_args):
         raise MeasurementError("disk gone")
 
@@ -63,7 +63,7 @@ def test_a_store_that_fails_at_the_end_does_not_hide_what_came_first(store, monk
     assert analyser.log[-1] == ("make_safe",)
 
 
-def test_a_store_that_fails_at_the_very_end_is_told(store, monkeypatch):
+def test_store_failure_at_the_end_is_reported(store, monkeypatch):
     def refuse(*_args):
         raise MeasurementError("disk gone")
 
@@ -75,7 +75,7 @@ def test_a_store_that_fails_at_the_very_end_is_told(store, monkeypatch):
     assert store.measurement(1).state == "interrupted"
 
 
-def test_another_program_that_holds_the_file_is_survived_or_told(store):
+def test_file_held_by_another_program_is_reported(store):
     blocker = sqlite3.connect(store.path, isolation_level=None)
     analyser = FakeAnalyser({("point", 6): lambda: blocker.execute("BEGIN IMMEDIATE")})
     with Store(store.path) as quick, pytest.raises(MeasurementError, match="held by another"):

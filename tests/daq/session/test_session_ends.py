@@ -17,7 +17,7 @@ from daq.session import Session
 from daq.session_events import PointStored, RunIn
 
 
-def test_stop_keeps_the_point_in_hand_and_can_be_resumed(store):
+def test_stop_keeps_current_point_and_can_resume(store):
     control = SessionControl()
     session = Session(FakeAnalyser(), store, new(), control)
     events = Watch(session, 5, lambda: control.stop("enough")).run()
@@ -33,7 +33,7 @@ def test_stop_keeps_the_point_in_hand_and_can_be_resumed(store):
     assert not np.any(store.response(1).flags)
 
 
-def test_interrupt_ends_the_point_in_hand_at_once_and_it_is_retaken(store):
+def test_interrupt_ends_current_point_and_retakes_it(store):
     control = SessionControl()
     slow = FakeAnalyser({("point", 6): lambda: control.interrupt("Ctrl-C")}, point_s=0.05)
     events = measured(store, analyser=slow, control=control)
@@ -75,7 +75,7 @@ def test_the_harder_request_wins(store, asked, state):
     assert (events[-1].state, events[-1].points) == (state, 0)
 
 
-def test_what_is_asked_before_the_first_byte_is_honoured_without_driving(store):
+def test_request_before_first_byte_drives_nothing(store):
     control = SessionControl()
     control.interrupt()
     analyser = FakeAnalyser()
@@ -83,7 +83,7 @@ def test_what_is_asked_before_the_first_byte_is_honoured_without_driving(store):
     assert analyser.log == [("make_safe",)]
 
 
-def test_a_stop_with_the_last_point_leaves_a_complete_measurement(store):
+def test_stop_at_last_point_completes_measurement(store):
     control = SessionControl()
     session = Session(FakeAnalyser(), store, new(), control)
     assert Watch(session, 18, control.stop).run()[-1].state == "complete"
@@ -107,7 +107,7 @@ def test_an_endless_point_is_ended_at_once(store, cut):
 
 
 @pytest.mark.parametrize("cut", ["stop", "interrupt", "abort"])
-def test_an_end_asked_for_at_any_moment_is_kept_to(store, cut):
+def test_end_requested_at_any_moment_is_honoured(store, cut):
     for moment in range(1, 12):
         control = SessionControl()
         analyser = FakeAnalyser({("point", moment): getattr(control, cut)})
@@ -123,7 +123,7 @@ def test_an_end_asked_for_at_any_moment_is_kept_to(store, cut):
 
 
 @pytest.mark.parametrize("presses", [1, 2, 5])
-def test_ctrl_c_without_handlers_does_not_skip_safe_off(store, presses):
+def test_ctrl_c_without_handlers_keeps_safe_off(store, presses):
     """A script that uses the engine and installs no handler of its own."""
     left = [presses]
     tried = []
@@ -151,7 +151,7 @@ def test_ctrl_c_without_handlers_does_not_skip_safe_off(store, presses):
     assert (found.state, found.source_state, found.points) == ("interrupted", OFF, 3)
 
 
-def test_a_watcher_who_leaves_ends_the_session_safely(store):
+def test_leaving_watcher_ends_session_safely(store):
     analyser = FakeAnalyser()
     run = Session(analyser, store, new()).run()
     for event in run:
@@ -164,7 +164,7 @@ def test_a_watcher_who_leaves_ends_the_session_safely(store):
     assert (found.state, found.source_state) == ("interrupted", SourceState.CONFIRMED_OFF)
 
 
-def test_a_fault_in_the_watcher_ends_the_session_safely(store):
+def test_failing_watcher_ends_session_safely(store):
     analyser = FakeAnalyser()
 
     def watch():

@@ -68,7 +68,7 @@ def test_a_wait_that_runs_out(store):
 
 
 @every_error
-def test_a_safe_off_that_raises_against_its_promise_proves_nothing(store, fault):
+def test_raising_safe_off_proves_nothing(store, fault):
     analyser = FakeAnalyser({("point", 6): LinkError("gone")})
     analyser.faults["safe"] = None
 
@@ -82,14 +82,14 @@ def test_a_safe_off_that_raises_against_its_promise_proves_nothing(store, fault)
 
 
 @pytest.mark.parametrize("state", [UNCONFIRMED, UNKNOWN, SourceState.ON])
-def test_what_cannot_be_proven_is_not_called_off(store, state):
+def test_unproven_source_is_not_called_off(store, state):
     analyser = FakeAnalyser({("point", 6): LinkError("gone")}, safe=(OFF, state))
     finished, _ = broken(store, analyser)
     assert finished.source_state is state
 
 
 @pytest.mark.parametrize("state", [UNCONFIRMED, UNKNOWN, SourceState.ON])
-def test_nothing_is_driven_while_the_source_is_not_proven_off(store, state):
+def test_unproven_source_off_drives_nothing(store, state):
     analyser = FakeAnalyser(safe=(state,))
     finished, error = broken(store, analyser)
     assert "switch it off by hand" in str(error)
@@ -97,7 +97,7 @@ def test_nothing_is_driven_while_the_source_is_not_proven_off(store, state):
     assert finished.source_state is state
 
 
-def test_a_source_found_driving_is_switched_off_first_and_said(store):
+def test_source_found_driving_is_switched_off_first(store):
     analyser = FakeAnalyser(found=SourceState.ON)
     events = list(Session(analyser, store, request()).run())
     lines = [e for e in events if isinstance(e, CheckLine) and e.name == "source"]
@@ -107,7 +107,7 @@ def test_a_source_found_driving_is_switched_off_first_and_said(store):
     assert names.index("make_safe") < names.index("prepare")
 
 
-def test_a_spoilt_point_stays_with_its_flag_and_the_sweep_goes_on(store):
+def test_spoilt_point_keeps_flag_and_sweep_continues(store):
     flags = {4: PointFlag.OVERLOAD, 6: PointFlag.SPOILT}
     finished = list(Session(FakeAnalyser(flags=flags), store, request()).run())[-1]
     assert (finished.state, finished.points, finished.flagged) == ("complete", 9, 2)

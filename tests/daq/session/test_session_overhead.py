@@ -13,7 +13,7 @@ from daq.store import Store
 from daq.store_records import MeasurementHeader
 
 
-def test_a_point_costs_less_than_five_milliseconds_with_its_commit(tmp_path):
+def test_point_costs_under_five_milliseconds_with_commit(tmp_path):
     plan = SweepPlan(spaced_frequencies(100.0, 200.0, 300), (1.0,))
     header = MeasurementHeader("ADSS", "", plan, "fake:", "test")
     moments = []

@@ -13,7 +13,7 @@ from daq.session import Session
 from daq.session_events import GoingOn, Paused, PointStored, RunIn, Warned
 
 
-def test_a_pause_switches_the_source_off_and_goes_on_with_a_run_in(store):
+def test_pause_switches_source_off_then_runs_in(store):
     control, analyser = SessionControl(), FakeAnalyser()
     seen_off = []
 
@@ -34,7 +34,7 @@ def test_a_pause_switches_the_source_off_and_goes_on_with_a_run_in(store):
     assert not np.any(store.response(1).flags)
 
 
-def test_time_in_a_pause_is_no_measuring_time(store):
+def test_pause_counts_as_no_measuring_time(store):
     control, paused_s = SessionControl(), 2.0
 
     def hold():
@@ -62,7 +62,7 @@ def test_a_pause_gives_way_to_any_end(store, cut, state):
     assert (events[-1].state, events[-1].points) == (state, 4)
 
 
-def test_a_pause_that_cannot_prove_the_source_off_says_so(store):
+def test_pause_reports_unproven_source_off(store):
     control = SessionControl()
     safe = (SourceState.CONFIRMED_OFF, SourceState.UNCONFIRMED, SourceState.CONFIRMED_OFF)
     analyser = FakeAnalyser(safe=safe)

@@ -11,7 +11,7 @@ from daq.errors import LinkError
 from daq.session import Session
 
 
-def test_a_lost_connection_is_opened_again_to_make_the_source_safe(store):
+def test_lost_connection_is_reopened_for_safe_off(store):
     dead = FakeAnalyser({("point", 6): LinkError("cable pulled")}, safe=(OFF, UNKNOWN))
     fresh = FakeAnalyser()
     fresh.level_vpk = 0.5
@@ -30,7 +30,7 @@ def test_a_lost_connection_is_opened_again_to_make_the_source_safe(store):
     assert "reconnected" in [event.kind for event in store.events(1)]
 
 
-def test_a_connection_that_stays_lost_leaves_the_source_unknown(store):
+def test_lasting_connection_loss_leaves_source_unknown(store):
     def refuse():
         raise LinkError("no route")
 
@@ -40,7 +40,7 @@ def test_a_connection_that_stays_lost_leaves_the_source_unknown(store):
     assert store.measurement(1).source_state is UNKNOWN
 
 
-def test_a_connection_that_cannot_even_be_closed_is_opened_again(store):
+def test_connection_that_cannot_close_is_reopened(store):
     """Nor does it matter what opening it raises: going safe raises nothing."""
     faults = {("point", 6): LinkError("cable pulled")}
     dead, fresh = FakeAnalyser(faults, safe=(OFF, UNKNOWN)), FakeAnalyser()
@@ -58,7 +58,7 @@ def test_a_connection_that_cannot_even_be_closed_is_opened_again(store):
     assert store.measurement(2).source_state is UNKNOWN
 
 
-def test_an_answer_without_proof_is_no_reason_to_connect_again(store):
+def test_answer_without_proof_causes_no_reconnection(store):
     def never():
         raise AssertionError("opened again")
 

@@ -16,7 +16,7 @@ def judge(points):
     return [(125.0, std_hz, 5.0), (153.0, std_hz, 5.0)]
 
 
-def test_refinement_goes_on_after_the_plan_and_survives_a_stop(store):
+def test_refinement_follows_plan_and_survives_stop(store):
     refinement = Refinement(target_std_hz=0.5, budget_points=30)
     plan = SweepPlan(PLAN.frequencies_hz, (1.0,))
     request = new(plan, refinement=refinement, judge=judge)

@@ -13,7 +13,7 @@ from daq.session_events import CheckLine, PointStored, Warned
 from daq.store import Store
 
 
-def test_resuming_what_is_complete_only_looks_at_the_source(store):
+def test_resuming_complete_measurement_only_checks_source(store):
     measured(store)
     analyser = FakeAnalyser()
     events = measured(store, again(1), analyser)
@@ -27,7 +27,7 @@ def test_resuming_what_is_not_there(store):
         list(Session(FakeAnalyser(), store, again(5)).run())
 
 
-def test_after_a_kill_the_point_that_was_in_hand_is_marked(store):
+def test_point_cut_by_kill_is_marked(store):
     # A killed program leaves its measurement as it last wrote it.
     run = Session(FakeAnalyser(), store, new()).run()
     for event in run:
@@ -44,7 +44,7 @@ def test_after_a_kill_the_point_that_was_in_hand_is_marked(store):
     run.close()
 
 
-def test_a_band_measured_again_supersedes_and_keeps_the_old_points(store):
+def test_remeasured_band_supersedes_and_keeps_old_points(store):
     measured(store)
     analyser = FakeAnalyser(gain=lambda f: 2.0 * known_gain(f))
     events = measured(store, again(1, remeasure_hz=(115.0, 135.0)), analyser)
@@ -67,7 +67,7 @@ def test_a_band_without_points_changes_nothing(store):
     assert analyser.driven == []
 
 
-def test_a_run_in_point_that_does_not_repeat_is_told(store):
+def test_unrepeatable_run_in_point_is_reported(store):
     control = SessionControl()
     Watch(Session(FakeAnalyser(), store, new(), control), 5, control.stop).run()
     changed = FakeAnalyser(gain=lambda f: 1.1 * known_gain(f))
@@ -79,7 +79,7 @@ def test_a_run_in_point_that_does_not_repeat_is_told(store):
 
 
 @pytest.mark.parametrize("points", [0, 2, 100])
-def test_a_shorter_run_in_can_be_asked_for(store, points):
+def test_shorter_run_in_can_be_requested(store, points):
     control = SessionControl()
     Watch(Session(FakeAnalyser(), store, new(), control), 14, control.stop).run()
     analyser = FakeAnalyser()
@@ -95,7 +95,7 @@ def test_other_settings_than_before_are_told(store):
     assert "SWE:STIM reads 6 CYCLE, and read 5 CYCLE" in of(Warned, events)[0].text
 
 
-def test_another_instrument_is_told_and_a_simulated_one_refused(store):
+def test_resume_notes_other_and_refuses_simulated_instrument(store):
     control = SessionControl()
     Watch(Session(FakeAnalyser(), store, new(), control), 5, control.stop).run()
     other = Identity("HEWLETT-PACKARD", "35670A", "MY2", "A.1", ("1D2",))

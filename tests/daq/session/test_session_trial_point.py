@@ -35,13 +35,13 @@ def test_an_overloaded_trial_point_ends_it(store):
     assert "an input is overloaded" in str(error)
 
 
-def test_a_judge_of_the_trial_point_is_heard(store):
+def test_judge_of_trial_point_is_obeyed(store):
     wanted = request(plausible=Plausibility(judge=lambda point: "no servo answers like this"))
     _, error = broken(store, FakeAnalyser(), wanted)
     assert "no servo answers like this" in str(error)
 
 
-def test_a_fixed_range_that_will_be_too_small_is_noted(store):
+def test_too_small_fixed_range_is_noted(store):
     plan = SweepPlan((120.0, 140.0), (0.1, 4.0))
     wanted = request(plan, input_range_vpk=(5.0, 0.5))
     events = list(Session(FakeAnalyser(gain=lambda f: 0.3), store, wanted).run())

@@ -6,7 +6,7 @@ from daq.store import Store
 from daq.store_records import MeasurementHeader
 
 
-def test_only_what_was_estimated_or_diagnosed_is_read(tmp_path):
+def test_only_estimated_or_diagnosed_lines_are_read(tmp_path):
     plan = SweepPlan((100.0, 110.0), (2.5,))
     with Store(tmp_path / "lab.db", create=True) as store:
         for serial in ("A", "A", "B", "A"):

@@ -44,7 +44,7 @@ def the_clock_was(path, when, table):
 
 
 @pytest.mark.parametrize("when", ["1999-01-01T00:00:00+00:00", "2099-01-01T00:00:00+00:00"])
-def test_what_is_in_force_does_not_depend_on_the_clock(file_store, when):
+def test_answer_in_force_ignores_the_clock(file_store, when):
     number = measured(file_store)
     file_store.add_estimate(number, "t", ESTIMATE)
     file_store.add_diagnosis(number, "t", DIAGNOSIS, {number: 2})
@@ -65,7 +65,7 @@ def test_what_is_in_force_does_not_depend_on_the_clock(file_store, when):
     assert file_store.diagnoses_in_force(number) == []
 
 
-def test_an_answer_is_of_the_points_that_it_was_made_of(store):
+def test_answer_belongs_to_points_it_used(store):
     number = measured(store, ended=False)
     version = store.response(number).provenance["points_version"]
     store.add_point(number, 1.5, 120.0, SweepPoint(120.0, 0.2j))
@@ -79,7 +79,7 @@ def test_an_answer_is_of_the_points_that_it_was_made_of(store):
     assert store.estimate_in_force(number) == kept
 
 
-def test_a_diagnosis_of_several_measurements_falls_with_any_of_them(store):
+def test_any_changed_measurement_invalidates_joint_diagnosis(store):
     one, two = measured(store), measured(store)
     kept = store.add_diagnosis(two, "t", DIAGNOSIS, {one: 2, two: 2}, physics="p", edition="e")
     assert store.diagnoses_in_force(two) == [kept]
@@ -89,14 +89,14 @@ def test_a_diagnosis_of_several_measurements_falls_with_any_of_them(store):
     assert store.lines()[1].diagnosis is None
 
 
-def test_one_with_other_numbers_of_the_unit_is_not_listed(store):
+def test_diagnosis_with_other_values_is_unlisted(store):
     number = measured(store)
     store.add_diagnosis(number, "t", DIAGNOSIS, {number: 2}, as_measured=False)
     assert store.lines()[0].diagnosis is None
     assert len(store.diagnoses_in_force(number)) == 1
 
 
-def test_the_counts_are_those_of_the_points_in_force(store):
+def test_counts_are_of_points_in_force(store):
     number = measured(store)
     spoilt = SweepPoint(110.0, 0.1j, flags=PointFlag.SPOILT)
     retaken = SweepPoint(110.0, 0.1j, flags=PointFlag.RETAKEN)
@@ -109,7 +109,7 @@ def test_the_counts_are_those_of_the_points_in_force(store):
     assert seen == [(2, 1, 3), (2, 1, 4), (2, 0, 5)]
 
 
-def test_lines_are_the_last_ones_of_a_unit_and_a_serial_number(store):
+def test_lines_are_filtered_by_unit_and_serial(store):
     for serial, unit in (("A", "ADSS"), ("B", "adss"), ("A", "EDSS"), ("A", "ADSS")):
         measured(store, serial, unit)
     measured(store, "A", hz=())
@@ -121,7 +121,7 @@ def test_lines_are_the_last_ones_of_a_unit_and_a_serial_number(store):
     assert store.unit_names() == ["ADSS", "EDSS", "adss"]
 
 
-def test_a_correction_says_who_when_and_what_stood_there(store):
+def test_correction_records_person_time_and_old_value(store):
     number, other = measured(store), measured(store)
     done = store.correct(number, "C. D.", {"serial": "SN-8", "notes": "cold", "operator": "A"})
     # The operator was right already.
@@ -155,7 +155,7 @@ def test_a_correction_says_who_when_and_what_stood_there(store):
         (1, "A", {"serial": "x", "notes": "y" * (LONGEST_TEXT + 1)}, "notes has 65537 characters"),
     ],
 )
-def test_a_correction_that_cannot_be_kept_changes_nothing(store, number, person, changes, said):
+def test_correction_that_cannot_be_stored_changes_nothing(store, number, person, changes, said):
     measured(store)
     with pytest.raises(InputError, match=said):
         store.correct(number, person, changes)
@@ -163,13 +163,13 @@ def test_a_correction_that_cannot_be_kept_changes_nothing(store, number, person,
     assert store.corrections(1) == []
 
 
-def test_a_remark_longer_than_a_history_holds_is_refused_before_it_is_measured(store):
+def test_too_long_remark_is_refused_before_measuring(store):
     with pytest.raises(InputError, match="notes has"):
         store.begin(MeasurementHeader("U", "", PLAN, "sim:", "t", notes="n" * (LONGEST_TEXT + 1)))
     assert store.lines() == []
 
 
-def test_what_is_read_of_a_list_does_not_grow_with_the_history(tmp_path):
+def test_read_size_does_not_grow_with_history(tmp_path):
     """By what SQLite did: the steps of its machine, not the clock."""
     path, steps = tmp_path / "bench.db", []
     with Store(path, create=True) as store:

@@ -30,7 +30,7 @@ def begin(store, plan=PLAN, **remarks):
     return store.begin(MeasurementHeader("ADSS", "7", plan, "sim:", "t", **remarks))
 
 
-def test_two_benches_write_and_a_third_reads_what_is_committed(postgres_url):
+def test_two_benches_write_and_third_reads(postgres_url):
     with (
         Store(postgres_url, create=True) as one,
         Store(postgres_url) as two,
@@ -47,7 +47,7 @@ def test_two_benches_write_and_a_third_reads_what_is_committed(postgres_url):
         assert reader.count() == 2
 
 
-def test_a_server_and_a_file_hold_the_same_columns(tmp_path, postgres_url):
+def test_server_and_file_have_equal_columns(tmp_path, postgres_url):
     """Each has a layout of its own, and one description of the columns serves both."""
     with Store(tmp_path / "bench.db", create=True), Store(postgres_url, create=True):
         pass
@@ -71,7 +71,7 @@ def test_a_server_and_a_file_hold_the_same_columns(tmp_path, postgres_url):
     assert {table: set(held) for table, held in server.items()} == described
 
 
-def test_histories_that_are_begun_at_once_are_one(postgres_url):
+def test_simultaneously_created_histories_are_one(postgres_url):
     faults, numbers = [], []
 
     def bench():
@@ -90,7 +90,7 @@ def test_histories_that_are_begun_at_once_are_one(postgres_url):
     assert sorted(numbers) == [1, 2, 3, 4]
 
 
-def test_a_measurement_under_way_is_taken_up_by_nobody_else(postgres_url):
+def test_running_measurement_is_not_resumed_elsewhere(postgres_url):
     with Store(postgres_url, create=True) as one, Store(postgres_url) as two:
         number = begin(one)
         with pytest.raises(MeasurementError, match=f"another session is measuring {number}"):
@@ -117,7 +117,8 @@ for hz in range(100, 200):
 """
 
 
-def test_no_told_point_is_lost_to_kill_9_nor_to_a_fallen_server(postgres, postgres_url):
+def test_kill_or_server_crash_loses_no_point(postgres, postgres_url):
+    """No point that was reported as stored."""
     done = subprocess.run(
         [sys.executable, "-c", KILLED, postgres_url], capture_output=True, text=True
     )
@@ -130,7 +131,7 @@ def test_no_told_point_is_lost_to_kill_9_nor_to_a_fallen_server(postgres, postgr
         store.reopen(1)  # whoever was killed holds it no more
 
 
-def test_a_server_that_goes_away_is_told_and_found_again(postgres, postgres_url):
+def test_lost_server_is_reported_and_reconnected(postgres, postgres_url):
     with Store(postgres_url, create=True) as store:
         number = begin(store)
         store.add_point(number, 1.5, 100.0, SweepPoint(100.0, 1j))
@@ -149,7 +150,7 @@ def test_a_server_that_goes_away_is_told_and_found_again(postgres, postgres_url)
         assert [p.point.gain for p in store.points(number)] == [1j, 2j]
 
 
-def test_a_stopped_transaction_of_others_holds_nobody_for_long(postgres, postgres_url):
+def test_stopped_transaction_of_others_has_bounded_wait(postgres, postgres_url):
     with Store(postgres_url, create=True) as store:
         number = begin(store)
         import psycopg
@@ -173,9 +174,7 @@ def test_a_stopped_transaction_of_others_holds_nobody_for_long(postgres, postgre
         ("UPDATE lashbench.measurements SET started = 'x'", FileFormatError, "cannot be read"),
     ],
 )
-def test_what_is_no_history_of_this_version_is_refused_in_one_line(
-    postgres, postgres_url, statement, fault, said
-):
+def test_server_of_other_version_is_refused(postgres, postgres_url, statement, fault, said):
     with Store(postgres_url, create=True) as store:
         store.note(begin(store), "n", "t")
     postgres.sql("bench", statement)
@@ -189,7 +188,7 @@ def test_what_is_no_history_of_this_version_is_refused_in_one_line(
     assert "\n" not in str(told.value)
 
 
-def test_who_may_not_is_refused_and_no_message_holds_the_password(postgres, postgres_url):
+def test_refused_login_message_hides_the_password(postgres, postgres_url):
     for wrong, said in (
         (postgres.url("bench", password="guess4"), "password authentication"),
         (postgres.url("nothing"), "does not exist"),
@@ -221,7 +220,7 @@ def test_a_reader_without_rights_to_write_reads(postgres, postgres_url):
     postgres.sql("bench", "DROP OWNED BY visitor", "DROP ROLE visitor")
 
 
-def test_texts_that_a_server_cannot_keep_are_refused(postgres_url):
+def test_texts_server_cannot_keep_are_refused(postgres_url):
     with Store(postgres_url, create=True) as store:
         for notes in ("a\0b", "\udcff"):
             with pytest.raises(InputError, match="cannot be kept"):
@@ -237,7 +236,7 @@ def test_a_plan_of_many_points_is_shared(postgres_url):
         assert [store.measurement(n).header.plan for n in numbers] == [plan, plan]
 
 
-def test_one_session_at_a_time_on_this_machine():
+def test_server_allows_one_session_per_machine():
     place = parse_place(f"postgresql://u:{SHOWN}@bench-host/d{os.getpid()}")
     with BenchLock(place), pytest.raises(MeasurementError, match="another session") as told:
         BenchLock(place, patience_s=0.2)
@@ -245,7 +244,7 @@ def test_one_session_at_a_time_on_this_machine():
 
 
 @given(st.text(max_size=30), st.sampled_from(["postgresql://", "postgres://", "", "mysql://"]))
-def test_any_text_is_a_file_or_a_server_or_refused(text, scheme):
+def test_place_is_file_server_or_refused(text, scheme):
     words = f"{scheme}u:s3cr%65t!@{text}" if scheme else text
     said = ""
     try:

@@ -28,7 +28,7 @@ def history(tmp_path):
 @pytest.mark.parametrize("ending", ["-wal", "-shm", "-journal"])
 @pytest.mark.parametrize("kind", ["link", "hard link", "text", "folder", "pipe"])
 @pytest.mark.parametrize("read_only", [False, True])
-def test_a_file_of_others_is_left_as_it_is(history, tmp_path, ending, kind, read_only):
+def test_foreign_file_is_left_unchanged(history, tmp_path, ending, kind, read_only):
     theirs, place = tmp_path / "colleague.txt", tmp_path / f"bench.db{ending}"
     theirs.write_text("the colleague's results")
     if kind == "link":
@@ -51,7 +51,7 @@ def test_a_file_of_others_is_left_as_it_is(history, tmp_path, ending, kind, read
     Store(history, read_only=read_only).close()
 
 
-def test_what_a_killed_program_left_is_taken_up(tmp_path):
+def test_files_left_by_killed_program_are_used(tmp_path):
     path = tmp_path / "bench.db"
     subprocess.run([sys.executable, "-c", KILLED, str(path)], check=True)
     assert (tmp_path / "bench.db-wal").stat().st_size > 0
@@ -59,6 +59,6 @@ def test_what_a_killed_program_left_is_taken_up(tmp_path):
         assert store.measurements() == []
 
 
-def test_a_history_that_another_has_open_is_opened(history):
+def test_history_opened_by_another_opens_too(history):
     with Store(history), Store(history), Store(history, read_only=True):
         pass

@@ -42,7 +42,7 @@ def point(frequency_hz: float, gain: complex = 0.1 - 0.2j, **changes) -> SweepPo
     return SweepPoint(frequency_hz, gain, **changes)
 
 
-def test_what_is_written_is_read_back_to_the_last_digit(store):
+def test_values_are_read_back_exactly(store):
     measurement = store.begin(header())
     store.set_instrument(measurement, IDENTITY)
     store.set_readback(measurement, {"SWE:STIM": "5 CYCLE"})
@@ -66,7 +66,7 @@ def test_what_is_written_is_read_back_to_the_last_digit(store):
     assert (found.points, found.flagged) == (2, 1)
 
 
-def test_a_value_that_is_no_number_stays_unknown(store):
+def test_not_a_number_stays_unknown(store):
     measurement = store.begin(header())
     spoilt = point(100.1, complex(math.nan, math.inf), gain_std_db=math.nan, flags=PointFlag.SPOILT)
     store.add_point(measurement, 1.5, 100.1, spoilt)
@@ -79,7 +79,7 @@ def test_a_value_that_is_no_number_stays_unknown(store):
     assert response.flags[0] == PointFlag.SPOILT
 
 
-def test_a_measurement_is_interrupted_until_it_says_otherwise(store):
+def test_unfinished_measurement_is_interrupted(store):
     measurement = store.begin(header())
     found = store.measurement(measurement)
     assert (found.state, found.source_state, found.ended) == (
@@ -100,7 +100,7 @@ def test_a_state_outside_the_three_is_refused(store):
     assert store.measurement(measurement).state == "interrupted"
 
 
-def test_a_point_measured_again_supersedes_and_keeps_the_old_one(store):
+def test_remeasured_point_supersedes_and_keeps_old_one(store):
     measurement = store.begin(header())
     first = store.add_point(measurement, 1.5, 100.1, point(100.1, 1j))
     other = store.add_point(measurement, 2.5, 100.1, point(100.1, 3j))
@@ -154,12 +154,12 @@ def test_measurements_are_listed_by_unit_oldest_first(store):
 
 
 @pytest.mark.parametrize("asked", ["GÄR", "gär", "GäR"])
-def test_a_unit_is_found_in_any_case_of_any_alphabet(store, asked):
+def test_unit_is_found_in_any_letter_case(store, asked):
     ids = [store.begin(header(unit=unit)) for unit in ("GÄR", "GAR", "gär")]
     assert [m.id for m in store.measurements(asked)] == [ids[0], ids[2]]
 
 
-def test_a_link_to_a_history_shows_what_its_log_holds(file_store, tmp_path):
+def test_link_shows_contents_of_the_log(file_store, tmp_path):
     (tmp_path / "elsewhere").mkdir()
     link = tmp_path / "elsewhere" / "link.db"
     link.symlink_to(file_store.path)
@@ -168,7 +168,7 @@ def test_a_link_to_a_history_shows_what_its_log_holds(file_store, tmp_path):
         assert [m.id for m in reader.measurements()] == [measurement]
 
 
-def test_through_a_link_the_disk_is_asked_for_every_commit(file_store, tmp_path, monkeypatch):
+def test_every_commit_through_link_is_flushed(file_store, tmp_path, monkeypatch):
     link = tmp_path / "link.db"
     link.symlink_to(file_store.path)
     flushed = []
@@ -208,12 +208,13 @@ def test_a_plan_survives_as_text():
     assert plan_from_text(plan_text(PLAN)) == PLAN
 
 
-def test_commits_survive_a_killed_program_and_a_cut_leaves_a_whole_file(file_store):
+def test_history_uses_write_ahead_log(file_store):
+    """Commits survive a killed program, and a power cut leaves a whole file."""
     with closing(sqlite3.connect(file_store.path)) as raw:
         assert raw.execute("PRAGMA journal_mode").fetchone() == ("wal",)
 
 
-def test_the_disk_is_asked_for_every_commit_without_waiting_for_it(file_store, monkeypatch):
+def test_every_commit_is_flushed_without_waiting(file_store, monkeypatch):
     measurement = file_store.begin(header())
     flushed, go = [], threading.Event()
 
@@ -237,7 +238,7 @@ def test_the_disk_is_asked_for_every_commit_without_waiting_for_it(file_store, m
     assert flushed == [log, log]
 
 
-def test_the_end_of_a_measurement_waits_for_the_disk(file_store, monkeypatch):
+def test_end_of_measurement_waits_for_flush(file_store, monkeypatch):
     measurement = file_store.begin(header())
     done = []
     monkeypatch.setattr(os, "fsync", lambda handle: (time.sleep(0.05), done.append(1)))
@@ -245,7 +246,7 @@ def test_the_end_of_a_measurement_waits_for_the_disk(file_store, monkeypatch):
     assert done
 
 
-def test_a_disk_that_refuses_a_flush_is_told_with_the_next_record(file_store, monkeypatch):
+def test_refused_flush_is_reported_at_next_record(file_store, monkeypatch):
     measurement = file_store.begin(header())
 
     def refuse(_handle):
@@ -267,7 +268,7 @@ def test_a_failed_write_leaves_nothing_half_done(store):
     assert store.points(measurement, superseded=True) == [old]
 
 
-def test_a_full_disk_is_told_and_loses_no_committed_point(tmp_path):
+def test_full_disk_loses_no_committed_point(tmp_path):
     path = tmp_path / "bench.db"
     with Store(path, create=True) as store:
         measurement = store.begin(header())
@@ -287,7 +288,7 @@ def test_a_full_disk_is_told_and_loses_no_committed_point(tmp_path):
         assert store.points(measurement) == told
 
 
-def test_a_held_file_is_told_within_its_bound(tmp_path):
+def test_locked_file_is_reported_within_bound(tmp_path):
     path = tmp_path / "bench.db"
     with Store(path, create=True) as store:
         measurement = store.begin(header())
@@ -343,7 +344,7 @@ for step in range(100_000):
 
 
 @pytest.mark.parametrize("lines", [1, 7, 60])
-def test_no_point_that_was_told_is_lost_to_kill_9(tmp_path, lines):
+def test_kill_9_loses_no_reported_point(tmp_path, lines):
     path = tmp_path / "bench.db"
     Store(path, create=True).close()
     with subprocess.Popen(
@@ -359,7 +360,7 @@ def test_no_point_that_was_told_is_lost_to_kill_9(tmp_path, lines):
         assert len(kept) - len(told) in (0, 1)
 
 
-def test_the_place_of_a_new_history_is_checked(tmp_path):
+def test_place_of_new_history_is_checked(tmp_path):
     with pytest.raises(InputError, match="no directory"):
         Store(tmp_path / "nowhere" / "bench.db", create=True)
     with pytest.raises(InputError, match="there is no history"):

@@ -64,7 +64,7 @@ def complaint(path: Path) -> str | None:
     return None
 
 
-def test_an_older_file_is_brought_up_with_all_it_holds(old, tmp_path):
+def test_older_file_is_migrated_completely(old, tmp_path):
     fresh = tmp_path / "fresh.db"
     Store(fresh, create=True).close()
     with Store(old) as store:
@@ -85,7 +85,7 @@ def test_an_older_file_is_brought_up_with_all_it_holds(old, tmp_path):
     assert layout(old) == layout(fresh)
 
 
-def test_an_older_file_that_may_not_be_written_is_read_as_it_is(old):
+def test_read_only_older_file_is_read_unmigrated(old):
     before = old.read_bytes()
     with Store(old, read_only=True) as store:
         first, second = store.lines()
@@ -107,7 +107,7 @@ def test_an_upgrade_that_fails_changes_nothing(old):
     assert layout(old) == before
 
 
-def test_a_newer_file_is_refused_and_left_alone(tmp_path):
+def test_newer_file_is_refused_and_unchanged(tmp_path):
     path = tmp_path / "new.db"
     Store(path, create=True).close()
     run_sql(path, f"PRAGMA user_version = {SCHEMA_VERSION + 5}")
@@ -127,7 +127,7 @@ def test_a_newer_file_is_refused_and_left_alone(tmp_path):
         f"PRAGMA application_id = {APPLICATION_ID}",
     ],
 )
-def test_the_file_of_another_program_is_left_alone(tmp_path, script):
+def test_file_of_another_program_is_unchanged(tmp_path, script):
     path = tmp_path / "other.db"
     run_sql(path, script)
     before = path.read_bytes()
@@ -136,7 +136,7 @@ def test_the_file_of_another_program_is_left_alone(tmp_path, script):
     assert path.read_bytes() == before
 
 
-def test_an_empty_file_becomes_a_history_only_where_one_is_made(tmp_path):
+def test_empty_file_becomes_history_only_on_creation(tmp_path):
     path = tmp_path / "empty.db"
     path.touch()
     with pytest.raises(InputError, match="no history"):
@@ -145,14 +145,14 @@ def test_an_empty_file_becomes_a_history_only_where_one_is_made(tmp_path):
         assert store.measurements() == []
 
 
-def test_a_directory_and_a_device_are_no_history(tmp_path):
+def test_directory_and_device_are_no_history(tmp_path):
     with pytest.raises(InputError, match="is a directory"):
         Store(tmp_path, create=True)
     with pytest.raises(InputError, match="not a regular file"):
         Store("/dev/null", create=True)
 
 
-def test_a_history_that_may_not_be_written_can_still_be_read(whole, tmp_path):
+def test_read_only_history_can_be_read(whole, tmp_path):
     place = tmp_path / "locked"
     place.mkdir()
     path = place / "bench.db"
@@ -169,7 +169,7 @@ def test_a_history_that_may_not_be_written_can_still_be_read(whole, tmp_path):
         place.chmod(0o755)
 
 
-def test_what_only_the_log_holds_is_read_too(whole, tmp_path):
+def test_contents_only_in_log_are_read(whole, tmp_path):
     path = tmp_path / "bench.db"
     path.write_bytes(whole)
     with Store(path) as writer:
@@ -202,7 +202,7 @@ def test_whoever_writes_may_leave_while_another_opens(whole, tmp_path, monkeypat
     max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(data=st.data())
-def test_a_damaged_file_is_refused_in_one_line_or_read_whole(whole, tmp_path, data):
+def test_damaged_file_is_refused_or_read_whole(whole, tmp_path, data):
     damage = data.draw(st.sampled_from(["cut", "flip", "zero", "garbage"]))
     content = bytearray(whole)
     if damage == "cut":
@@ -248,7 +248,7 @@ def test_a_cut_file_is_refused(whole, tmp_path, part):
         ("UPDATE units SET name = CAST(x'ff00ff' AS TEXT)", "measurement"),
     ],
 )
-def test_a_record_that_cannot_be_read_is_told(whole, tmp_path, script, reads):
+def test_unreadable_record_is_reported(whole, tmp_path, script, reads):
     path = tmp_path / "odd.db"
     path.write_bytes(whole)
     run_sql(path, script)
@@ -266,7 +266,7 @@ def test_a_record_that_cannot_be_read_is_told(whole, tmp_path, script, reads):
         "(SELECT 1 UNION ALL SELECT id + 1 FROM n) SELECT id FROM n",
     ],
 )
-def test_a_history_with_a_program_in_it_is_refused(whole, tmp_path, script):
+def test_history_containing_a_program_is_refused(whole, tmp_path, script):
     path = tmp_path / "trap.db"
     path.write_bytes(whole)
     run_sql(path, script)
@@ -275,7 +275,7 @@ def test_a_history_with_a_program_in_it_is_refused(whole, tmp_path, script):
             Store(path, read_only=read_only)
 
 
-def test_a_record_nested_beyond_all_bounds_is_told(whole, tmp_path):
+def test_too_deeply_nested_record_is_reported(whole, tmp_path):
     path = tmp_path / "deep.db"
     path.write_bytes(whole)
     run_sql(path, f"UPDATE points SET detail = '{'[' * 100_000}'")

@@ -36,7 +36,7 @@ def told(store):
     ]  # fmt: skip
 
 
-def test_it_reads_the_same_before_and_after_it_is_brought_up(old):
+def test_older_file_reads_alike_after_migration(old):
     before = old.read_bytes()
     with Store(old, read_only=True) as store:
         as_it_is = told(store)
@@ -54,7 +54,7 @@ def test_it_reads_the_same_before_and_after_it_is_brought_up(old):
     assert as_it_is[0][4:8] == (5, 0, (2.5,), True)
 
 
-def test_an_estimate_that_a_later_session_may_have_overtaken_is_not_in_force(old):
+def test_possibly_outdated_estimate_is_not_in_force(old):
     with Store(old) as store:
         first, second, third, fourth = store.lines()
         assert first.estimate.summary["contribution_ratio"]["value"] == 0.31
@@ -77,7 +77,7 @@ def test_older_software_refuses_it_then(old):
     assert version == SCHEMA_VERSION > 2
 
 
-def test_a_document_that_is_none_keeps_no_history_from_being_brought_up(old):
+def test_invalid_document_does_not_stop_migration(old):
     raw = sqlite3.connect(old)
     raw.execute("UPDATE estimates SET document = '{\"contribution_ratio\": NaN' WHERE id = 2")
     raw.execute("UPDATE estimates SET document = x'00' WHERE id = 3")

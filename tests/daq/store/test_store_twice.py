@@ -35,7 +35,7 @@ os._exit(9)
 OTHER = "import sys; from daq.store import Store; Store(sys.argv[1]).close()"
 
 
-def test_no_point_is_lost_where_the_history_is_looked_at_meanwhile(tmp_path):
+def test_reading_history_meanwhile_loses_no_point(tmp_path):
     """As a screen does beside its session, and `history` in another terminal."""
     db = tmp_path / "bench.db"
     process = subprocess.Popen(
@@ -56,7 +56,7 @@ def test_no_point_is_lost_where_the_history_is_looked_at_meanwhile(tmp_path):
         assert [point.point.gain for point in store.points(1)] == [1j, 2j, 3j]
 
 
-def test_a_file_that_is_none_is_still_refused_beside_an_open_one(tmp_path):
+def test_file_replaced_beside_open_one_is_refused(tmp_path):
     db, other = tmp_path / "bench.db", tmp_path / "other.db"
     other.write_text("something else, and more of it")
     with Store(db, create=True), pytest.raises(LashbenchError, match="is not a history"):

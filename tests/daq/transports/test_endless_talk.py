@@ -103,7 +103,7 @@ def test_what_only_talks_is_no_adapter(talk):
 
 @pytest.mark.parametrize("talk", TALK)
 @pytest.mark.parametrize("act", ACTS)
-def test_through_an_adapter_that_begins_to_talk_every_act_ends(talk, act):
+def test_endless_adapter_talk_ends_every_act(talk, act):
     link = MemoryLink(TinyAdapter(lambda _: None))
     wire = PrologixTransport(Adapter(link, 11, Deadline.after(5.0)), "prologix:")
 
@@ -115,7 +115,7 @@ def test_through_an_adapter_that_begins_to_talk_every_act_ends(talk, act):
     ends(lambda: ACTS[act](wire))
 
 
-def test_a_peer_that_takes_no_more_is_a_bounded_wait_on_a_bare_socket():
+def test_full_peer_bounds_wait_on_bare_socket():
     with talking(b"", listens=False) as port:
         wire = open_transport(f"TCPIP::127.0.0.1::{port}::SOCKET")
 

@@ -43,7 +43,7 @@ def machine(tmp_path):
     return Machine(tmp_path)
 
 
-def test_an_adapter_that_stays_is_where_it_was(machine):
+def test_unmoved_adapter_keeps_its_port(machine):
     book, device = machine.book(), machine.plug(0)
     assert book.now(device) == device
     book.note(device)
@@ -59,7 +59,8 @@ def test_the_lasting_link_is_followed(machine):
     assert os.path.realpath(book.now(device)) == str(machine.folder / "ttyUSB1")
 
 
-def test_without_links_it_is_found_by_its_usb_serial_number(tmp_path):
+def test_adapter_is_found_by_usb_serial_number(tmp_path):
+    """Where the system offers no lasting links."""
     machine = Machine(tmp_path, links=False)
     book, device = machine.book(), machine.plug(0)
     other = machine.plug(1, usb=(0x0403, 0x6001, "OTHER"))
@@ -69,7 +70,7 @@ def test_without_links_it_is_found_by_its_usb_serial_number(tmp_path):
     assert machine.plug(2) == book.now(device) != other
 
 
-def test_another_adapter_under_the_old_name_is_not_taken_for_it(machine):
+def test_other_adapter_under_old_name_is_rejected(machine):
     book, device = machine.book(), machine.plug(0)
     book.note(device)
     machine.pull(0)
@@ -78,7 +79,7 @@ def test_another_adapter_under_the_old_name_is_not_taken_for_it(machine):
     assert os.path.realpath(book.now(device)) == str(machine.folder / "ttyUSB1")
 
 
-def test_of_two_alike_without_a_number_none_is_guessed(tmp_path):
+def test_alike_adapters_without_number_are_not_guessed(tmp_path):
     machine = Machine(tmp_path, links=False)
     clone = (0x1A86, 0x7523, "")
     book, device = machine.book(), machine.plug(0, usb=clone)
@@ -90,7 +91,7 @@ def test_of_two_alike_without_a_number_none_is_guessed(tmp_path):
     assert book.now(device) == device
 
 
-def test_a_lasting_name_is_offered_where_there_is_one(machine):
+def test_lasting_port_name_is_offered_if_available(machine):
     book, device = machine.book(), machine.plug(0)
     assert book.lasting(device) == str(machine.by_id / "usb-A")
     assert book.lasting(str(machine.by_id / "usb-A")) is None

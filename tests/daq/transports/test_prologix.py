@@ -43,7 +43,7 @@ def test_what_must_be_escaped_is():
     assert escape(b"a\rb\nc\x1bd+e") == b"a\x1b\rb\x1b\nc\x1b\x1bd\x1b+e"
 
 
-def test_a_message_that_starts_like_an_adapter_command_reaches_the_instrument():
+def test_message_like_adapter_command_reaches_the_instrument():
     adapter = TinyAdapter(lambda _: None)
     opened(adapter).write("++addr 5", soon())
     assert adapter.messages == [b"++addr 5"]
@@ -51,7 +51,7 @@ def test_a_message_that_starts_like_an_adapter_command_reaches_the_instrument():
 
 
 @pytest.mark.parametrize("line", ["X" * 120, "+" * 60, "", "two\nlines", "grün"])
-def test_what_cannot_be_sent_as_one_message_is_refused_and_not_sent(line):
+def test_unsendable_message_is_refused_and_not_sent(line):
     adapter = TinyAdapter(lambda _: None)
     transport = opened(adapter)
     with pytest.raises(ProtocolError, match="nothing was sent"):
@@ -66,7 +66,7 @@ def test_the_longest_line_goes_through():
 
 
 @given(st.binary(min_size=0, max_size=300), st.integers(0, 50))
-def test_any_block_comes_back_whole_however_it_is_cut(payload, piece):
+def test_any_block_arrives_whole_however_split(payload, piece):
     digits = str(len(payload)).encode()
     block = b"#" + str(len(digits)).encode() + digits + payload + b"\n"
     transport = opened(TinyAdapter(lambda _: block, piece=piece))
@@ -92,7 +92,7 @@ def test_dialects_are_told_by_their_version(version, dialect):
     assert dialect_of(version) is dialect
 
 
-def test_everything_is_set_and_nothing_left_to_a_default():
+def test_every_adapter_setting_is_sent_explicitly():
     adapter = TinyAdapter(lambda _: None)
     opened(adapter, address=14)
     wanted = {"mode": "1", "auto": "0", "eoi": "1", "eos": "2", "eot_enable": "0", "addr": "14"}
@@ -100,7 +100,7 @@ def test_everything_is_set_and_nothing_left_to_a_default():
     assert int(adapter.settings["read_tmo_ms"]) <= 3000
 
 
-def test_a_prologix_stops_saving_before_anything_is_set():
+def test_prologix_stops_saving_before_any_setting():
     adapter = TinyAdapter(lambda _: None)
     opened(adapter)
     before = adapter.lines[: adapter.lines.index(b"++savecfg 0")]
@@ -110,19 +110,19 @@ def test_a_prologix_stops_saving_before_anything_is_set():
 @pytest.mark.parametrize(
     "version", ["AR488 GPIB controller, ver. 0.53.04", "GPIB-USB Version 6.00"]
 )
-def test_savecfg_is_never_sent_where_it_would_write(version):
+def test_savecfg_is_never_sent_to_saving_adapters(version):
     adapter = TinyAdapter(lambda _: None, version=version)
     opened(adapter)
     assert not any(line.startswith(b"++savecfg") for line in adapter.lines)
     assert adapter.eeprom_writes == 0
 
 
-def test_an_ar488_under_another_name_is_still_known_for_one():
+def test_ar488_under_another_name_is_recognised():
     adapter = TinyAdapter(lambda _: None, version="my GPIB box no. 3")
     assert Adapter(MemoryLink(adapter), 11, Deadline.after(1.0)).dialect is AR488
 
 
-def test_a_verbose_ar488_is_silenced_and_answers_no_idn_of_its_own():
+def test_verbose_ar488_is_silenced_without_own_idn():
     adapter = TinyAdapter(echo_number, version="AR488 GPIB controller, ver. 0.53", verbose=True)
     transport = opened(adapter)
     assert not adapter.verbose
@@ -130,7 +130,7 @@ def test_a_verbose_ar488_is_silenced_and_answers_no_idn_of_its_own():
     assert ask(transport, "7?", soon()) == "+7"
 
 
-def test_a_greeting_is_not_taken_for_the_version():
+def test_greeting_is_not_taken_for_version():
     adapter = TinyAdapter(echo_number, version="AR488 GPIB controller, ver. 0.53")
     link = MemoryLink(adapter)
     link.buffer = b"AR488 starting\r\n"
@@ -149,7 +149,7 @@ def test_something_else_on_the_port_is_quoted():
         Adapter(MemoryLink(TinyAdapter(lambda _: None, version="ttyACM ready")), 11, soon())
 
 
-def test_a_setting_that_does_not_read_back_is_refused():
+def test_setting_with_wrong_read_back_is_refused():
     adapter = TinyAdapter(lambda _: None)
     del adapter.settings["eos"]
     with pytest.raises(LinkError, match=r"'\+\+eos 2' and reads back 'Unrecognized command'"):
@@ -159,7 +159,7 @@ def test_a_setting_that_does_not_read_back_is_refused():
 # Replies
 
 
-def test_a_late_reply_is_asked_for_again_and_kept():
+def test_late_reply_is_requested_again_and_kept():
     adapter = TinyAdapter(echo_number, late_reads=3)
     transport = opened(adapter)
     assert ask(transport, "5?", Deadline.after(5.0)) == "+5"
@@ -167,11 +167,11 @@ def test_a_late_reply_is_asked_for_again_and_kept():
     assert adapter.empty_reads == 0
 
 
-def test_stray_nuls_are_not_part_of_a_reply():
+def test_nul_bytes_around_reply_are_dropped():
     assert ask(opened(TinyAdapter(lambda _: b"\0+5\0\n")), "X?", soon()) == "+5"
 
 
-def test_a_silent_instrument_is_told_from_a_silent_adapter():
+def test_silent_instrument_differs_from_silent_adapter():
     adapter = TinyAdapter(lambda _: None)
     transport = opened(adapter)
     with pytest.raises(BenchTimeout, match=r"instrument is silent, 'FREQ\?' got no answer"):
@@ -181,19 +181,19 @@ def test_a_silent_instrument_is_told_from_a_silent_adapter():
         ask(transport, "FREQ?", soon())
 
 
-def test_a_reply_cut_short_says_how_much_came():
+def test_short_reply_error_states_received_length():
     transport = opened(TinyAdapter(lambda _: b"+1.02"))
     with pytest.raises(ProtocolError, match=r"'X\?' was cut short, 5 bytes came"):
         ask(transport, "X?", soon())
 
 
-def test_a_block_cut_short_says_how_much_came():
+def test_short_block_error_states_received_length():
     transport = opened(TinyAdapter(lambda _: b"#216" + struct.pack(">d", 1.0)))
     with pytest.raises(ProtocolError, match=r"'B\?' was cut short, 12 bytes came"):
         ask_block(transport, "B?", soon())
 
 
-def test_a_reply_that_nobody_asked_for_stops_the_next_message():
+def test_unrequested_reply_stops_the_next_message():
     adapter = TinyAdapter(lambda _: None)
     transport = opened(adapter)
     adapter.link.buffer = b"+3\n"
@@ -210,7 +210,7 @@ def test_noise_of_nul_bytes_is_no_reply():
     assert adapter.messages == [b"A 1"]
 
 
-def test_a_reply_that_is_not_text_is_refused():
+def test_reply_that_is_not_text_is_refused():
     with pytest.raises(ProtocolError, match="not text"):
         ask(opened(TinyAdapter(lambda _: b"\xff\xfe\n")), "X?", soon())
 
@@ -222,7 +222,7 @@ def test_a_serial_poll_gives_the_status_byte():
     assert opened(TinyAdapter(lambda _: None, status_byte=96)).serial_poll(soon()) == 96
 
 
-def test_a_poll_that_nobody_answers_is_an_error_of_its_own():
+def test_unanswered_poll_is_error_of_its_own():
     transport = opened(TinyAdapter(lambda _: None, status_byte=None))
     with pytest.raises(BenchTimeout, match="'serial poll' got no answer"):
         transport.serial_poll(soon())
@@ -234,7 +234,7 @@ def test_a_poll_answered_by_nonsense_is_refused():
         transport.serial_poll(soon())
 
 
-def test_a_device_clear_leaves_no_old_reply_behind():
+def test_device_clear_discards_old_replies():
     adapter = TinyAdapter(lambda message: b"old" if message == b"OLD?" else b"new\n")
     transport = opened(adapter)
     with pytest.raises(ProtocolError, match="cut short"):
@@ -246,7 +246,7 @@ def test_a_device_clear_leaves_no_old_reply_behind():
     assert ask(transport, "NEW?", soon()) == "new"
 
 
-def test_an_adapter_that_was_reset_is_noticed_and_set_up_again():
+def test_reset_adapter_is_noticed_and_configured_again():
     adapter = TinyAdapter(echo_number)
     transport = opened(adapter)
     adapter.settings |= {"addr": "5", "auto": "1", "mode": "0"}
@@ -259,7 +259,7 @@ def test_an_adapter_that_was_reset_is_noticed_and_set_up_again():
     assert ask(transport, "8?", soon()) == "+8"
 
 
-def test_a_clear_through_a_silent_adapter_is_a_lost_link():
+def test_clear_through_silent_adapter_loses_link():
     adapter = TinyAdapter(lambda _: None)
     transport = opened(adapter)
     adapter.silent = True
@@ -268,7 +268,7 @@ def test_a_clear_through_a_silent_adapter_is_a_lost_link():
 
 
 @pytest.mark.parametrize("deaf_for", range(3))
-def test_an_adapter_that_starts_while_it_is_asked_is_asked_again(deaf_for):
+def test_adapter_starting_during_query_is_asked_again(deaf_for):
     adapter = TinyAdapter(echo_number)
     transport = opened(adapter)
     lost, hear = [], adapter.feed
@@ -285,7 +285,7 @@ def test_an_adapter_that_starts_while_it_is_asked_is_asked_again(deaf_for):
     assert ask(transport, "1?", soon()) == "+1"
 
 
-def test_an_answer_from_before_is_never_taken_for_a_new_one():
+def test_stale_answer_is_never_taken_as_new():
     adapter = TinyAdapter(echo_number)
     transport = opened(adapter)
     adapter.silent = True
@@ -298,7 +298,7 @@ def test_an_answer_from_before_is_never_taken_for_a_new_one():
     assert ask(transport, "3?", soon()) == "+3"
 
 
-def test_commands_still_go_out_to_a_silent_adapter_and_questions_do_not():
+def test_silent_adapter_gets_commands_but_no_queries():
     adapter = TinyAdapter(echo_number)
     transport = opened(adapter)
     adapter.silent = True

@@ -54,7 +54,7 @@ def test_a_dialogue_comes_back_as_it_was(recorded):
     assert answers[2:] == [96, True, False, None]
 
 
-def test_every_act_is_on_disk_before_the_call_returns(tmp_path):
+def test_every_act_is_on_disk_before_return(tmp_path):
     path = tmp_path / "run.jsonl"
     recorder = Recorder(Script("> A 1\n> B?\n< +5"), path)
     recorder.write("A 1", SOON)
@@ -65,7 +65,7 @@ def test_every_act_is_on_disk_before_the_call_returns(tmp_path):
     recorder.close()
 
 
-def test_errors_are_recorded_and_come_back_as_errors(tmp_path):
+def test_errors_are_recorded_and_replayed_as_errors(tmp_path):
     path = tmp_path / "run.jsonl"
     recorder = Recorder(Moody("> Q?\n< TIMEOUT\n! clear"), path)
     for transport in (recorder, Replay):
@@ -77,7 +77,7 @@ def test_errors_are_recorded_and_come_back_as_errors(tmp_path):
         assert transport.device_clear(SOON)
 
 
-def test_a_disk_that_is_full_ends_the_transcript_and_not_the_dialogue(tmp_path):
+def test_full_disk_ends_transcript_not_dialogue(tmp_path):
     told, script, path = [], Script(DIALOGUE), tmp_path / "run.jsonl"
     recorder = Recorder(script, path, told.append)
     recorder.write("A 1", SOON)
@@ -92,7 +92,7 @@ def test_a_disk_that_is_full_ends_the_transcript_and_not_the_dialogue(tmp_path):
     assert Replay(tmp_path / "run.jsonl").unused == 1
 
 
-def test_a_departure_is_named_by_line_and_by_both_sides(recorded):
+def test_mismatch_names_line_and_both_sides(recorded):
     replay = Replay(recorded[0])
     replay.write("A 1", SOON)
     with pytest.raises(ProtocolError) as error:
@@ -113,7 +113,7 @@ def test_a_replay_does_not_wait(recorded):
     Replay(recorded[0]).pause(1e9)
 
 
-def test_a_last_line_cut_off_by_a_crash_is_left_out(recorded):
+def test_truncated_last_line_is_omitted(recorded):
     path, _ = recorded
     whole = path.read_text()
     path.write_text(whole[:-10])

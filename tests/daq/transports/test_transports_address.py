@@ -106,7 +106,7 @@ def test_anything_else_is_refused_with_the_forms(url, fault):
 
 
 @given(st.text(max_size=40))
-def test_no_text_escapes_the_parser_with_another_error(text):
+def test_parser_raises_no_other_error(text):
     with contextlib.suppress(ConfigurationError):
         parse_address(text)
 
@@ -132,13 +132,13 @@ def test_a_scheme_without_a_provider_is_unknown():
         open_transport("sim:", {})
 
 
-def test_a_provided_scheme_gets_what_follows_the_colon():
+def test_provided_scheme_gets_text_after_colon():
     seen = []
     assert open_transport("sim:a?b=c", {"sim": lambda rest: seen.append(rest) or "wire"}) == "wire"
     assert seen == ["a?b=c"]
 
 
-def test_a_replay_of_nothing_is_a_bad_file(tmp_path):
+def test_replay_of_empty_file_is_bad_file(tmp_path):
     with pytest.raises(FileFormatError, match="cannot be read"):
         open_transport(f"replay:{tmp_path / 'gone'}")
 

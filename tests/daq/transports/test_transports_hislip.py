@@ -67,7 +67,7 @@ def test_damaged_replies_are_told(transport):
     assert ask(transport, "A?", soon()) == "+1"
 
 
-def test_a_poll_is_its_own_answer_whatever_service_is_requested(server, transport):
+def test_poll_reply_ignores_pending_service_request(server, transport):
     server.requests_before_answers = True
     for status in (96, 0, 32, 65):
         server.instrument.status_byte = status
@@ -87,14 +87,14 @@ def test_service_is_waited_for(server, transport):
     assert not transport.wait_for_service(soon(0.05))
 
 
-def test_a_late_reply_is_never_taken_for_the_next(server, transport):
+def test_late_reply_is_never_taken_for_next(server, transport):
     server.late_s = 0.2
     with pytest.raises(BenchTimeout, match=r"'A\?' got no answer within 0.05 s"):
         ask(transport, "A?", soon(0.05))
     assert ask(transport, "B?", soon()) == "+2"
 
 
-def test_a_clear_drops_a_late_reply_that_comes_before_its_acknowledgement(server, transport):
+def test_clear_drops_reply_arriving_before_acknowledgement(server, transport):
     server.late_s = 0.2
     transport.write("BLOCK?", soon())
     assert transport.device_clear(soon())
@@ -112,7 +112,7 @@ def test_a_lock_of_another_client_is_told(server, transport):
     assert ask(transport, "B?", soon()) == "+2"
 
 
-def test_a_server_that_restarts_is_connected_to_anew(server, transport):
+def test_restarted_server_is_reconnected(server, transport):
     server.restart()
     with pytest.raises(LinkError):
         ask(transport, "A?", soon())
@@ -121,7 +121,7 @@ def test_a_server_that_restarts_is_connected_to_anew(server, transport):
     again.close()
 
 
-def test_nobody_there_and_something_else_there_are_no_connection():
+def test_missing_or_other_server_gives_no_connection():
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
         with pytest.raises(LinkError, match="no INITIALIZE_RESPONSE within"):
@@ -143,7 +143,7 @@ def test_nobody_there_and_something_else_there_are_no_connection():
 
 @settings(max_examples=15, deadline=None)
 @given(st.binary(max_size=60))
-def test_no_bytes_of_a_server_raise_anything_else(noise):
+def test_server_bytes_raise_no_other_error(noise):
     hello = packed(Kind.INITIALIZE_RESPONSE, 0, 1) + packed(Kind.ASYNC_INITIALIZE_RESPONSE)
     size = packed(Kind.ASYNC_MAXIMUM_MESSAGE_SIZE_RESPONSE)
     with ByteServer(lambda _: hello + size + noise) as one:

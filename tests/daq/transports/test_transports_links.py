@@ -43,7 +43,7 @@ def test_pyserial_urls_join_the_two():
         transport.close()
 
 
-def test_an_adapter_that_wakes_late_is_waited_for():
+def test_adapter_that_wakes_late_is_awaited():
     adapter = TinyAdapter(number)
     awake = time.monotonic() + 1.0
 
@@ -69,7 +69,7 @@ def test_a_port_that_does_not_exist():
         SerialLink("/dev/ttyNONE7")
 
 
-def test_a_port_pulled_out_is_lost_for_reading_and_writing():
+def test_unplugged_port_is_lost_both_ways():
     pty = Pty(lambda data: b"")
     link = SerialLink(pty.device)
     pty.unplug()
@@ -86,7 +86,7 @@ def test_a_port_pulled_out_is_lost_for_reading_and_writing():
     pty.__exit__()
 
 
-def test_a_port_that_vanishes_while_nothing_is_said_is_noticed(tmp_path):
+def test_port_vanishing_while_idle_is_noticed(tmp_path):
     with Pty(lambda data: b"") as pty:
         name = tmp_path / "adapter"
         os.symlink(pty.device, name)
@@ -110,7 +110,7 @@ def test_nothing_to_read_ends_at_the_deadline():
         link.close()
 
 
-def test_a_tcp_link_that_is_closed_or_never_was():
+def test_closed_or_absent_tcp_link_is_lost():
     with ByteServer(lambda data: None) as server:
         link = TcpLink("127.0.0.1", server.port, Deadline.after(1.0))
         assert link.receive(Deadline.after(0.05)) == b""
@@ -125,7 +125,7 @@ def test_a_tcp_link_that_is_closed_or_never_was():
         TcpLink("127.0.0.1", server.port, Deadline.after(1.0))
 
 
-def test_a_peer_that_takes_no_more_is_a_bounded_wait():
+def test_full_peer_bounds_the_wait():
     with ByteServer(lambda data: time.sleep(0.3) or b"") as server:
         link = TcpLink("127.0.0.1", server.port, Deadline.after(1.0))
         with pytest.raises(BenchTimeout, match="was not taken within"):

@@ -63,7 +63,7 @@ def test_a_raw_socket_answers_text_and_blocks(raw):
         assert ask_block(raw, "BLOCK?", Deadline.after(2.0)) == PAYLOAD
 
 
-def test_commands_in_a_row_do_not_wait_for_each_other(raw):
+def test_consecutive_commands_do_not_wait(raw):
     started = time.monotonic()
     for _ in range(20):
         raw.write("X 1", Deadline.after(1.0))
@@ -73,7 +73,8 @@ def test_commands_in_a_row_do_not_wait_for_each_other(raw):
     assert time.monotonic() - started < 0.5
 
 
-def test_a_raw_socket_has_no_poll_and_drops_on_clear(raw):
+def test_raw_socket_has_no_poll_or_clear(raw):
+    """A clear drops the queued reply."""
     assert raw.serial_poll(Deadline.after(1.0)) is None
     raw.write("A?", Deadline.after(1.0))
     time.sleep(0.05)
@@ -91,22 +92,22 @@ def test_a_time_out_names_what_waited(raw):
 
 
 @pytest.mark.parametrize("query", ["CUT?", "LONG?"])
-def test_a_block_cut_short_is_a_damaged_reply(raw, query):
+def test_short_block_is_a_damaged_reply(raw, query):
     with pytest.raises(ProtocolError, match="cut short"):
         ask_block(raw, query, Deadline.after(0.1))
 
 
-def test_text_where_a_block_was_due_is_a_damaged_reply(raw):
+def test_text_instead_of_block_is_damaged_reply(raw):
     with pytest.raises(ProtocolError, match="should start with '#'"):
         ask_block(raw, "A?", Deadline.after(0.5))
 
 
-def test_bytes_that_are_no_text_are_a_damaged_reply(raw):
+def test_bytes_other_than_text_are_damaged_reply(raw):
     with pytest.raises(ProtocolError, match="not text"):
         ask(raw, "BINARY?", Deadline.after(0.5))
 
 
-def test_a_closed_connection_is_lost_at_once_and_never_spins():
+def test_closed_connection_is_lost_at_once():
     with ByteServer(lambda data: None if b"BYE" in data else b"+1\n") as server:
         transport = open_transport(f"TCPIP::127.0.0.1::{server.port}::SOCKET")
         assert ask(transport, "A?", Deadline.after(1.0)) == "+1"
@@ -122,7 +123,7 @@ def test_a_closed_connection_is_lost_at_once_and_never_spins():
         transport.close()
 
 
-def test_a_connection_closed_while_waiting_ends_the_wait():
+def test_connection_closed_while_waiting_ends_wait():
     hang_up = threading.Event()
 
     def answer(data):
@@ -140,14 +141,14 @@ def test_a_connection_closed_while_waiting_ends_the_wait():
         transport.close()
 
 
-def test_a_port_on_which_nobody_listens_is_no_connection():
+def test_port_without_listener_gives_no_connection():
     with ByteServer(lambda data: b"") as server:
         port = server.port
     with pytest.raises(LinkError, match="no connection"):
         open_transport(f"TCPIP::127.0.0.1::{port}::SOCKET")
 
 
-def test_a_gpib_card_without_a_back_end_is_said_so():
+def test_gpib_card_without_back_end_is_reported():
     with pytest.raises(LinkError, match="needs its maker's VISA, or linux-gpib"):
         open_transport("GPIB0::11::INSTR")
 
@@ -204,7 +205,7 @@ def test_every_driver_measures_through_a_gateway(driver):
 
 @pytest.mark.parametrize("driver", DRIVERS, ids=lambda driver: driver.scheme or "preset")
 @pytest.mark.parametrize("refused", [(READ_STB,), (CLEAR,), (READ_STB, CLEAR)], ids=str)
-def test_a_gateway_without_poll_or_clear_is_measured_through_and_told(store, driver, refused):
+def test_gateway_without_poll_or_clear_is_reported(store, driver, refused):
     """Error 8, operation not supported."""
     box = simulated(driver.scheme, LinearPlant(known_gain), ["truncated-block:point=9"])
     lead = f"{driver.scheme}:" if driver.scheme else ""
@@ -237,7 +238,7 @@ def test_a_gateway_without_poll_or_clear_is_measured_through_and_told(store, dri
 
 
 @pytest.mark.parametrize("driver", DRIVERS, ids=lambda driver: driver.scheme or "preset")
-def test_a_gateway_that_starts_anew_ends_the_session_with_the_source_off(store, driver):
+def test_restarted_gateway_ends_session_with_source_off(store, driver):
     box = simulated(driver.scheme, LinearPlant(known_gain))
     lead = f"{driver.scheme}:" if driver.scheme else ""
     plan = SweepPlan(
@@ -267,7 +268,7 @@ def test_a_gateway_that_starts_anew_ends_the_session_with_the_source_off(store, 
     ids=["poll", "clear", "write", "read"],
 )
 @pytest.mark.parametrize("fault", ["hangs up", "silent", "no answer"])
-def test_a_lost_gateway_is_told_from_an_instrument_that_does_not_answer(procedure, act, fault):
+def test_lost_gateway_differs_from_silent_instrument(procedure, act, fault):
     device = Vxi11Instrument(instrument)
 
     def feed(data):
@@ -286,7 +287,7 @@ def test_a_lost_gateway_is_told_from_an_instrument_that_does_not_answer(procedur
             transport.close()
 
 
-def test_an_instrument_that_another_client_locked_is_told(vxi11):
+def test_instrument_locked_by_another_is_reported(vxi11):
     transport, device = vxi11
     device.errors = {WRITE: 11, READ_STB: 11}
     for act in (lambda: transport.write("A?", Deadline.after(1.0)),
@@ -295,7 +296,7 @@ def test_an_instrument_that_another_client_locked_is_told(vxi11):
             act()
 
 
-def test_usb_without_a_back_end_is_said_so():
+def test_usb_without_back_end_is_reported():
     with pytest.raises(LinkError, match="USB needs a maker's VISA, or pyusb"):
         open_transport("USB0::0x03EB::0x2065::GPIB_11_3E1F::INSTR")
 
@@ -317,7 +318,7 @@ def test_vxi11_times_out_by_name(vxi11):
 
 
 @pytest.mark.parametrize(("query", "fault"), [("CUT?", "20 bytes came"), ("LONG?", "were due")])
-def test_vxi11_says_how_much_of_a_block_came(vxi11, query, fault):
+def test_vxi11_states_received_length_of_block(vxi11, query, fault):
     with pytest.raises(ProtocolError, match=fault):
         ask_block(vxi11[0], query, Deadline.after(0.5))
 
@@ -329,7 +330,7 @@ def test_vxi11_without_anybody_there_is_no_connection():
         open_transport(f"TCPIP::127.0.0.1,{port}::inst0::INSTR", opening_s=1.0)
 
 
-def test_a_call_that_a_gateway_does_not_end_is_aborted():
+def test_call_that_gateway_leaves_open_is_aborted():
     """Its link keeps the bus otherwise, and the next session waits behind it."""
     aborted, records = [], Records()
 

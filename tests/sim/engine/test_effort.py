@@ -12,7 +12,7 @@ from sim.response import Servo, simulate_cycles
 from sim.unit import load_unit
 
 
-def test_every_machine_level_point_and_cycle_counts_its_duration():
+def test_effort_counts_machine_level_point_and_cycle():
     plan = SweepPlan((100.0, 200.0), (1.5, 2.5), settle_cycles=2, integrate_cycles=3)
     servos = [Servo.of(load_unit("adss"), ratio) for ratio in (0.2, 0.5, 0.8)]
     with counting() as effort:
@@ -21,7 +21,7 @@ def test_every_machine_level_point_and_cycle_counts_its_duration():
     assert effort.simulated_s == pytest.approx(3 * 2 * 5 * (1 / 100.0 + 1 / 200.0))
 
 
-def test_motion_of_a_hardening_shaft_is_worth_more_of_a_plain_units():
+def test_hardening_shaft_motion_is_worth_more():
     plan = SweepPlan((200.0,), (1.5,), settle_cycles=2, integrate_cycles=3)
     unit = load_unit("adss")
     effects = [parse_effect(text) for text in ("shaft-hardening:h=1e4", "shaft-stiffness:k_s1=30")]
@@ -33,7 +33,7 @@ def test_motion_of_a_hardening_shaft_is_worth_more_of_a_plain_units():
     assert 4 * plan.duration_s < effort.worth_s < 5 * plan.duration_s
 
 
-def test_motion_that_needs_shorter_steps_is_worth_more():
+def test_motion_with_shorter_steps_is_worth_more():
     """At the first step the motion of the harder shaft grows without bound."""
     plan = SweepPlan((40.0, 60.0, 80.0), (4.0,), settle_cycles=2, integrate_cycles=3)
     steps = {"longest_step_s": 1e-5, "shorter_steps_s": (5e-6, 1.25e-6)}
@@ -47,7 +47,7 @@ def test_motion_that_needs_shorter_steps_is_worth_more():
     assert worth[1] > 1.3 * worth[0]
 
 
-def test_what_is_not_said_to_be_dear_is_worth_itself():
+def test_unpriced_motion_is_worth_its_duration():
     with counting() as outer, counting() as inner:
         spend(1.0)
         spend(2.0, 5.0)
@@ -55,7 +55,7 @@ def test_what_is_not_said_to_be_dear_is_worth_itself():
         assert (effort.simulated_s, effort.worth_s) == (3.0, 6.0)
 
 
-def test_blocks_count_for_themselves_and_for_those_around_them():
+def test_nested_blocks_count_for_outer_ones_too():
     with counting() as outer:
         spend(1.0)
         with counting() as inner:
@@ -65,7 +65,7 @@ def test_blocks_count_for_themselves_and_for_those_around_them():
     assert (outer.simulated_s, inner.simulated_s) == (7.0, 2.0)
 
 
-def test_threads_count_where_they_run_in_a_copy_of_the_context():
+def test_threads_count_in_copied_context():
     threads, times = 4, 2000
 
     def work():

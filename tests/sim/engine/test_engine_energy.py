@@ -67,7 +67,7 @@ def test_a_chain_without_losses_keeps_its_energy(name, ratio):
 
 @pytest.mark.parametrize("h", [1e3, 1e4, 1e5])
 @pytest.mark.parametrize("name", UNITS)
-def test_a_hardening_shaft_without_losses_keeps_its_energy(name, h):
+def test_lossless_hardening_shaft_conserves_energy(name, h):
     # 0.2 s; 5e-5 was measured at most, as without hardening. With a single pass over the laws
     # in each step EDSS doubled its energy at 1e4 and went out of bounds at 1e5.
     chain = without_losses(UNITS[name], 0.5, [parse_effect(f"shaft-hardening:h={h}")])
@@ -105,7 +105,7 @@ DAMPERS = ["shaft-damping:c_s1=0.02", "mesh1-damping:c_g1=0.2", "mesh2-damping:c
 
 
 @pytest.mark.parametrize(("b_t_deg", "creep"), [(0.0, 1e-11), (0.066, 1e-5)])
-def test_friction_brings_free_motion_to_rest_and_rest_is_still(b_t_deg, creep):
+def test_friction_brings_motion_to_rest(b_t_deg, creep):
     unit = ADSS.with_parameters(b_t_deg=b_t_deg)
     drivetrain = drivetrain_with(unit, 0.25, [parse_effect(text) for text in DAMPERS])
     system = drivetrain.replacing("motor", k_t=0.0, k_b=0.0).system()

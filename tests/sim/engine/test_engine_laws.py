@@ -40,7 +40,7 @@ def bounce_period(k, d, v):
     return 4.0 * d / v + 2.0 * math.pi * math.sqrt(J / k)
 
 
-def test_play_lets_a_mass_bounce_with_the_period_of_flight_and_contact():
+def test_bounce_period_is_flight_plus_contact():
     k, d, v = 500.0, 1e-3, 0.8
     system = system_of(Mesh("m", {"q": 1.0}, k, d))
     period = bounce_period(k, d, v)
@@ -50,7 +50,8 @@ def test_play_lets_a_mass_bounce_with_the_period_of_flight_and_contact():
     assert abs(q) < 1e-4 * 10 * 4 * d
 
 
-def test_inside_the_play_nothing_acts_and_in_contact_the_spring_alone():
+def test_only_spring_acts_in_contact():
+    """Inside the backlash nothing acts."""
     k, d = 500.0, 1e-3
     system = system_of(Mesh("m", {"q": 1.0}, k, d))
     time = 0.9e-3
@@ -65,7 +66,7 @@ def test_inside_the_play_nothing_acts_and_in_contact_the_spring_alone():
 
 
 @pytest.mark.parametrize("c", [0.01, 0.05, 0.15])
-def test_damped_play_gives_back_the_speed_of_a_damped_half_swing(c):
+def test_damped_contact_returns_damped_half_swing_speed(c):
     k, d, v = 500.0, 1e-3, 0.8
     system = system_of(Mesh("m", {"q": 1.0}, k, d, c=c))
     omega = math.sqrt(k / J)
@@ -80,7 +81,7 @@ def test_damped_play_gives_back_the_speed_of_a_damped_half_swing(c):
     assert q == pytest.approx(0.5 * d, rel=1e-2)
 
 
-def test_friction_stops_a_sliding_mass_where_it_should_and_holds_it():
+def test_friction_stops_sliding_mass_and_holds_it():
     T, w0 = 0.014, 3.0
     system = system_of(DryFriction("f", "q", T))
     stop_time, distance = J * w0 / T, J * w0**2 / (2.0 * T)
@@ -95,7 +96,7 @@ def test_friction_stops_a_sliding_mass_where_it_should_and_holds_it():
 
 
 @pytest.mark.parametrize("share", [-0.999, -0.5, 0.5, 0.999])
-def test_below_break_away_a_constant_torque_moves_nothing(share):
+def test_torque_below_break_away_moves_nothing(share):
     T = 0.014
     system = system_of(DryFriction("f", "q", T), ConstantTorque("q", share * T))
     _, state = drive(system, rows_of(system), 50.0, 200)
@@ -115,7 +116,7 @@ def test_above_break_away_the_surplus_accelerates(share):
     assert at(system, state, "q", "q'") == pytest.approx(expected, rel=1e-9)
 
 
-def test_friction_turns_with_the_motion_when_the_torque_beats_it():
+def test_friction_reverses_with_motion():
     T, push, w0 = 0.014, 0.05, -4.0
     system = system_of(DryFriction("f", "q", T), ConstantTorque("q", push))
     before = -w0 * J / (push + T)
@@ -127,7 +128,7 @@ def test_friction_turns_with_the_motion_when_the_torque_beats_it():
     assert at(system, state, "q") == pytest.approx([q], rel=1e-3)
 
 
-def test_a_spring_lets_go_of_stuck_friction_exactly_where_it_beats_it():
+def test_spring_releases_stuck_friction_at_break_away():
     k, T = 2.0, 0.014
     system = system_of(DryFriction("f", "q", T), Spring({"q": 1.0}, k))
     for stretch, moves in ((0.999 * T / k, False), (1.05 * T / k, True)):
@@ -135,7 +136,7 @@ def test_a_spring_lets_go_of_stuck_friction_exactly_where_it_beats_it():
         assert (at(system, state, "q")[0] != pytest.approx(stretch, rel=1e-9)) == moves
 
 
-def test_stribeck_friction_follows_its_curve_while_it_slides():
+def test_stribeck_friction_follows_its_curve():
     T, T_s, w_s, push = 0.010, 0.008, 0.7, 0.025
     system = system_of(DryFriction("f", "q", T, T_s, w_s), ConstantTorque("q", push))
 
@@ -178,7 +179,7 @@ def series(bend, peak=8.0):
     return np.array([transform[0].real, *(2j * transform[1:])])
 
 
-def test_excess_clips_the_drive_to_the_series_of_a_clipped_sine():
+def test_clipping_gives_series_of_clipped_sine():
     got = bent_drive([(1.0, 3.0)])
     expected = series(lambda v: min(max(v, -3.0), 3.0))
     assert got == pytest.approx(expected, abs=2e-4)
@@ -199,7 +200,7 @@ AMPLIFIERS = {
 
 
 @pytest.mark.parametrize("name", AMPLIFIERS)
-def test_an_amplifier_bends_a_sine_as_its_characteristic_says(name):
+def test_amplifier_characteristic_distorts_sine_as_given(name):
     """Dead about zero, then more one way than the other, then cut off: in that order."""
     amplifier = AMPLIFIERS[name]
     clip = math.inf if amplifier.V_sat is None else amplifier.V_sat
@@ -215,7 +216,7 @@ def test_an_amplifier_bends_a_sine_as_its_characteristic_says(name):
     assert bent_drive(laws) == pytest.approx(series(bend), abs=5e-4)
 
 
-def test_cubic_spring_swings_with_the_period_of_duffing():
+def test_cubic_spring_has_duffing_period():
     k, h, amplitude = 100.0, 2000.0, 0.03
     system = system_of(Spring({"q": 1.0}, k), HardeningSpring("h", {"q": 1.0}, k, h))
     # x'' = -w^2 (x + h x^3) from rest at a: period 4 K(m) / (w sqrt(1 + h a^2)).
@@ -229,7 +230,7 @@ def test_cubic_spring_swings_with_the_period_of_duffing():
 
 
 @pytest.mark.parametrize("tinies", [1, 2])
-def test_hardening_springs_with_tiny_inertias_between_follow_their_equations(tinies):
+def test_hardening_springs_follow_equations_across_tiny_inertias(tinies):
     # As in the middle of a hardening shaft: a force on a tiny inertia moves both its springs.
     k, h, tiny = 100.0, 2000.0, J / 500.0
     names = ["q", "m", "n"][: tinies + 1]
@@ -292,7 +293,7 @@ def bounce_errors(step_s):
     return np.sqrt(np.mean(np.square(errors)))
 
 
-def test_error_of_play_falls_with_the_square_of_the_step():
+def test_backlash_error_falls_with_step_squared():
     errors = np.array([bounce_errors(step) for step in (16e-6, 8e-6, 4e-6, 2e-6)])
     orders = np.log2(errors[:-1] / errors[1:])
     assert orders.mean() > 1.8

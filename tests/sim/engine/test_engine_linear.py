@@ -31,7 +31,7 @@ def test_linear_limit_is_the_transfer_function(unit):
         assert np.abs(drifted).max() < 1e-6 * np.abs(steady).max()
 
 
-def test_from_zeros_the_linear_limit_is_reached_once_the_start_has_died():
+def test_transient_decays_to_linear_limit():
     quiet = ADSS.with_parameters(**FRICTIONLESS, b_t_deg=0.0)
     effects = ["shaft-damping:c_s1=0.002", "load-viscous-damping:B_L=0.05"]
     system = drivetrain_with(quiet, 0.5, [parse_effect(e) for e in effects]).system()
@@ -43,7 +43,7 @@ def test_from_zeros_the_linear_limit_is_reached_once_the_start_has_died():
 
 
 @pytest.mark.parametrize("step_s", [2e-6, 5e-6, 50e-6])
-def test_the_step_does_not_matter_to_a_linear_system(step_s):
+def test_linear_system_does_not_depend_on_step(step_s):
     quiet = EDSS.with_parameters(**FRICTIONLESS, b_t_deg=0.0)
     effects = ["shaft-damping:c_s1=0.1", "mesh1-damping:c_g1=10", "mesh2-damping:c_2=100"]
     system = drivetrain_with(quiet, 0.5, [parse_effect(e) for e in effects]).system()
@@ -53,7 +53,7 @@ def test_the_step_does_not_matter_to_a_linear_system(step_s):
     assert state[:, 0] == pytest.approx(fine[:, 0], rel=1e-7, abs=1e-9 * np.abs(fine).max())
 
 
-def test_a_constant_offset_turns_the_motor_at_its_free_speed():
+def test_constant_offset_gives_motor_free_speed():
     quiet = ADSS.with_parameters(**FRICTIONLESS, b_t_deg=0.0)
     effects = ["shaft-damping:c_s1=0.002"]
     system = drivetrain_with(quiet, 0.5, [parse_effect(e) for e in effects]).system()
@@ -73,7 +73,8 @@ def state_step(system, modes):
 
 @pytest.mark.parametrize("unit", [ADSS, EDSS], ids=["adss", "edss"])
 @pytest.mark.parametrize("effects", [(), ("shaft-damping:c_s1=0.1", "amplifier-lag:tau_a=1e-4")])
-def test_one_step_is_the_matrix_exponential_by_modes_and_without(unit, effects):
+def test_one_step_is_the_matrix_exponential(unit, effects):
+    """With modes and without."""
     system = drivetrain_with(unit, 0.3, [parse_effect(text) for text in effects]).system()
     n, inlets = len(system.b), np.array([law.inlet for law in system.nonlinearities]).T
     by_modes = find_modes(system)
@@ -99,7 +100,7 @@ def test_one_step_is_the_matrix_exponential_by_modes_and_without(unit, effects):
             assert apart.max() < 1e-8 * (np.abs(expected) * scale[:, None]).max()
 
 
-def test_modes_or_not_the_motion_with_play_and_friction_is_the_same():
+def test_motion_is_equal_with_and_without_modes():
     system = paper_drivetrain(ADSS, 0.25).system()
     start = np.zeros(len(system.states))
     kept, state = drive(system, start, 130.0, 2, amplitude=2.5)

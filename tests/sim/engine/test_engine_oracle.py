@@ -32,7 +32,7 @@ DAMPERS = {"c_s1": "shaft-damping", "c_g1": "mesh1-damping", "c_2": "mesh2-dampi
     [(LIGHT, 60.0), (LIGHT, 130.0), (LOSSY, 110.0), (LOSSY, 180.0), (SPLIT, 110.0), (SPLIT, 150.0)]
     + [(ELEVATION, f) for f in (60.0, 80.0, 95.0)],
 )
-def test_agrees_with_the_oracle_where_motion_is_periodic(case, frequency_hz):
+def test_periodic_motion_agrees_with_oracle(case, frequency_hz):
     unit, ratio, extras, step_s = case
     effects = [parse_effect(f"{DAMPERS[c]}:{c}={value}") for c, value in extras.items()]
     # Both from zeros: where several motions are stable, the start decides.
@@ -95,7 +95,7 @@ def test_undamped_units_scatter_as_the_oracle_does(name, seed):
     assert min(permutation_p(groups, rng)) > 1e-3
 
 
-def test_the_comparison_of_distributions_can_tell_a_damped_scheme_apart():
+def test_distribution_comparison_detects_damped_scheme():
     # At 10 us the oracle damps the mesh modes numerically: another machine.
     unit, ratio, band = BANDS["edss"]
     rng = np.random.default_rng(3)
@@ -107,7 +107,7 @@ def test_the_comparison_of_distributions_can_tell_a_damped_scheme_apart():
 
 @pytest.mark.parametrize("unit", [ADSS, EDSS], ids=["adss", "edss"])
 @pytest.mark.parametrize("c_s1", [0.003, 0.02, 0.05])
-def test_plays_that_push_each_other_are_solved_until_they_agree(unit, c_s1, monkeypatch):
+def test_coupled_meshes_are_solved_until_they_agree(unit, c_s1, monkeypatch):
     effects = [parse_effect(f"shaft-damping:c_s1={c_s1}")]
 
     def moved():

@@ -55,7 +55,7 @@ def taken(steps, grows):
     return seen, motions
 
 
-def test_a_stretch_and_the_one_before_are_gone_through_again():
+def test_failed_stretch_and_previous_are_repeated():
     seen, motions = taken((LONG, SHORT), lambda f, step: f == 76.0 and step == LONG)
     again = [(74.0, SHORT), (76.0, SHORT)]
     long = [(f, LONG) for f in FREQUENCIES]
@@ -69,12 +69,12 @@ def test_a_stretch_and_the_one_before_are_gone_through_again():
     assert same == [True, True, *[False] * 9]
 
 
-def test_the_first_of_all_has_none_before_it():
+def test_first_stretch_is_repeated_alone():
     seen, _ = taken((LONG, SHORT), lambda f, step: f == 70.0 and step == LONG)
     assert seen[:3] == [(70.0, LONG), (70.0, SHORT), (72.0, LONG)]
 
 
-def test_a_third_step_is_taken_where_the_second_will_not_do():
+def test_third_step_follows_failed_second():
     seen, _ = taken((LONG, SHORT, SHORTEST), lambda f, step: f == 76.0 and step > SHORTEST)
     assert seen.count((76.0, SHORTEST)) == 1
     assert [f for f, step in seen if step == SHORTEST] == [74.0, 76.0]
@@ -87,13 +87,13 @@ def test_what_grows_often_keeps_the_shorter_step():
     assert [f for f, step in seen if step == SHORT] == [70.0, 70.0, *FREQUENCIES[1:]]
 
 
-def test_what_grows_at_every_step_is_an_error():
+def test_growth_at_every_step_is_an_error():
     with pytest.raises(AnalysisError, match="at 76 Hz grew without bound"):
         taken((LONG, SHORT), lambda f, step: f == 76.0)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_a_shaft_that_hardens_beyond_the_step_is_carried_through(seed):
+def test_shaft_hardening_beyond_step_stays_finite(seed):
     system, parameters, _ = machine(2e7)
     start = np.zeros((len(system.states), 2))
     start[system.states.index("th_L")] = 1e-5 * np.random.default_rng(seed).standard_normal(2)

@@ -29,7 +29,7 @@ STEP_S = 1e-5
 
 
 @pytest.mark.parametrize("unit", [ADSS, EDSS], ids=["adss", "edss"])
-def test_linear_limit_is_the_transfer_function_to_single_precision(unit):
+def test_linear_limit_holds_to_single_precision(unit):
     quiet = unit.with_parameters(**FRICTIONLESS, b_t_deg=0.0)
     system = drivetrain_with(quiet, 0.5, [parse_effect("shaft-damping:c_s1=0.002")]).system()
     eye = np.eye(len(system.b))
@@ -68,7 +68,7 @@ def test_agrees_with_double_where_motion_is_periodic(unit, ratio, damped, freque
 
 @pytest.mark.parametrize("effect", sorted(BUILT_IN))
 @pytest.mark.parametrize("unit", [ADSS, EDSS], ids=["adss", "edss"])
-def test_every_effect_is_the_same_for_as_long_as_a_start_is_remembered(unit, effect):
+def test_every_effect_agrees_until_start_decays(unit, effect):
     sizes = {}
     for p in BUILT_IN[effect].parameters:
         low, high = p.range(unit)
@@ -88,7 +88,7 @@ def test_every_effect_is_the_same_for_as_long_as_a_start_is_remembered(unit, eff
 
 
 @pytest.mark.skipif(not architecture(), reason="what this processor does is not known here")
-def test_what_dies_away_ends_at_zero_and_not_among_numbers_that_take_long():
+def test_decaying_motion_reaches_zero_without_denormals():
     system = drivetrain_with(ADSS, 0.4, [parse_effect("amplifier-lag:tau_a=0.0005")]).system()
     one, ends = np.ones(16), []
     # 0.2 s are 400 times the lag; the smallest number of full digits is left behind after 90.
@@ -102,7 +102,7 @@ def test_what_dies_away_ends_at_zero_and_not_among_numbers_that_take_long():
     assert np.float32(1e-38) * np.float32(0.1) > 0.0, "the caller's own arithmetic has changed"
 
 
-def test_a_system_without_usable_modes_keeps_all_its_digits():
+def test_system_without_modes_keeps_double_precision():
     system = paper_drivetrain(ADSS, 0.25).system()
     modes = find_modes(system, worst_condition=0.0)
     start = np.zeros((len(system.states), 3))

@@ -55,7 +55,7 @@ work = st.tuples(
 
 @settings(max_examples=12, deadline=None)
 @given(some=st.lists(work, max_size=9), single=st.booleans(), offset=st.sampled_from([0.0, 0.2]))
-def test_whoever_comes_and_goes_gets_what_it_gets_alone(some, single, offset):
+def test_joining_and_leaving_lanes_equal_separate_runs(some, single, offset):
     def asking(one):
         return asker(*one, single=single, offset=offset)
 
@@ -80,7 +80,7 @@ def test_more_points_than_lanes_take_turns():
         assert same(motions, alone)
 
 
-def test_askers_are_begun_when_lanes_are_free_for_them():
+def test_requests_start_when_lanes_are_free():
     begun = []
 
     def askers():
@@ -117,7 +117,7 @@ def test_nobody_asks_for_nothing():
 
 
 @pytest.mark.parametrize("single", [False, True])
-def test_lanes_go_freely_where_vectors_would_be_empty(single):
+def test_free_lanes_are_used_for_partial_vectors(single):
     width = WIDE * (2 if single else 1)
     assert goes_freely(1, 3 * width, single)
     assert goes_freely(width // 2, 3, single)

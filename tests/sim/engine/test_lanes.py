@@ -110,7 +110,7 @@ def test_choices_and_bounds_are_numpys(single):
 
 
 @pytest.mark.parametrize("single", [False, True])
-def test_signs_are_numpys_down_to_those_of_zeros(single):
+def test_signs_match_numpy_including_zeros(single):
     b = np.array([0.5, -4.0, -1.0, -1e-3, 0.0, -0.0, -3.0])
     for ours, wanted in (
         (Lanes.signed_as, np.copysign(A, b)),
@@ -122,7 +122,7 @@ def test_signs_are_numpys_down_to_those_of_zeros(single):
         assert np.array_equal(np.signbit(found), np.signbit(wanted))
 
 
-def test_a_product_and_what_is_added_to_it_are_rounded_once():
+def test_fused_multiply_add_rounds_once():
     if not machine_code.multiplies_and_adds():
         pytest.skip("this machine multiplies and adds one after the other")
     a = np.array([1.0 + 2.0**-30])
@@ -132,7 +132,7 @@ def test_a_product_and_what_is_added_to_it_are_rounded_once():
     assert found != a[0] * a[0] - 1.0
 
 
-def test_a_machine_that_cannot_do_both_in_one_rounds_twice():
+def test_machine_without_fused_multiply_rounds_twice():
     a = np.array([1.0 + 2.0**-30, -3.7, 1e-9])
     found = computed(lambda a: a * a - 1.0, [a], single=False, fused=False)
     assert np.array_equal(found, a * a - 1.0)
@@ -157,7 +157,7 @@ def test_every_architecture_is_told_and_put_back(architecture, triple, sets):
     assert text.count(f"\t{sets}\t") == 2
 
 
-def test_an_architecture_that_is_not_known_is_told_nothing():
+def test_unknown_architecture_keeps_denormals_setting():
     module = ir.Module()
     emit = ir.IRBuilder(
         ir.Function(module, ir.FunctionType(ir.VoidType(), []), "run").append_basic_block()
@@ -168,7 +168,7 @@ def test_an_architecture_that_is_not_known_is_told_nothing():
     assert "call" not in str(module).split("define")[1]
 
 
-def test_nan_stays_nan_where_it_is_and_nowhere_else():
+def test_nan_stays_in_its_lane():
     a = np.array([1.0, np.nan, 3.0])
     found = computed(lambda a, b: a * b + a, [a, a], single=True)
     assert np.array_equal(np.isnan(found), [False, True, False])
@@ -176,7 +176,7 @@ def test_nan_stays_nan_where_it_is_and_nowhere_else():
 
 @settings(max_examples=25, deadline=None)
 @given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=VECTOR_BYTES // 8))
-def test_a_lane_does_not_depend_on_its_neighbours(numbers):
+def test_lane_does_not_depend_on_neighbours(numbers):
     def expression(a):
         return (a * a + 1.0) / (abs(a) + 2.0) - a * 0.3
 
@@ -185,7 +185,7 @@ def test_a_lane_does_not_depend_on_its_neighbours(numbers):
     assert np.array_equal(together, alone)
 
 
-def test_stribecks_curve_is_as_good_as_it_says():
+def test_stribeck_curve_has_stated_accuracy():
     w = np.linspace(-3.0, 3.0, 15)
     one = np.ones_like(w)
     for part in (slice(0, 8), slice(7, 15)):
@@ -212,7 +212,7 @@ def friction(w0, ahead):
 
 
 @pytest.mark.parametrize("law", [play, friction])
-def test_a_short_cut_gives_the_same_to_the_last_bit(law):
+def test_short_cut_is_bit_equal(law):
     plain, branching = (machine(law, 2, single=False, branches=b) for b in (False, True))
     rng = np.random.default_rng(0)
     random = D * rng.normal(scale=2.0, size=(2, 400))
@@ -226,7 +226,7 @@ def test_a_short_cut_gives_the_same_to_the_last_bit(law):
         np.testing.assert_array_equal(branching(some), plain(some))
 
 
-def test_a_short_cut_is_taken_only_where_all_lanes_may():
+def test_short_cut_needs_all_lanes():
     def expression(a):
         return a.code.short_cut(lambda: (a > 0.0, a.like(1.0)), lambda: a.like(2.0))
 

@@ -37,7 +37,7 @@ def doubled(source, written, name="double", program=PROGRAM):
     return number.value
 
 
-def test_a_program_is_compiled_once_and_anew_where_a_source_changes(written, tmp_path):
+def test_program_is_recompiled_only_after_change(written, tmp_path):
     source, other = tmp_path / "law.py", tmp_path / "other.py"
     source.write_text("one")
     other.write_text("another")
@@ -51,7 +51,7 @@ def test_a_program_is_compiled_once_and_anew_where_a_source_changes(written, tmp
 
 @pytest.mark.parametrize("damage", [lambda kept: kept[:-1], lambda kept: b"", lambda kept: kept[:9],
                                     lambda kept: kept[:33] + b"e" + kept[34:]])  # fmt: skip
-def test_what_is_damaged_is_not_run_but_compiled_anew(written, tmp_path, damage):
+def test_damaged_code_is_recompiled_not_run(written, tmp_path, damage):
     source = tmp_path / "law.py"
     source.write_text("one")
     doubled(source, written)
@@ -64,7 +64,7 @@ def test_what_is_damaged_is_not_run_but_compiled_anew(written, tmp_path, damage)
     assert file.read_bytes() == whole
 
 
-def test_a_folder_that_cannot_be_written_costs_time_alone(written, tmp_path, monkeypatch):
+def test_unwritable_folder_only_costs_time(written, tmp_path, monkeypatch):
     source = tmp_path / "law.py"
     source.write_text("one")
     monkeypatch.setenv("XDG_CACHE_HOME", str(source))
@@ -74,7 +74,7 @@ def test_a_folder_that_cannot_be_written_costs_time_alone(written, tmp_path, mon
 
 
 @pytest.mark.parametrize(("mode", "gives"), [(0o755, 63.0), (0o777, 42.0)])
-def test_code_that_others_could_have_put_there_is_not_run(written, tmp_path, mode, gives):
+def test_code_others_may_have_written_never_runs(written, tmp_path, mode, gives):
     source, other = tmp_path / "law.py", tmp_path / "other.py"
     source.write_text("one")
     other.write_text("another")

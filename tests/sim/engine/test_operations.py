@@ -16,7 +16,7 @@ from sim.engine.layout import STEPS_SEEN
 PAGE = Path(__file__).parents[3] / "docs" / "performance.md"
 
 
-def test_steps_take_as_many_operations_as_the_page_says():
+def test_steps_take_documented_number_of_operations():
     tally = count_steps(SERVO)
     said = re.search(
         rf"{STEPS_SEEN} steps of one lane: (\d+) operations "
@@ -28,7 +28,7 @@ def test_steps_take_as_many_operations_as_the_page_says():
 
 
 @pytest.mark.parametrize("unit", [ADSS, EDSS], ids=["adss", "edss"])
-def test_what_is_counted_is_what_the_units_of_the_paper_take(unit):
+def test_counted_steps_are_those_of_paper_units(unit):
     system = paper_drivetrain(unit, 0.4).system()
     one, start = np.ones(1), np.zeros((len(system.states), 1))
     stretch = Stretch(120.0, 2.5 * one, 0.0 * one, 0.0 * one, 0, 1)
@@ -36,7 +36,7 @@ def test_what_is_counted_is_what_the_units_of_the_paper_take(unit):
     assert next(asking).layout.structure == SERVO
 
 
-def test_two_more_coordinates_cost_what_a_pair_of_rows_does():
+def test_two_coordinates_cost_a_pair_of_rows():
     more = replace(SERVO, turning=(True, *SERVO.turning), heard=(True, True, *SERVO.heard))
     grown = count_steps(more) - count_steps(SERVO)
     assert set(grown) == {"add or multiply"}

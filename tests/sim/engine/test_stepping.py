@@ -68,7 +68,7 @@ DIFFERENT = [
      (4, VECTOR - 3, [(4, 4)]), (3, VECTOR - 3, [(2, 2), (1, 1)]),
      (2, 3 * VECTOR - 4, [(1, 2), (1, 1)] * 2), (2, 4 * VECTOR, [(1, 4)] * 2)],
 )  # fmt: skip
-def test_what_one_program_steps_is_stepped_in_one_call(count, lanes, made, single, calls):
+def test_requests_of_one_program_share_calls(count, lanes, made, single, calls):
     # Vectors hold half as many numbers of twice the size.
     lanes = lanes if single else -(-lanes // 2)
     ask = [dict(how, lanes=lanes, single=single) for how in DIFFERENT[:count]]
@@ -105,7 +105,7 @@ def growing_asker(**how):
     return growing(asker(**how), lambda steps: 900 < steps.steps < 920)
 
 
-def test_one_that_goes_back_leaves_the_other_as_it_is(calls):
+def test_repeated_request_leaves_the_other_unchanged(calls):
     back = {"lanes": TWO - 1, "steps": (LONG, SHORT)}
     other = {"ratio": 0.3, "steps": (LONG,)}
     together = step_together([growing_asker(**back), asker(**other)])
@@ -138,7 +138,7 @@ def test_who_asks_for_nothing_is_done():
     lanes=st.integers(1, 100),
     single=st.booleans(),
 )
-def test_all_are_shared_out_and_no_core_is_left_without(kinds, cores, lanes, single):
+def test_requests_are_shared_among_all_cores(kinds, cores, lanes, single):
     lots = shared_out(kinds, cores, lanes, single)
     assert sorted(i for lot in lots for i in lot) == list(range(len(kinds)))
     assert all(lots)
@@ -168,5 +168,5 @@ def test_all_are_shared_out_and_no_core_is_left_without(kinds, cores, lanes, sin
         ("aaabbbcc", 2, TWO, [[0, 1], [3, 4], [6, 7], [2, 5]]),
     ],
 )
-def test_pairs_are_made_where_no_core_would_be_without(kinds, cores, lanes, lots):
+def test_pairs_form_only_when_cores_suffice(kinds, cores, lanes, lots):
     assert shared_out(kinds, cores, lanes) == lots

@@ -40,7 +40,7 @@ def test_both_units_have_the_same_topology():
     assert np.array_equal(adss.A != 0.0, edss.A != 0.0)
 
 
-def test_ratio_moves_play_from_gear_2_to_gear_1():
+def test_ratio_moves_backlash_between_gears():
     for ratio in (0.0, 0.25, 1.0):
         meshes = paper_drivetrain(ADSS, ratio).system().nonlinearities[:2]
         b_t = np.radians(ADSS.backlash.b_t_deg)
@@ -58,7 +58,7 @@ def oscillator():
     return assembly
 
 
-def test_two_inertias_and_a_geared_spring_by_hand():
+def test_two_inertias_and_geared_spring_by_hand():
     system = oscillator().build(output={"q": 1.0})
     assert system.states == ("q", "r", "q'", "r'")
     by_hand = [[0, 0, 1, 0], [0, 0, 0, 1], [-4, 12, 0, 0], [48, -144, 0, -0.5]]
@@ -78,7 +78,7 @@ def test_stored_energy_changes_by_damping_alone():
     assert power == pytest.approx(lost, abs=1e-9 * np.abs(system.energy).max())
 
 
-def test_a_mesh_enters_closed_with_a_law_that_takes_the_play_back_out():
+def test_mesh_is_closed_spring_less_backlash_law():
     assembly = oscillator()
     Mesh("m", {"q": 1.0, "r": -1.0}, 10.0, 0.1, c=0.5).enter(assembly)
     system = assembly.build(output={"q": 1.0})
@@ -112,7 +112,8 @@ def test_a_coordinate_given_twice_is_refused():
         Inertia("q", 1.0).enter(assembly)
 
 
-def test_drivetrain_elements_are_added_once_and_replaced_by_copy():
+def test_drivetrain_elements_are_unique_and_copied():
+    """An element is added once and replaced by a copy."""
     plain = paper_drivetrain(ADSS, 0.0)
     with pytest.raises(ValueError, match="rotor"):
         plain.adding(rotor=Inertia("th_m", 1.0))

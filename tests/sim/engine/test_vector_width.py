@@ -43,7 +43,7 @@ def stepped(wide):
     return run.stdout.split()
 
 
-def test_wide_and_narrow_vectors_give_the_same_to_the_last_bit():
+def test_wide_and_narrow_vectors_are_bit_equal():
     (wide, one), (narrow, other) = stepped(True), stepped(False)
     assert (wide, narrow) == ("64", "32")
     assert one == other
