@@ -34,7 +34,7 @@ def text(comment="", **changes):
         ("frequency_hz", 1e9, r"frequency_hz 1e\+09 is above the 1e\+07 Hz"),
     ],
 )
-def test_a_value_that_no_bench_has_is_refused_by_its_line(tmp_path, name, value, said):
+def test_implausible_value_is_refused_by_line(tmp_path, name, value, said):
     path = tmp_path / "slip.csv"
     path.write_text(text(**{name: value}))
     with pytest.raises(FileFormatError, match=rf"slip\.csv, line 4: {said}") as caught:
@@ -62,7 +62,7 @@ def test_what_lies_at_a_limit_is_read(tmp_path, name, bound):
         ("dc_offset_v = 1e9", r"dc_offset_v 1e\+09 is above the 1000 V"),
     ],
 )
-def test_so_is_one_that_stands_above_the_header(tmp_path, comment, said):
+def test_implausible_header_value_is_refused(tmp_path, comment, said):
     path = tmp_path / "slip.csv"
     path.write_text(text(f"# {comment}\n"))
     with pytest.raises(FileFormatError, match=rf"slip\.csv: {said}"):
@@ -73,7 +73,7 @@ def test_so_is_one_that_stands_above_the_header(tmp_path, comment, said):
     "changes",
     [{"gain": 1e11}, {"gain_std_db": 1e6}, {"source_vpk": 2e3}, {"dc_v": 1e4}, {"harmonic3": 1e11}],
 )
-def test_nothing_is_written_that_would_not_be_read(tmp_path, changes):
+def test_unreadable_values_are_not_written(tmp_path, changes):
     fields = {"frequency_hz": [100.0, 101.0], "source_vpk": 1.5, "gain": 0.5} | changes
     path = tmp_path / "x.csv"
     with pytest.raises(FileFormatError, match="can be believed"):
@@ -81,7 +81,7 @@ def test_nothing_is_written_that_would_not_be_read(tmp_path, changes):
     assert not path.exists()
 
 
-def test_a_point_that_is_lost_in_noise_is_no_slip(tmp_path):
+def test_point_lost_in_noise_is_plausible(tmp_path):
     """Of a hundred thousand readings of nothing, none is refused: chance errs by one in 1e8."""
     rng = np.random.default_rng(3)
     gain = 1e-7 * (rng.standard_normal((2, 100_000)).T @ [1.0, 1j])
@@ -97,7 +97,7 @@ def test_a_point_that_is_lost_in_noise_is_no_slip(tmp_path):
         assert disbelief(name, values) is None
 
 
-def test_what_other_programs_and_the_analyser_saved_is_held_to_the_same(tmp_path):
+def test_files_of_other_programs_have_same_bounds(tmp_path):
     path = tmp_path / "TRACE.DAT"
     path.write_bytes(replace(File(), gain=(1.0, 1j, 1e30, 1.0), y_code=4).content())
     with pytest.raises(FileFormatError, match=r"TRACE\.DAT, row 3, at 105 Hz: gain_db 600 is"):
@@ -111,7 +111,7 @@ def test_what_other_programs_and_the_analyser_saved_is_held_to_the_same(tmp_path
 
 
 @pytest.mark.parametrize("suffix", [".h5", ".mat", ".uff"])
-def test_what_was_stored_is_given_back_however_odd(tmp_path, suffix):
+def test_stored_odd_value_is_read_back(tmp_path, suffix):
     path = tmp_path / f"odd{suffix}"
     odd = measured()
     odd.gain[1] = 1e20

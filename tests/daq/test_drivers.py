@@ -52,7 +52,7 @@ def test_nobody_but_the_tables_names_an_instrument():
             assert not named, f"{path} imports {named}"
 
 
-def test_every_driver_has_a_simulated_instrument_of_its_kind():
+def test_every_driver_has_its_simulated_instrument():
     assert {model.scheme for model in models()} == {driver.scheme for driver in DRIVERS}
     for driver in DRIVERS:
         instrument = simulated(driver.scheme, LinearPlant(known_gain))
@@ -79,13 +79,13 @@ def test_an_instrument_is_known_by_its_identity(identity, scheme):
 
 
 @pytest.mark.parametrize("driver", DRIVERS, ids=lambda driver: driver.scheme or "preset")
-def test_an_adapter_talks_to_the_address_that_the_instrument_comes_with(driver):
+def test_adapter_uses_default_gpib_address(driver):
     lead = f"{driver.scheme}:" if driver.scheme else ""
     assert parse_instrument(f"{lead}prologix:COM3").gpib_address == driver.gpib_address
     assert parse_instrument(f"{lead}prologix-tcp:host:1234?addr=3").gpib_address == 3
 
 
-def test_there_is_one_preset_and_no_scheme_twice():
+def test_one_preset_and_unique_schemes():
     schemes = [driver.scheme for driver in DRIVERS]
     assert schemes.count("") == 1
     assert len(set(schemes)) == len(schemes)
@@ -97,19 +97,19 @@ def test_an_address_alone_is_for_the_preset(url):
     assert (driver.scheme, address) == ("", url.strip())
 
 
-def test_an_unknown_scheme_is_refused_with_those_there_are():
+def test_unknown_scheme_is_refused_with_known_ones():
     with pytest.raises(ConfigurationError, match="sim:, TCPIP"):
         open_analyser("frobnicator:GPIB0::11::INSTR")
 
 
 @pytest.mark.parametrize("url", ["sr785:", "sr785:foo", "SR785:sim:", "sr785:sr785:sim:"])
-def test_what_is_no_address_is_shown_whole_with_what_may_stand_before_it(url):
+def test_invalid_address_is_shown_with_valid_prefixes(url):
     with pytest.raises(ConfigurationError, match="before any of them may stand .*'sr785:'") as told:
         open_analyser(url)
     assert repr(url) in str(told.value)
 
 
-def test_it_opens_an_instrument_that_can_be_made_safe():
+def test_opened_instrument_can_be_made_safe():
     with served(linear_analyser(known_gain)) as url:
         analyser = open_analyser(url)
         try:
@@ -119,7 +119,7 @@ def test_it_opens_an_instrument_that_can_be_made_safe():
             analyser.close()
 
 
-def test_what_the_instrument_cannot_be_set_to_is_refused_for_its_address():
+def test_sweep_is_checked_against_addressed_instrument():
     check_sweep("sim:", SweepPlan((10.0, 20.0), (1.0,)), 10.0, (None, None))
     with pytest.raises(LimitError):
         check_sweep("sim:", SweepPlan((10.0, 20.0), (99.0,)), 10.0, (None, None))

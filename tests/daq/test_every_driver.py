@@ -79,7 +79,7 @@ def right(point, tolerance=1e-4):
     ],
     ids=["up", "down", "log", "one", "few", "any"],
 )
-def test_points_come_in_the_order_asked_for_and_are_right(driver, frequencies):
+def test_points_are_correct_in_requested_order(driver, frequencies):
     instrument, analyser = prepared(driver)
     points = list(analyser.sweep(frequencies))
     assert len(points) == len(frequencies)
@@ -138,7 +138,7 @@ def test_nothing_drives_before_it_was_allowed(driver):
 
 
 @every_driver
-def test_the_first_refusal_comes_before_the_first_volt(driver):
+def test_refusal_precedes_the_first_volt(driver):
     instrument, analyser = prepared(driver)
     seen = []
 
@@ -166,7 +166,7 @@ def test_leaving_a_sweep_early_stops_the_source(driver):
 
 @every_driver
 @pytest.mark.parametrize("taken", [0, 5, 17])
-def test_somebody_else_can_make_it_safe_at_any_moment(driver, taken):
+def test_second_client_can_make_safe_anytime(driver, taken):
     """As a watchdog does: over another wire, knowing nothing."""
     instrument, analyser = prepared(driver)
     points = analyser.sweep(GRID)
@@ -183,7 +183,7 @@ def test_somebody_else_can_make_it_safe_at_any_moment(driver, taken):
 
 
 @every_driver
-def test_what_cannot_be_read_is_unknown_and_never_raises(driver):
+def test_unreadable_source_is_unknown_without_raising(driver):
     instrument, analyser = prepared(driver, ["dropped-connection:point=1"])
     points = analyser.sweep(GRID)
     with pytest.raises(LashbenchError):
@@ -218,7 +218,7 @@ def test_settings_are_refused_whole_or_taken_whole(
 
 
 @every_driver
-def test_a_sweep_that_cannot_be_set_is_refused_before_anything_is_opened(driver):
+def test_impossible_sweep_is_refused_before_opening(driver):
     lead = f"{driver.scheme}:" if driver.scheme else ""
     check_sweep(f"{lead}sim:", PLAN, 10.0, (None, None))
     for plan, slew, ranges in (
@@ -237,7 +237,7 @@ def test_a_sweep_that_cannot_be_set_is_refused_before_anything_is_opened(driver)
     [(driver, other) for driver in DRIVERS for other in DRIVERS if driver is not other],
     ids=lambda driver: driver.scheme or "preset",
 )
-def test_who_gives_the_address_of_another_instrument_is_told_what_to_do(driver, other):
+def test_address_of_other_instrument_states_the_remedy(driver, other):
     instrument = simulated(other.scheme, LinearPlant(known_gain))
     analyser = driver.drive(Loopback(instrument))
     word = f"begins with '{other.scheme}:'" if other.scheme else f"has no '{driver.scheme}:'"
@@ -264,7 +264,7 @@ def run(session):
 
 
 @every_driver
-def test_a_session_measures_all_points_with_the_source_off_in_the_end(driver, store):
+def test_session_measures_all_points_source_ends_off(driver, store):
     instrument, analyser = bench(driver)
     events, error = run(Session(analyser, store, request(driver)))
     assert error is None
@@ -307,7 +307,7 @@ def shared_faults():
 
 @every_driver
 @pytest.mark.parametrize("fault", shared_faults())
-def test_a_fault_loses_nothing_and_leaves_nothing_on(driver, store, fault):
+def test_fault_loses_no_point_and_switches_off(driver, store, fault):
     instrument, analyser = bench(driver, [fault])
 
     def reopen():

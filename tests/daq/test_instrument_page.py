@@ -19,7 +19,7 @@ def gain(hz: float) -> complex:
     return 0.5 / (1 + 1j * hz / 100.0)
 
 
-def test_the_plain_script_measures_the_response_and_leaves_the_source_off(tmp_path):
+def test_documented_script_measures_with_source_off_afterwards(tmp_path):
     (script,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     path = tmp_path / "response.py"
     path.write_text(script)

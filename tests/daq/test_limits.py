@@ -46,7 +46,7 @@ def test_a_plan_at_every_bound_passes():
         ),
     ],
 )
-def test_everything_passed_is_named_with_who_sets_it(changes, faults):
+def test_exceeded_limits_are_named_with_origin(changes, faults):
     with pytest.raises(LimitError) as refusal:
         check_plan(plan(**changes), [BENCH, UNIT])
     assert refusal.value.exit_code == 5
@@ -91,7 +91,7 @@ def test_the_benches_that_come_along_are_whole():
         assert 0 < bounds.start_hz < bounds.stop_hz < math.inf
 
 
-def test_the_recipes_that_come_along_keep_their_own_limits_and_the_default_bench():
+def test_shipped_recipes_keep_own_and_bench_limits():
     names = config_names("recipes")
     assert {"adss", "edss"} <= set(names)
     for name in names:
@@ -199,7 +199,7 @@ def test_a_wrong_recipe_is_refused(tmp_path, old, new):
         load_recipe(str(path))
 
 
-def test_a_recipe_of_an_empty_band_makes_no_plan(tmp_path):
+def test_empty_band_makes_no_plan(tmp_path):
     path = tmp_path / "r.toml"
     path.write_text(RECIPE.replace("stop_hz = 200.0", "stop_hz = 50.0"))
     with pytest.raises(InputError, match="stop must lie above"):

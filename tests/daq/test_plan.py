@@ -8,7 +8,7 @@ from daq.errors import InputError
 from daq.plan import MOST_POINTS, spaced_frequencies
 
 
-def test_both_ends_are_included_and_steps_are_even():
+def test_both_ends_are_included_in_even_steps():
     assert spaced_frequencies(100.0, 140.0, 5) == (100.0, 110.0, 120.0, 130.0, 140.0)
     assert spaced_frequencies(1.0, 100.0, 3, "log") == pytest.approx((1.0, 10.0, 100.0))
     assert spaced_frequencies(120.0, 120.0, 1) == (120.0,)
@@ -24,7 +24,7 @@ def test_both_ends_are_included_and_steps_are_even():
         ((10.0, 20.0, 10**10), f"10000000000 points are more .* up to {MOST_POINTS}"),
     ],
 )
-def test_what_is_no_sweep_is_refused_at_once(band, said):
+def test_invalid_sweep_is_refused_at_once(band, said):
     began = time.monotonic()
     with pytest.raises(InputError, match=said):
         spaced_frequencies(*band)
@@ -32,5 +32,5 @@ def test_what_is_no_sweep_is_refused_at_once(band, said):
     assert time.monotonic() - began < 5.0
 
 
-def test_as_many_points_as_a_sweep_holds_are_laid_out():
+def test_largest_sweep_is_laid_out():
     assert len(spaced_frequencies(10.0, 20.0, MOST_POINTS)) == MOST_POINTS

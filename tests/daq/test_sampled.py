@@ -54,7 +54,7 @@ def test_the_sine_never_jumps_whatever_the_blocks(blocks, hz):
     assert np.abs(volts).max() <= 2.0 + 1e-9
 
 
-def test_a_level_moves_at_its_slew_and_reaches_zero_exactly():
+def test_level_follows_slew_rate_to_exact_zero():
     converter = StreamConverter("test", RATE, 10.0, (1.0, 1.0))
     converter.aim(1.0, 0.5, 10.0)
     made(converter, [480])
@@ -68,7 +68,7 @@ def test_a_level_moves_at_its_slew_and_reaches_zero_exactly():
     assert tail[-100:] == pytest.approx(0.0, abs=0.0)
 
 
-def test_a_recording_begins_with_its_step_and_has_what_was_asked_for():
+def test_recording_starts_with_step_and_requested_length():
     converter = StreamConverter("test", RATE, 1.0, (2.0, 3.0))
     converter.step(123.0, 1000)
     assert converter.recorded() == 0
@@ -114,7 +114,7 @@ def prepared(box, **changes):
     return analyser
 
 
-def test_level_and_phase_are_right_although_everything_comes_two_milliseconds_late():
+def test_delay_of_two_milliseconds_is_compensated():
     box = simulated("sampled", LinearPlant(known_gain))
     for point in prepared(box).sweep((60.0, 139.7, 140.3, 333.3, 499.0)):
         true = known_gain(point.frequency_hz)
@@ -125,7 +125,7 @@ def test_level_and_phase_are_right_although_everything_comes_two_milliseconds_la
     assert box.driven_v == 0.0
 
 
-def test_a_loop_back_that_is_missing_or_wrong_is_no_measurement():
+def test_missing_or_wrong_loop_back_is_refused():
     class Weak(LinearPlant):
         def dwell(self, *words):
             found = super().dwell(*words)
@@ -138,7 +138,7 @@ def test_a_loop_back_that_is_missing_or_wrong_is_no_measurement():
     assert box.driven_v == 0.0
 
 
-def test_a_servo_is_measured_as_by_the_analyser(tmp_path):
+def test_sampled_measurement_agrees_with_analyser(tmp_path):
     """ARF and RF of the same servo through both, within their own error bars."""
     found = []
     for url in ("sim:?ratio=0.3&seed=2", "sampled:sim:?ratio=0.3&seed=2"):
@@ -238,7 +238,7 @@ def test_a_sound_card_is_measured_with(card):
         ("sampled:nidaq:Dev1", LinkError, "needs nidaqmx"),
     ],
 )
-def test_a_device_that_cannot_be_had_is_one_line(card, url, fault, said):
+def test_missing_device_is_one_line(card, url, fault, said):
     with pytest.raises(fault, match=said) as told:
         open_analyser(url)
     assert "\n" not in str(told.value)

@@ -8,19 +8,19 @@ import pytest
 from daq.driving.variance import gain_standard_error, normalised_variance
 
 
-def test_it_is_the_scatter_of_one_cycle_relative_to_the_mean():
+def test_variance_is_single_cycle_relative_to_mean():
     cycles = np.array([2.0 + 0j, 2.0 + 2j, 2.0 - 2j, 2.0])
     assert normalised_variance(cycles) == pytest.approx((4 + 4) / 3 / 4)
     assert normalised_variance(5j * cycles) == pytest.approx(normalised_variance(cycles))
 
 
-def test_one_cycle_and_a_mean_of_zero_tell_nothing():
+def test_one_cycle_or_zero_mean_gives_zero():
     assert normalised_variance(np.array([1.0 + 0j])) == 0.0
     assert normalised_variance(np.array([1.0 + 0j, -1.0])) == 0.0
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_the_standard_error_covers_the_scatter_of_measured_gains(seed):
+def test_standard_error_covers_scatter_of_gains(seed):
     generator = np.random.default_rng(seed)
     n, runs, sigma_1, sigma_2, gain = 30, 2000, 0.02, 0.15, 0.4 * np.exp(1j)
 
@@ -48,11 +48,11 @@ def test_the_standard_error_covers_the_scatter_of_measured_gains(seed):
     ("one", "two", "cycles"),
     [(None, 0.1, 30), (0.1, None, 30), (-0.1, 0.2, 30), (0.0, 0.0, 30), (0.1, 0.1, 1)],
 )
-def test_what_cannot_be_known_is_not_made_up(one, two, cycles):
+def test_unknown_standard_error_is_none(one, two, cycles):
     assert gain_standard_error(one, two, cycles) is None
 
 
-def test_a_clean_source_is_no_reason_to_know_nothing():
+def test_zero_source_variance_still_gives_error():
     gain_std_db, phase_std_deg = gain_standard_error(0.0, 0.06, 30)
     assert gain_std_db == pytest.approx(8.685889638 * math.sqrt(0.06 / 60))
     assert phase_std_deg == pytest.approx(math.degrees(math.sqrt(0.06 / 60)))

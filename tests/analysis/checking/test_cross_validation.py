@@ -19,7 +19,7 @@ HALF, TRUE = ROWS // 2, ("load-inertia",)
     ("middle", "std"),
     [((0.5,), (0.05,)), ((0.3,), (0.1,)), ((0.4, 0.6), (0.08, 0.04)), ((0.5, 0.5), (0.02, 0.1))],
 )
-def test_places_of_a_walk_are_believed_as_a_bell_says(middle, std):
+def test_walk_posterior_matches_a_gaussian(middle, std):
     """Mean and standard deviation of a Gaussian, from the weights alone."""
     surface = candidate(observation(np.zeros((3, ROWS))), ("load-inertia",)[: len(middle) - 1])
     surface = surface.surface
@@ -39,7 +39,7 @@ def test_places_of_a_walk_are_believed_as_a_bell_says(middle, std):
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_what_the_other_levels_leave_open_is_no_miss(seed, monkeypatch):
+def test_uncertainty_of_other_levels_is_no_miss(seed, monkeypatch):
     """The low level says everything of the ratio, the high one nothing, and is true to it."""
     slope = synthetic.RATIO_SLOPE.copy()
     slope[:, :HALF] *= 8.0
@@ -68,7 +68,7 @@ def test_what_no_place_predicts_is_a_miss(seed):
     assert hold_out(candidate(honest, seed=seed), honest).rms_sigma < 1.3
 
 
-def test_each_level_is_predicted_by_a_fit_that_has_not_seen_it():
+def test_each_level_is_predicted_when_held_out():
     observed = observation(read(TRUE, np.array([0.5, 0.5]), np.random.default_rng(2)))
     spoilt = observed.values.copy()
     high = observed.source_vpk == LEVELS[1]
@@ -90,7 +90,7 @@ def test_each_level_is_predicted_by_a_fit_that_has_not_seen_it():
         ([(0, 12)], [(0, 12)], [(0, 6), (6, 12)]),
     ],
 )
-def test_what_is_kept_away_is_a_level_else_a_sweep_else_half_a_band(levels, blocks, folds):
+def test_folds_are_levels_sweeps_or_half_bands(levels, blocks, folds):
     found = module._folds(swept(levels, blocks, ["up"] * len(blocks)))
     assert [fold for fold, _ in found] == [slice(*ends) for ends in folds]
     for fold, rows in found:
@@ -134,9 +134,8 @@ def swept(levels, blocks, directions):
         ),
     ],
 )  # fmt: skip
-def test_where_sweeps_went_both_ways_neither_the_level_nor_the_way_was_seen(
-    blocks, directions, rows
-):
+def test_two_way_sweeps_hold_out_both_folds(blocks, directions, rows):
+    """Neither the level nor the direction of a fold was seen."""
     levels = [(0, 4), (4, 8), (8, 12)]
     found = module._folds(swept(levels, blocks, directions))
     assert [fold for fold, _ in found] == [slice(*ends) for ends in blocks]
@@ -144,7 +143,7 @@ def test_where_sweeps_went_both_ways_neither_the_level_nor_the_way_was_seen(
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_jump_between_branches_is_no_miss_and_a_resonance_is(seed):
+def test_branch_jump_is_tolerated_resonance_is_not(seed):
     rng = np.random.default_rng(seed)
     z = np.clip(0.8 * rng.standard_normal((3, 183)), -2.5, 2.5)
     jump, resonance = z.copy(), z.copy()

@@ -42,11 +42,11 @@ def believed(effects, values=None):
         (AMID, HEAVY, False), (AMID, BRAKED, False), (AMID, TIED, False),
     ],
 )  # fmt: skip
-def test_a_payload_is_another_cause_far_from_what_was_measured_alone(payload, other, alike):
+def test_payload_is_equivalent_only_within_range(payload, other, alike):
     assert is_equivalent_at_load(believed(SWINGING, payload), believed(other)) is alike
 
 
-def test_a_damped_heavier_load_equals_a_damped_payload():
+def test_damped_heavier_load_equals_damped_payload():
     heavy = believed(tuple(sorted(HEAVY + BRAKED)))
     swinging = Hypothesis(ADSS, tuple(sorted(SWINGING + BRAKED)))
     values = {"B_L": 0.2, "J_p": 0.2 * J_L, "f_p": 5.0 * HIGH, "zeta_p": 0.02}
@@ -56,7 +56,7 @@ def test_a_damped_heavier_load_equals_a_damped_payload():
 
 
 @pytest.mark.parametrize("extra", [("amplifier-gain",), ("load-coulomb-friction",)])
-def test_what_is_not_at_the_load_must_be_the_same(extra):
+def test_causes_beyond_load_must_be_equal(extra):
     known = {"k_a": 4.5, "T_f_L": 0.05}
     with_extra = Hypothesis(ADSS, tuple(sorted(SWINGING + extra)))
     sizes = dict(zip(["J_p", "f_p", "zeta_p"], FAR_ABOVE, strict=True)) | known
@@ -65,13 +65,13 @@ def test_what_is_not_at_the_load_must_be_the_same(extra):
     assert not is_equivalent_at_load(one, believed(HEAVY))
 
 
-def test_nothing_is_like_a_set_with_as_many_sizes():
+def test_sets_with_equal_sizes_are_not_equivalent():
     assert not is_equivalent_at_load(believed(HEAVY), believed(HEAVY))
     assert not is_equivalent_at_load(believed(BRAKED), believed(HEAVY))
 
 
 @pytest.mark.parametrize(("alike", "rivals"), [(True, []), (False, [SWINGING])])
-def test_what_says_the_same_with_more_sizes_is_no_rival_and_marked_so(monkeypatch, alike, rivals):
+def test_larger_equivalent_set_is_marked_not_rival(monkeypatch, alike, rivals):
     verdict = standing([(BRAKED, 0.0), (SWINGING, -10.0), ((), -300.0)])
     payload = verdict.judged[1]
     monkeypatch.setattr(
@@ -88,9 +88,7 @@ def test_what_says_the_same_with_more_sizes_is_no_rival_and_marked_so(monkeypatc
     ("behind", "alike", "named"),
     [(19.0, True, BRAKED), (21.0, True, SWINGING), (19.0, False, SWINGING)],
 )
-def test_the_simpler_of_two_that_say_the_same_is_named_where_they_tie(
-    monkeypatch, behind, alike, named
-):
+def test_simpler_equivalent_set_is_named_in_tie(monkeypatch, behind, alike, named):
     monkeypatch.setattr(
         rules,
         "is_equivalent_at_load",

@@ -20,9 +20,7 @@ def seen(effects, seed):
     ("missed", "share", "alike", "asked"),
     [(0.1, 0.0, True, 1), (0.1, 0.03, True, 2), (9.0, 0.0, False, 48), (0.1, 1.0, False, 48)],
 )
-def test_own_runs_are_asked_about_other_levels_until_they_decide(
-    missed, share, alike, asked, monkeypatch
-):
+def test_replicates_are_drawn_until_decisive(missed, share, alike, asked, monkeypatch):
     """Own runs miss other levels by one standard deviation or so: never by 0.1 or 9."""
     count, held_out = [], adequacy.hold_out_surface
     monkeypatch.setattr(
@@ -35,7 +33,7 @@ def test_own_runs_are_asked_about_other_levels_until_they_decide(
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_an_observation_like_own_runs_is_adequate_and_another_is_not(seed):
+def test_observation_like_replicates_is_adequate(seed):
     fitting = seen(TRUE, seed)
     rng = np.random.default_rng(seed)
     # Twelve draws of about a standard normal: above 3.5 once in 400 of such tests.
@@ -45,7 +43,7 @@ def test_an_observation_like_own_runs_is_adequate_and_another_is_not(seed):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_only_misfit_at_the_lowest_level_is_credited(seed, monkeypatch):
+def test_only_lowest_level_misfit_is_credited(seed, monkeypatch):
     """What is asked is the misfit at all levels, and that at all but the lowest."""
     asked = []
     monkeypatch.setattr(adequacy, "credited", lambda *both: asked.append(both) or -7.0)
@@ -62,9 +60,7 @@ def test_only_misfit_at_the_lowest_level_is_credited(seed, monkeypatch):
 
 
 @pytest.mark.parametrize("comparable", [0, 1])
-def test_where_every_run_did_alone_what_it_did_nothing_speaks_against_the_observation(
-    comparable, monkeypatch
-):
+def test_incomparable_replicates_do_not_reject_observation(comparable, monkeypatch):
     """Two short sweeps of a cable at one level had no run that others did as; it was no error.
 
     One run has no scatter, by which anything would be far off.
@@ -83,7 +79,7 @@ def test_where_every_run_did_alone_what_it_did_nothing_speaks_against_the_observ
     # By chance two less to two more than a mean in this world.
     [(0.0, -1.0, 0.4), (1.0, -1.0, 0.2), (6.0, -1.0, 0.0), (6.0, 4.0, 0.2), (6.0, -99.0, 0.0)],
 )
-def test_a_gain_is_held_against_what_own_runs_bring_by_chance(monkeypatch, ahead, mean, share):
+def test_gain_is_compared_with_chance_of_replicates(monkeypatch, ahead, mean, share):
     def standing(likelihood):
         best = SimpleNamespace(log_likelihood=likelihood, place=None)
         climbs = SimpleNamespace(climb=lambda place, tries: best)

@@ -46,7 +46,7 @@ def test_noise_leaves_as_much_as_noise():
     assert np.sum(np.array(left) > 2.5) <= 7
 
 
-def test_a_band_that_leans_is_seen_where_a_sum_over_points_sees_little():
+def test_systematic_band_is_seen_despite_small_sum():
     """The lower half of every level leans by less than a point's scatter.
 
     Seen in eight draws of ten: fewer than 18 of 30 have a probability of 0.3 %.
@@ -64,14 +64,14 @@ def test_a_band_that_leans_is_seen_where_a_sum_over_points_sees_little():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_levels_that_lean_against_each_other_are_seen_too(seed):
+def test_opposite_band_deviations_are_seen_too(seed):
     one, *own = noise(np.random.default_rng(seed), 49)
     leaning = one.residual.copy()
     leaning[1] += np.where(np.arange(ROWS) < 122, 0.02, -0.01)
     assert judge_structure(fit(leaning), own, SEEN, NONE) > 2.5
 
 
-def test_a_late_jump_is_chance_at_the_lowest_level_and_nowhere_else():
+def test_late_jump_is_chance_at_lowest_level():
     """Ten points after it are off by twice their scatter, all to one side; medians of eleven draws.
 
     Single ones scatter by one or so: these by 0.4, and each limit is four of that away.
@@ -88,7 +88,7 @@ def test_a_late_jump_is_chance_at_the_lowest_level_and_nowhere_else():
     assert min(higher) > 3.0
 
 
-def test_the_only_level_has_no_credit_and_the_lowest_has_its_limits():
+def test_credit_needs_several_levels_and_is_bounded():
     alone = SimpleNamespace(blocks=(slice(0, ROWS),), levels=(slice(0, ROWS),))
     one, *own = noise(np.random.default_rng(6), 49)
     jumped = one.residual.copy()
@@ -102,11 +102,11 @@ def test_the_only_level_has_no_credit_and_the_lowest_has_its_limits():
     ("everywhere", "elsewhere", "counts"),
     [(1.0, 3.0, 1.0), (4.0, 0.5, 0.5), (4.0, 3.0, 3.0), (9.0, 0.5, 4.0), (-1.0, -3.0, -3.0)],
 )
-def test_a_credit_only_forgives_and_not_without_end(everywhere, elsewhere, counts):
+def test_credit_only_reduces_within_bounds(everywhere, elsewhere, counts):
     assert credited(everywhere, elsewhere) == counts
 
 
-def test_what_own_runs_leave_as_well_is_no_structure():
+def test_structure_in_replicates_is_no_structure():
     rng = np.random.default_rng(1)
     lean = np.zeros((3, ROWS))
     lean[0, :30] = 0.05
@@ -127,7 +127,7 @@ def test_datasheet_values_count_as_they_are_improbable(off):
         assert judge_structure(leant, own, SEEN, SIGMAS) > -7.1
 
 
-def test_what_was_not_observed_is_left_out_and_one_point_makes_no_band():
+def test_unobserved_points_and_single_points_are_omitted():
     one, *own = noise(np.random.default_rng(3), 49)
     known = judge_structure(one, own, SEEN, NONE)
     spoilt = one.residual.copy()

@@ -18,9 +18,9 @@ PAIR = ("amplifier-gain", "cable-stiffness")
     ("size", "lost", "pressed"),
     [(0.93, 29.0, True), (0.93, 31.0, False), (0.84, 0.0, False), (0.99, 29.0, True)],
 )
-def test_a_datasheet_value_that_may_be_half_or_twice_is_no_explanation(
-    size, lost, pressed, mirrored
-):
+def test_half_or_twice_datasheet_explains_nothing(size, lost, pressed, mirrored):
+    """For values that may be that far off anyway."""
+
     def fit(place):
         return SimpleNamespace(place=place, log_likelihood=-lost if place[1] in (0.0, 1.0) else 0.0)
 
@@ -55,7 +55,7 @@ def off_by(effects, off, steep):
         ("filter-corner", 0.051, False), ("amplifier-gain", 0.028, False),
     ],
 )  # fmt: skip
-def test_a_corner_is_as_good_as_its_capacitors(effect, off, within):
+def test_filter_corner_has_tolerance_of_capacitors(effect, off, within):
     one = off_by((effect,), off, 1e6)
     assert one.hypothesis.within_tolerance(one.best.place) == [within]
 
@@ -76,7 +76,7 @@ def test_a_corner_is_as_good_as_its_capacitors(effect, off, within):
     ],
 )
 @pytest.mark.parametrize("beside", [(), ("amplifier-lag",), ("load-inertia",)])
-def test_a_resonance_far_outside_what_was_measured_is_out_of_sight(beside, resonance_hz, beyond):
+def test_resonance_far_outside_band_is_rejected(beside, resonance_hz, beyond):
     hypothesis = Hypothesis(ADSS, tuple(sorted((*beside, "payload-flexibility"))))
     sizes = {"J_p": 5e-4, "f_p": resonance_hz, "zeta_p": 0.03, "tau_a": 3e-4, "J_L": 3e-3}
     values = [sizes[parameter.name] for _, parameter in hypothesis.parameters]
@@ -87,7 +87,7 @@ def test_a_resonance_far_outside_what_was_measured_is_out_of_sight(beside, reson
     assert is_out_of_sight(one) is beyond
 
 
-def test_what_has_no_resonance_is_never_out_of_sight():
+def test_effect_without_resonance_is_never_outside_band():
     one = off_by(PAIR, 0.2, 0.0)
     one.surface.observation = SimpleNamespace(frequency_hz=np.array([1e4, 2e4]))
     assert not is_out_of_sight(one)

@@ -18,9 +18,7 @@ THREE = (*TRUE, *WRONG, "shaft-damping")
     [(1.0, 400.0, True), (1.0, 200.0, False), (0.97, 400.0, False), (0.0, -400.0, True),
      (0.01, -400.0, True), (0.03, -400.0, False), (0.5, 400.0, False)],
 )  # fmt: skip
-def test_a_size_that_wants_to_be_beyond_its_range_is_no_explanation(
-    monkeypatch, size, steep, pressed
-):
+def test_size_at_range_end_is_rejected(monkeypatch, size, steep, pressed):
     def fit(place):
         # Falls off inwards by the heat of 15 within 0.05, or by less.
         return SimpleNamespace(place=place, log_likelihood=steep * place[1])
@@ -49,9 +47,7 @@ def test_a_size_that_wants_to_be_beyond_its_range_is_no_explanation(
         (TRUE + WRONG, 1.6, 1.0, False), (THREE, 0.9, 0.0, True), (THREE, 1.1, 1.0, False),
     ],
 )  # fmt: skip
-def test_what_misses_other_levels_or_fits_worse_must_have_own_runs_that_do(
-    effects, missed, share, adequate, monkeypatch
-):
+def test_rejection_compares_misses_with_replicates(effects, missed, share, adequate, monkeypatch):
     monkeypatch.setattr(objection, "is_out_of_sight", lambda _: False)
     monkeypatch.setattr(objection, "misses_alike", lambda one, held, least, rng: share > least)
     best = SimpleNamespace(place=np.full(1 + len(effects), 0.5))

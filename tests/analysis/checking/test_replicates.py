@@ -40,12 +40,12 @@ def test_replicates_show_stated_errors_that_scatter(seed):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_replicates_show_the_noise_of_the_observation_at_their_quietest(seed):
+def test_replicates_show_observed_noise_when_quiet(seed):
     shown = [estimate_noise(np.sqrt(2.0) * one) for one in replicated(0.0, seed)]
     assert np.median(shown) == pytest.approx(1.0, abs=0.02)
     # The noise is then louder than its estimate, as it is on a bench.
     assert np.median(replicated(0.0, seed)) > 1.15
 
 
-def test_motion_that_scatters_is_left_as_it_was_simulated():
+def test_scattering_motion_is_not_altered():
     np.testing.assert_allclose(replicated(1e6, 1), np.sqrt(5e5), rtol=1e-4)

@@ -53,7 +53,8 @@ def test_nothing_is_blamed_where_nothing_is_hidden(cache):
 
 
 @pytest.mark.study
-def test_a_cause_that_is_taken_out_is_not_blamed_with_confidence_on_another(cache):
+def test_withheld_cause_is_not_confidently_replaced(cache):
+    """The response hides a cause that the catalogue lacks."""
     text = "filter-corner:scale=0.6"
     found = diagnose_response(
         response_hiding([text], 5), ADSS, without=("filter-corner",), cache=cache
@@ -71,13 +72,13 @@ SEEN_UNEXPLAINED = (316,)
 
 @pytest.mark.study
 @pytest.mark.parametrize("seed", [*SEEN_BLAMED, *SEEN_UNEXPLAINED])
-def test_plain_units_that_once_misled_it_are_consistent(seed, cache):
+def test_plain_units_once_misjudged_are_consistent(seed, cache):
     found = diagnose_response(response_hiding([], seed), ADSS, cache=cache)
     assert (found.verdict.word, found.causes) == ("consistent", ())
 
 
 @pytest.mark.study
-def test_two_large_causes_are_named_as_a_pair(cache):
+def test_two_large_causes_are_named_together(cache):
     texts = ["amplifier-lag:tau_a=0.002", "load-inertia:J_L=0.0040"]
     found = diagnose_response(response_hiding(texts, 8, ratio=0.4), ADSS, cache=cache)
     first = found.verdict.judged[0].effects
@@ -89,7 +90,8 @@ def test_two_large_causes_are_named_as_a_pair(cache):
 
 
 @pytest.mark.study
-def test_one_level_without_phase_still_gets_a_verdict_and_asks_for_more(cache):
+def test_one_level_without_phase_gets_verdict(cache):
+    """The answer asks for another measurement."""
     plan = SweepPlan(SHORT.frequencies_hz[::2], (2.5,))
     whole = response_hiding(["load-inertia:J_L=0.0045"], 2, plan)
     poor = type(whole).from_arrays(
@@ -121,7 +123,7 @@ def test_practice_sets_of_another_program(number, tmp_path, practice_cache):
 
 
 @pytest.mark.study
-def test_a_practice_set_with_half_of_its_points(tmp_path, practice_cache):
+def test_practice_set_with_half_its_points(tmp_path, practice_cache):
     response = read_response(PRACTICE / "practice-12.csv")
     frequencies = np.unique(response.frequency_hz)[::2]
     half = response.take(np.isin(response.frequency_hz, frequencies))
@@ -177,7 +179,7 @@ def practice_cache(tmp_path_factory):
 
 
 @pytest.mark.study
-def test_a_sweep_with_an_offset_is_diagnosed_together_with_what_it_follows(cache):
+def test_offset_sweep_is_diagnosed_with_its_predecessor(cache):
     """A cable of 900 N.m/rad at one level: each sweep alone is short, and leans or does not."""
     text, frequencies = "cable-stiffness:K_c=900", spaced_frequencies(105.0, 172.0, 16)
     rng = np.random.default_rng(4)

@@ -29,7 +29,7 @@ def proposed(judge, rivals=(SECOND,)):
     return propose_measurement(ADSS, FIRST, rivals, SEEN, separate=counted), tried
 
 
-def test_every_plan_lies_within_the_limits_and_the_choice_is_wide():
+def test_proposed_plans_vary_within_the_limits():
     _, tried = proposed(lambda plan: 1.0)
     for plan in tried:
         assert plan.levels_vpk[0] + abs(plan.dc_offset_v) <= ADSS.limits.source_vpk
@@ -51,7 +51,7 @@ def test_every_plan_lies_within_the_limits_and_the_choice_is_wide():
         ((900.0, 1000.0), (1.0, 4.0), 0),
     ],
 )
-def test_what_was_measured_beyond_the_limits_is_answered_within_them(band_hz, levels_vpk, plans):
+def test_measurement_beyond_limits_gets_plan_within(band_hz, levels_vpk, plans):
     beyond = SimpleNamespace(
         frequency_hz=np.array(band_hz), source_vpk=np.array(levels_vpk),
         plans=SEEN.plans, noise_v=SEEN.noise_v,
@@ -69,14 +69,14 @@ def test_what_was_measured_beyond_the_limits_is_answered_within_them(band_hz, le
         assert plan.frequencies_hz[-1] <= ADSS.limits.stop_hz
 
 
-def test_the_plan_that_parts_them_furthest_is_taken():
+def test_most_separating_plan_is_proposed():
     found, _ = proposed(lambda plan: 5.0 if plan.dc_offset_v else 1.0)
     assert found.plan.dc_offset_v > 0.0
     assert found.expected_sigma == 5.0
     assert found.separates == ("load-inertia", "shaft-stiffness")
 
 
-def test_a_cheaper_plan_that_does_nearly_as_well_is_preferred():
+def test_cheaper_plan_of_similar_power_is_preferred():
     found, tried = proposed(lambda plan: 4.0 - 1e-3 * plan.duration_s)
     assert found.plan.duration_s == min(plan.duration_s for plan in tried)
 
@@ -97,7 +97,7 @@ THIRD = candidate(SEEN, ("amplifier-gain",))
         ([1.0, 1.9], [1.5, 0.5], "amplifier-gain", 1.9, 1.0, True),
     ],
 )
-def test_of_several_rivals_the_one_that_is_hardest_to_tell_decides(
+def test_least_separated_rival_decides_the_plan(
     monkeypatch, offset, down, separates, sigma, other, takes_offset
 ):
     def judge(plan):
@@ -118,7 +118,7 @@ def test_of_several_rivals_the_one_that_is_hardest_to_tell_decides(
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.5])
-def test_measure_takes_the_plan_as_it_is_printed(offset):
+def test_measure_accepts_the_printed_plan(offset):
     from tui.cli import build_app
 
     plan = SweepPlan(tuple(np.linspace(80.0, 200.0, 31)), (0.75,), "down", dc_offset_v=offset)
@@ -136,7 +136,7 @@ def test_measure_takes_the_plan_as_it_is_printed(offset):
     ("unit", "given"),
     [("EDSS", "edss"), ("My Gimbal", "My Gimbal"), ("my units/it's.toml", "my units/it's.toml")],
 )
-def test_the_unit_is_printed_as_a_shell_reads_it(unit, given):
+def test_printed_unit_is_quoted_for_shell(unit, given):
     plan = SweepPlan(tuple(np.linspace(80.0, 200.0, 31)), (0.75,))
     words = shlex.split(NextMeasurement(unit, plan, ("a", "b"), 3.0).command)
     assert words[words.index("--unit") + 1] == given
@@ -159,7 +159,7 @@ def test_simulation_separates_models_that_differ():
     assert apart(0, 0, 0) == [0.0, 0.0]
 
 
-def test_every_plan_is_judged_by_the_same_machines():
+def test_all_plans_are_judged_by_same_machines():
     """Or plans would differ by the machines that were drawn for them."""
     asked = []
 

@@ -21,9 +21,7 @@ from analysis.diagnosis.figures import residual_figure
         ((), ("load-inertia",), None, "consistent, nothing named"),
     ],
 )
-def test_residuals_are_drawn_of_the_plain_model_and_of_what_stands_first(
-    monkeypatch, hidden, judged, label, title
-):
+def test_residual_figure_shows_plain_and_first_model(monkeypatch, hidden, judged, label, title):
     found = makings.diagnosis(monkeypatch, hidden, [judged])
     figure = residual_figure(found)
     panel = figure.axes[0]

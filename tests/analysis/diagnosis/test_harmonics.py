@@ -35,7 +35,7 @@ def compared(*responses, seed=2, noise_v=5e-5):
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_a_machine_like_the_model_has_harmonics_as_simulated(seed):
+def test_harmonics_of_plain_machine_agree_with_simulation(seed):
     """One in some five hundred is beyond four standard deviations of twelve machines."""
     found = compared(measured(seed=seed))
     assert {one.number for one in found} <= {2, 3}
@@ -45,7 +45,7 @@ def test_a_machine_like_the_model_has_harmonics_as_simulated(seed):
     assert "odd ones as simulated" in describe_harmonics(found)
 
 
-def test_an_amplifier_that_gives_more_one_way_shows_in_even_ones():
+def test_asymmetric_amplifier_shows_in_even_harmonics():
     found = compared(measured("amplifier-unevenness:scale=1.5"))
     even = [one for one in found if one.parity == "even"]
     assert even
@@ -55,7 +55,7 @@ def test_an_amplifier_that_gives_more_one_way_shows_in_even_ones():
     assert said.endswith(": something acts more one way than the other")
 
 
-def test_clipping_shows_in_odd_harmonics_at_its_level():
+def test_clipping_shows_in_odd_harmonics_when_clipping():
     found = compared(measured("amplifier-saturation:V_sat=8"))
     odd = {one.source_vpk: one for one in found if one.parity == "odd"}
     assert odd[4.0].differs
@@ -65,14 +65,15 @@ def test_clipping_shows_in_odd_harmonics_at_its_level():
         assert said.endswith(": something limits, rubs or gives alike both ways")
 
 
-def test_a_harmonic_that_drowns_in_the_readings_noise_is_not_told():
+def test_harmonic_below_noise_is_not_reported():
     response = measured("amplifier-unevenness:scale=1.5")
     quiet = replace(response, harmonic2=response.harmonic2 * 1e-4)
     assert {one.number for one in compared(quiet)} == {3}
     assert compared(response, noise_v=1.0) == ()
 
 
-def test_a_response_without_harmonics_is_said_to_have_none_and_nothing_is_simulated():
+def test_response_without_harmonics_simulates_nothing():
+    """It is stated to have none."""
     response = measured()
     nothing = np.full(len(response), np.nan + 0j)
     with counting() as effort:
@@ -81,14 +82,14 @@ def test_a_response_without_harmonics_is_said_to_have_none_and_nothing_is_simula
     assert describe_harmonics(()).startswith("the response holds none above its noise")
 
 
-def test_each_of_several_sweeps_is_held_against_its_own():
+def test_each_sweep_has_its_own_harmonics_reference():
     high = replace(PLAN, levels_vpk=(3.0,), direction="down")
     found = compared(measured(), measured(plan=high))
     assert {one.source_vpk for one in found if one.number == 3} == {2.5, 3.0, 4.0}
     assert not any(one.differs for one in found)
 
 
-def test_a_row_without_a_harmonic_is_left_out_and_no_other():
+def test_only_row_without_harmonic_is_omitted():
     response = measured("amplifier-unevenness:scale=1.5")
     third = response.harmonic3.copy()
     third[3] = np.nan
@@ -104,7 +105,7 @@ def test_a_row_without_a_harmonic_is_left_out_and_no_other():
     assert lower.simulated != higher.simulated
 
 
-def test_a_harmonic_tells_of_itself_what_a_document_holds():
+def test_harmonic_converts_to_its_document():
     one = Harmonic(2, 1.5, 0.02, 0.01, 6.0)
     assert one.to_json() == {
         "harmonic": 2, "parity": "even", "source_vpk": 1.5, "measured_share": 0.02,

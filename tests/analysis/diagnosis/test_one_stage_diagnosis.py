@@ -11,7 +11,7 @@ from sim.unit import load_unit
 
 
 @pytest.mark.slow
-def test_a_heavier_load_is_named_and_sized_on_one_stage(tmp_path):
+def test_heavier_load_is_found_on_one_stage(tmp_path):
     unit = load_unit(str(config_path("templates", "one-stage")))
     plan = SweepPlan(
         spaced_frequencies(30.0, 150.0, 14, "log"), (1.5, 4.0), settle_cycles=4, integrate_cycles=6

@@ -37,7 +37,7 @@ def test_predictions_leave_what_the_residuals_say(explained):
     assert size["datasheet"] == pytest.approx(2.75e-3)
 
 
-def test_a_stored_prediction_of_another_shape_is_refused(explained):
+def test_stored_prediction_of_wrong_shape_is_refused(explained):
     document = json.loads(json.dumps(explained.to_json()))
     assert fault_of("diagnosis", document) == ""
     document["prediction"]["baseline"]["gain_db"].pop()

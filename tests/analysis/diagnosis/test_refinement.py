@@ -58,7 +58,7 @@ def test_a_sharp_answer_costs_nothing_more():
 
 
 @pytest.mark.parametrize("scatter", [0.6, 0.7])
-def test_it_stops_as_soon_as_the_answer_is_sharp(scatter):
+def test_refinement_stops_at_sharp_answer(scatter):
     looking, told = Looking(scatter), []
     before, after = stds(looking.before()), stds(looking.after(told.append))
     assert looking.world.rounds == [ROUND]
@@ -67,7 +67,7 @@ def test_it_stops_as_soon_as_the_answer_is_sharp(scatter):
     assert len(told) == 1
 
 
-def test_a_ratio_that_is_hardly_known_gets_all_rounds_but_no_more():
+def test_uncertain_ratio_uses_all_rounds_only():
     looking, told = Looking(scatter=10.0), []
     assert stds(looking.after(told.append))[0] > 0.025
     assert looking.world.rounds == [ROUND] * 12
@@ -75,7 +75,7 @@ def test_a_ratio_that_is_hardly_known_gets_all_rounds_but_no_more():
     assert told[-1] == 1.0
 
 
-def test_runs_that_lie_close_together_are_not_believed():
+def test_closely_spaced_runs_widen_the_posterior():
     """However sharp the answer: what is learned is never more wrong than the runs are apart."""
     looking = Looking(scatter=0.1)
     sizes = np.linspace(0.495, 0.505, 4)[:, None]
@@ -90,7 +90,7 @@ def test_runs_that_lie_close_together_are_not_believed():
 
 
 @pytest.mark.parametrize(("share", "rounds"), [(0.42, 3), (2.5, 1), (1e-9, 12)])
-def test_it_takes_no_more_motion_than_it_may(share, rounds):
+def test_refinement_keeps_its_simulation_budget(share, rounds):
     """A round that is begun is finished; what was simulated before does not count."""
 
     class Slow(synthetic_runs.World):
@@ -107,7 +107,7 @@ def test_it_takes_no_more_motion_than_it_may(share, rounds):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_further_runs_bring_the_answer_no_farther_from_the_truth(seed):
+def test_more_runs_do_not_worsen_the_answer(seed):
     looking = Looking(scatter=1.0, seed=seed)
     before, after = looking.before(), looking.after()
     # Four draws of two numbers: one beyond 3.5 sigma in 250 runs of this test.

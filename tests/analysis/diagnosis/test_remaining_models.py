@@ -38,7 +38,7 @@ def left(found, **changes):
     return find_remaining_models(verdict, sized, PLAIN, found.observation, np.random.default_rng(1))
 
 
-def test_an_explained_document_tells_the_backlash_that_goes_with_its_ratio(explained):
+def test_explained_document_states_backlash_of_its_ratio(explained):
     document = explained.to_json()
     ratio, (model,) = document["contribution_ratio"]["extended"], document["models"]
     b_t, n = ADSS.backlash.b_t_deg, ADSS.output_ratio
@@ -62,7 +62,7 @@ def test_a_consistent_document_tells_the_plain_model(consistent):
     assert document["b1_deg"]["value"] == document["models"][0]["b1_deg"]["value"]
 
 
-def test_what_is_likely_all_the_same_stays_beside_the_plain_model(consistent):
+def test_likely_adequate_model_remains_beside_plain_model(consistent):
     (other,) = (one for one in consistent.verdict.judged if one.effects)
     plain = consistent.verdict.baseline
     for probability, objection, kept in ((0.3, "", 1), (0.3, "unlike", 0), (0.01, "", 0)):
@@ -71,7 +71,7 @@ def test_what_is_likely_all_the_same_stays_beside_the_plain_model(consistent):
         assert [model.causes for model in models] == [(), *[one.effects] * kept]
 
 
-def test_every_rival_of_a_tie_is_sized_and_none_is_accepted(explained):
+def test_tied_models_are_sized_and_none_accepted(explained):
     also = tuple(one for one in explained.verdict.judged if one.effects in (STIFF, ()))
     models = left(explained, word="ambiguous", also=also)
     assert {model.causes for model in models[1:]} >= {STIFF, ()}
@@ -86,7 +86,7 @@ def test_every_rival_of_a_tie_is_sized_and_none_is_accepted(explained):
     assert "plain model (probability" in told
 
 
-def test_what_is_likely_is_left_by_a_tie_though_it_is_no_rival(explained):
+def test_likely_model_remains_in_tie_without_rival(explained):
     best, *others = explained.verdict.judged
     (stiff,) = (one for one in others if one.effects == STIFF)
     for probability, kept in ((0.08, [LOAD, STIFF]), (0.02, [LOAD])):

@@ -10,7 +10,7 @@ from worlds.synthetic import LEVELS, ROWS, candidate, observation, read
 from analysis.diagnosis.residuals import Residual, describe_residuals, find_residuals
 
 
-def test_departures_are_found_where_they_are_and_nowhere_else():
+def test_departures_are_found_only_where_present():
     values = read((), np.array([0.5]), np.random.default_rng(4))
     quiet = observation(values)
     assert len(find_residuals(candidate(quiet), quiet)) <= 2
@@ -78,7 +78,7 @@ def departing(level_vpk, quantity="gain"):
         ((2, 3, 3), "in 8 bands, at all source levels alike;"),
     ],
 )
-def test_at_which_levels_it_departs_is_told_as_it_is(counts, told):
+def test_description_names_the_departing_levels(counts, told):
     levels = (1.0, 2.0, 3.5)
     seen = SimpleNamespace(source_vpk=np.repeat(levels, 4), values=np.zeros((3, 12)))
     found = [departing(v) for v, count in zip(levels, counts, strict=True) for _ in range(count)]
@@ -95,7 +95,7 @@ def test_at_which_levels_it_departs_is_told_as_it_is(counts, told):
         (("gain",), np.nan, "the gain departs in 1 band;"),
     ],
 )
-def test_what_departs_is_told_and_no_more_than_was_read(quantities, phase, told):
+def test_description_names_departing_read_quantities_only(quantities, phase, told):
     values = np.zeros((3, 4))
     values[1] = phase
     seen = SimpleNamespace(source_vpk=np.full(4, 2.0), values=values)

@@ -41,7 +41,7 @@ def tied(explained, lead, objection, effects=STIFF):
         ((), -30.0, "", ", but so may nothing beyond tolerance."),
     ],
 )
-def test_a_rival_may_explain_it_too_or_is_said_not_to(explained, effects, lead, objection, said):
+def test_rival_states_whether_it_also_explains(explained, effects, lead, objection, said):
     found = tied(explained, lead, objection, effects)
     probability = found.verdict.probability
     assert found.summary()[0].endswith(f" explains it with probability {probability:.2f}{said}")
@@ -57,14 +57,14 @@ def test_a_rival_may_explain_it_too_or_is_said_not_to(explained, effects, lead, 
     ]
 
 
-def test_an_answer_without_a_rival_says_how_probable_it_is(explained):
+def test_answer_without_rival_states_its_probability(explained):
     probability = explained.verdict.probability
     assert explained.summary()[0].endswith(f" explains it with probability {probability:.2f}.")
     assert explained.to_json()["causes"][0]["probability"] == pytest.approx(probability)
 
 
 @pytest.mark.parametrize(("judged", "warned"), [(STIFF, True), (("load-inertia",), False)])
-def test_the_ratio_of_a_model_that_does_not_explain_is_warned_of(monkeypatch, judged, warned):
+def test_ratio_of_rejected_model_has_warning(monkeypatch, judged, warned):
     found = makings.diagnosis(monkeypatch, ("load-inertia",), [judged])
     assert (found.verdict.word == "unexplained") == warned
     said = [t for t in found.to_json()["warnings"] if "contribution ratio is that of" in t]
@@ -90,7 +90,7 @@ def known(effects, log_likelihood):
         ({PAIR[:1]: -500.0}, PAIR[0]),
     ],
 )
-def test_the_cause_that_costs_most_to_leave_out_comes_first(alone, first):
+def test_most_costly_cause_to_omit_comes_first(alone, first):
     pair = known(PAIR, 100.0)
     verdict = SimpleNamespace(best=SimpleNamespace(candidate=pair), probability=0.9)
     found = ParameterPosterior(np.array([0.4, 0.2, 0.7]), 1e-4 * np.eye(3))
@@ -110,7 +110,7 @@ def as_the_datasheet(sharpened):
     return close
 
 
-def test_a_value_that_may_be_the_datasheets_is_not_named(monkeypatch, explained):
+def test_cause_at_datasheet_value_is_not_named(monkeypatch, explained):
     """Its plain model fits no better for it: nothing explains that measurement."""
     assert [cause.effect for cause in explained.causes] == ["load-inertia"]
     monkeypatch.setattr(makings, "sharpened", as_the_datasheet(makings.sharpened))
@@ -121,7 +121,7 @@ def test_a_value_that_may_be_the_datasheets_is_not_named(monkeypatch, explained)
     assert "load-inertia" in line
 
 
-def test_what_is_left_of_several_is_sized_and_asked_the_same(monkeypatch):
+def test_remaining_causes_are_sized_and_tested_alike(monkeypatch):
     """A part that is named in place of the whole is told by runs of its own."""
     braked, load, asked = ("load-inertia", "load-viscous-damping"), ("load-inertia",), []
 
@@ -141,7 +141,7 @@ def test_what_is_left_of_several_is_sized_and_asked_the_same(monkeypatch):
 
 
 @pytest.mark.parametrize(("left", "named"), [(0.5, False), (0.9, True)])
-def test_causes_that_undo_one_another_are_not_named(monkeypatch, left, named):
+def test_cancelling_causes_are_not_named(monkeypatch, left, named):
     """An operator is told which, and what to do; the ratio is not that of such a tale."""
     monkeypatch.setattr(second_thoughts, "cancellation_ratio", lambda *_: left)
     braked = ("load-inertia", "load-viscous-damping")
@@ -161,7 +161,7 @@ def test_causes_that_undo_one_another_are_not_named(monkeypatch, left, named):
 
 
 @pytest.mark.parametrize(("asked", "word"), [(0.0, "explained"), (2.0, "ambiguous")])
-def test_what_shares_the_probability_is_told_as_a_rival(monkeypatch, asked, word):
+def test_set_sharing_the_probability_is_rival(monkeypatch, asked, word):
     monkeypatch.setattr(certainty, "_SURE", asked)
     found = makings.diagnosis(monkeypatch, ("load-inertia",), [("load-inertia",), STIFF])
     document = found.to_json()
@@ -171,9 +171,8 @@ def test_what_shares_the_probability_is_told_as_a_rival(monkeypatch, asked, word
 
 
 @pytest.mark.parametrize("asked", [0.0, 2.0])
-def test_what_shares_the_probability_does_not_keep_a_value_that_may_be_the_datasheets(
-    monkeypatch, asked
-):
+def test_rival_probability_does_not_keep_datasheet_value(monkeypatch, asked):
+    """Nothing is named where the value may be that of the datasheet."""
     monkeypatch.setattr(certainty, "_SURE", asked)
     monkeypatch.setattr(makings, "sharpened", as_the_datasheet(makings.sharpened))
     found = makings.diagnosis(monkeypatch, ("load-inertia",), [("load-inertia",), PAIR])

@@ -19,7 +19,7 @@ PAYLOAD = synthetic.PAYLOAD
     (), ("load-inertia",), ("load-inertia", "load-viscous-damping"), ("amplifier-lag",),
     ("load-stribeck-friction", "tachometer-gain"),
 ])  # fmt: skip
-def test_places_stay_what_they_are_where_a_complex_number_would_not_be_fewer(effects):
+def test_places_are_coordinates_unless_impedance_saves_dimensions(effects):
     chart = FeatureMap(Hypothesis(ADSS, effects), FREQUENCIES)
     places = np.random.default_rng(0).uniform(size=(5, chart.hypothesis.d))
     assert np.array_equal(chart(places), places[None])
@@ -31,7 +31,7 @@ def test_places_stay_what_they_are_where_a_complex_number_would_not_be_fewer(eff
     (("load-inertia", "payload-flexibility"), [0]),
     (("payload-flexibility", "tachometer-gain"), [0, 4]),
 ])  # fmt: skip
-def test_two_numbers_stand_in_for_all_sizes_at_the_load(effects, kept):
+def test_reflected_impedance_replaces_all_load_sizes(effects, kept):
     chart = FeatureMap(Hypothesis(ADSS, effects), FREQUENCIES)
     places = np.random.default_rng(1).uniform(size=(5, chart.hypothesis.d))
     seen = chart(places)
@@ -42,7 +42,7 @@ def test_two_numbers_stand_in_for_all_sizes_at_the_load(effects, kept):
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=7, max_size=7))
-def test_nothing_at_the_load_reflects_more_than_comes(sizes):
+def test_load_reflects_no_more_than_incident(sizes):
     every = Hypothesis(ADSS, ("cable-stiffness", "load-inertia", "load-viscous-damping",
                               "payload-flexibility"))  # fmt: skip
     place = np.array([[0.5, *sizes[: every.d - 1]]])
@@ -62,7 +62,7 @@ def test_what_is_reflected_of_known_loads():
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_reflected_impedance_predicts_a_resonance_sizes_do_not(
+def test_reflected_impedance_predicts_better_than_sizes(
     seed,
 ):
     """The middle error was 3.5 to 5.1 times smaller in twelve draws.

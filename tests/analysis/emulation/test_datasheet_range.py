@@ -35,7 +35,7 @@ def test_where_nothing_is_seen_the_datasheet_stands():
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_a_sharp_resonance_off_its_datasheet_is_found(seed):
+def test_sharp_resonance_off_datasheet_is_found(seed):
     """At 5 % the resonance of a robot's axis moves by its width, and slopes tell little."""
     unit = load_unit("r3-1")
     spread, known = spread_of(unit), unit.parameters

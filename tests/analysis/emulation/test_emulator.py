@@ -28,7 +28,7 @@ def test_a_climb_finds_the_place(seed):
     assert 0.7 < np.sqrt(np.mean(z**2)) < 1.3
 
 
-def test_deviations_are_found_and_held_by_their_tolerance():
+def test_deviations_are_found_and_bounded_by_tolerance():
     off = np.array([2.0, -2.0, 0.0, 1.0, -1.0]) * SIGMAS
     surface = candidate(seen(deviations=off, scatter=0.1), EFFECT).surface
     fit = surface.fit(PLACE)
@@ -38,7 +38,7 @@ def test_deviations_are_found_and_held_by_their_tolerance():
     assert far.log_likelihood < fit.log_likelihood - 50.0
 
 
-def test_rows_not_asked_for_do_not_enter_the_fit():
+def test_unrequested_rows_do_not_enter_fit():
     values = read(EFFECT, PLACE, np.random.default_rng(1))
     first = np.arange(ROWS) < ROWS // 2
     spoilt = values.copy()

@@ -24,7 +24,7 @@ def weighted(seed, n=40, k=2, c=5):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_plane_is_that_of_weighted_least_squares(seed):
+def test_plane_fit_is_weighted_least_squares(seed):
     offset, weight, values, _ = weighted(seed)
     value, variance = np.empty(len(values)), np.empty(len(values))
     solve_plane(offset, weight, 0.0, values, False, value, variance)
@@ -56,7 +56,7 @@ def test_a_run_without_weight_does_not_count(n):
     assert np.array_equal(results[0], results[1])
 
 
-def test_the_variance_of_students_t_is_found_and_a_wild_run_hardly_moves_it():
+def test_student_t_variance_resists_outlying_run():
     rng = np.random.default_rng(5)
     n, columns = 4000, 6
     values = (0.3 * TAIL_SCALE * rng.standard_t(TAIL, (columns, n))).astype(np.float32)
@@ -87,7 +87,7 @@ def student(mean, std):
     return stats.t(TAIL, scale=TAIL_SCALE * std).logpdf(mean) - stats.t(TAIL).logpdf(0.0)
 
 
-def test_densities_are_students_t_and_nothing_where_nothing_was_observed():
+def test_densities_are_student_t_or_zero_unobserved():
     values = read(("load-inertia",), np.array([0.5, 0.4]), np.random.default_rng(6))
     values[1, 3:7] = np.nan
     fit = candidate(observation(values), ("load-inertia",)).best
@@ -118,7 +118,7 @@ def test_leaning_is_the_most_probable_deviation():
     assert log_prior < -0.5 * np.sum((best / sigmas) ** 2)
 
 
-def test_weights_are_those_of_the_first_reach_that_suffices():
+def test_weights_use_first_sufficient_reach():
     squares = np.array([0.0, 0.04, 0.5, 2.0, 9.0])
     weight = agreement.weigh(squares, 2.0)
     assert weight.sum() >= 2.0
@@ -143,7 +143,7 @@ def test_the_nearest_are_those_that_sorting_finds(most):
 
 
 @pytest.mark.parametrize("far", [np.zeros(9), np.full(9, 7.0), np.array([1e-300, 1e300, 2.0, 2.0])])
-def test_the_nearest_are_found_among_what_no_limit_parts(far):
+def test_nearest_runs_are_found_without_limit(far):
     for most in range(1, len(far) + 1):
         near = np.full(most, -1)
         nearest(far, most, 0.0, near)
@@ -170,7 +170,7 @@ def looked_at(surface, place, leaning):
 
 
 @pytest.mark.parametrize("leaning", [False, True])
-def test_rows_with_neighbours_of_their_own_agree_where_these_are_all(leaning):
+def test_neighbours_by_row_agree_with_common_ones(leaning):
     seen = observation(read(("load-inertia",), np.array([0.5, 0.4]), np.random.default_rng(3)))
     surface = candidate(seen, ("load-inertia",)).surface
     alike, by_row = looked_at(surface, np.array([0.45, 0.5]), leaning)
@@ -178,7 +178,7 @@ def test_rows_with_neighbours_of_their_own_agree_where_these_are_all(leaning):
         assert one == pytest.approx(other, rel=1e-3, abs=1e-4)
 
 
-def test_a_scatter_is_smoothed_over_its_own_level_alone():
+def test_scatter_is_smoothed_within_its_level():
     rows = expectation.Runs.smoothed_over([slice(0, 4), slice(4, 7)])
     assert rows.tolist() == [
         [0, 0, 0, 1, 2], [0, 0, 1, 2, 3], [0, 1, 2, 3, 3], [1, 2, 3, 3, 3],
@@ -186,7 +186,7 @@ def test_a_scatter_is_smoothed_over_its_own_level_alone():
     ]  # fmt: skip
 
 
-def test_what_is_compiled_beforehand_is_what_a_fit_takes():
+def test_fit_compiles_nothing_further():
     expectation.compile_all()
     functions = agreement.agree, agreement.log_shares, agreement.weigh
     before = [list(function.signatures) for function in functions]

@@ -22,20 +22,20 @@ def world(slopes, rng, runs=200, scatter=0.02):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_coordinate_is_as_much_wider_as_it_matters_less(seed):
+def test_length_scale_grows_as_sensitivity_falls(seed):
     places, difference = world([2.0, 1.0, 0.8], np.random.default_rng(seed))
     width = learn_width(places[None], difference, WIDTH, np.full((1, 1, 3), 0.5))
     np.testing.assert_allclose(width, WIDTH * [1.0, 2.0, 2.5], rtol=0.12)
 
 
-def test_a_coordinate_that_does_nothing_is_wide_but_not_endless():
+def test_insensitive_coordinate_has_bounded_length_scale():
     places, difference = world([1.0, 0.0, 1.0], np.random.default_rng(0))
     difference[:, 1] = np.nan  # No phase was observed.
     width = learn_width(places[None], difference, WIDTH, np.full((1, 1, 3), 0.5))
     np.testing.assert_allclose(width, WIDTH * [1.0, 4.0, 1.0], rtol=0.05)
 
 
-def test_widths_do_not_depend_on_the_units_of_what_is_read():
+def test_length_scales_do_not_depend_on_units():
     places, difference = world([1.0, 0.3, 0.6], np.random.default_rng(1))
     one = learn_width(places[None], difference, WIDTH, np.full((1, 1, 3), 0.5))
     other = learn_width(places[None], 30.0 * difference, WIDTH, np.full((1, 1, 3), 0.5))
@@ -57,7 +57,7 @@ def test_equal_coordinates_of_rows_give_shared_widths(seed):
     np.testing.assert_allclose(apart, shared, rtol=1e-9)
 
 
-def test_a_coordinate_may_change_from_row_to_row():
+def test_coordinate_may_change_between_rows():
     """Of two coordinates that change places half-way along the rows each does the same."""
     rng = np.random.default_rng(4)
     places = rng.uniform(0.0, 1.0, (200, 2))

@@ -86,7 +86,7 @@ def test_phases_meet_across_180_degrees():
     assert np.abs(match_prediction(seen, other).residual[1] + 0.01).max() < 1e-9
 
 
-def test_a_branch_that_single_runs_show_explains_a_stretch():
+def test_rare_branch_explains_part_of_response():
     quiet = observation(gain=np.where(np.arange(ROWS) < ROWS // 2, 0.1, 0.02))
     rare = np.zeros((10, 3, ROWS))
     common = prediction(quiet, std=0.05)

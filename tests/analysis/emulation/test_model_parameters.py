@@ -16,7 +16,7 @@ TRUE = ("load-inertia",)
 
 
 @pytest.mark.parametrize(("wider", "told"), [(1.4, 0.3), (1.6, 0.5), (6.0, 0.5)])
-def test_what_is_hardly_known_with_caution_is_told_with_it(monkeypatch, wider, told):
+def test_caution_applies_to_poorly_known_parameters(monkeypatch, wider, told):
     asked = []
 
     def calibrate(*_, **caution):
@@ -35,7 +35,7 @@ def test_what_is_hardly_known_with_caution_is_told_with_it(monkeypatch, wider, t
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_what_data_tell_well_is_told_as_it_was_found(seed):
+def test_well_determined_parameters_are_not_widened(seed):
     rng = np.random.default_rng(seed)
     seen = observation(read(TRUE, np.array([0.5, 0.5]), rng))
     one = candidate(seen, TRUE, seed)

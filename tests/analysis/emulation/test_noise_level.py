@@ -17,21 +17,21 @@ def seen(noise_v):
     return unread(PLAN, noise_v)
 
 
-def test_a_reading_whose_quiet_points_show_the_usual_noise_leaves_nothing_to_try():
+def test_usual_noise_leaves_one_candidate():
     for noise in (1e-5, USUAL_NOISE_V, 1.2 * USUAL_NOISE_V):
         observation = seen(noise)
         assert possible_noises(observation) == [observation]
         assert likeliest_noise([observation], lambda _: pytest.fail("asked")) is observation
 
 
-def test_noises_are_tried_from_the_usual_one_to_what_the_quietest_points_show():
+def test_candidate_noises_span_usual_to_quietest_points():
     noises = [one.noise_v for one in possible_noises(seen(2e-3))]
     assert noises[0] == pytest.approx(USUAL_NOISE_V)
     assert noises[-1] == pytest.approx(2e-3)
     assert noises == sorted(noises)
 
 
-def test_noise_is_relative_to_the_response_whatever_it_is():
+def test_noise_is_relative_to_response():
     observation = seen(2e-3)
     louder = observation.with_noise(4e-3)
     np.testing.assert_allclose(louder.noise, 2.0 * observation.noise)
@@ -52,7 +52,7 @@ def scatter_likelihood(chatter_v, read):
 
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize(("chatter_v", "noise_v"), [(2e-3, 5e-4), (2e-4, 2e-3)])
-def test_noise_and_chatter_are_told_apart_by_what_simulations_show(chatter_v, noise_v, seed):
+def test_simulations_separate_noise_from_chatter(chatter_v, noise_v, seed):
     # Both benches read about 2 mV everywhere: one is noisy, the other's motion chatters.
     rng = np.random.default_rng(seed)
     read = np.log(np.sqrt(2.0) * np.hypot(chatter_v, noise_v)) + 0.1 * rng.standard_normal(ROWS)
@@ -61,13 +61,13 @@ def test_noise_and_chatter_are_told_apart_by_what_simulations_show(chatter_v, no
     assert heard.noise_v == pytest.approx(noise_v, rel=0.35)
 
 
-def test_where_chatter_drowns_it_the_noise_is_taken_for_the_usual_one():
+def test_noise_below_chatter_is_taken_as_usual():
     shown = replace(seen(1.0), noise_v=5e-3, noise=np.full(ROWS, 5e-3), loudest_v=5e-3)
     heard = likeliest_noise(possible_noises(shown), lambda _: 0.0)
     assert heard.noise_v == pytest.approx(USUAL_NOISE_V)
 
 
-def test_runs_are_read_with_the_noise_that_quiet_points_show():
+def test_quiet_points_fix_noise_of_runs():
     rng = np.random.default_rng(1)
     np.testing.assert_array_equal(draw_noises(seen(4e-4), 7, rng), np.full(7, 4e-4))
     # Answers for quiet benches do not depend on what is done about others.
@@ -75,7 +75,7 @@ def test_runs_are_read_with_the_noise_that_quiet_points_show():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_where_the_noise_is_in_doubt_runs_are_read_with_all_that_are_possible(seed):
+def test_uncertain_noise_is_drawn_over_its_range(seed):
     heard = seen(8.0 * USUAL_NOISE_V).with_noise(1.1 * USUAL_NOISE_V)
     heard = heard.at_rows(np.arange(0, len(heard), 2))
     noises = draw_noises(heard, 48, np.random.default_rng(seed))

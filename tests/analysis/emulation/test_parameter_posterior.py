@@ -63,7 +63,8 @@ def runs(places, drawn):
 
 
 @pytest.mark.parametrize("branch", [False, True])
-def test_intervals_cover_and_are_not_wider_than_the_best_estimator_deserves(branch):
+def test_intervals_cover_and_are_near_optimal(branch):
+    """They are not wider than the best estimator deserves."""
     results = [experiment(seed, branch) for seed in range(40)]
     z = np.array([(c.mean[0] - t) / np.sqrt(c.covariance[0, 0]) for t, c in results])
     stated = np.median([np.sqrt(c.covariance[0, 0]) for _, c in results])
@@ -146,7 +147,8 @@ def chattering(truth, noise_v, rng):
 
 
 @pytest.mark.parametrize("noise_v", [USUAL_NOISE_V, 1.5e-3])
-def test_intervals_cover_where_chatter_and_noise_are_not_told_apart(noise_v):
+def test_intervals_cover_with_chatter_or_noise(noise_v):
+    """Also where the two cannot be told apart."""
     rng = np.random.default_rng(11)
     truths = rng.uniform(0.3, 0.7, 40)
     found = [chattering(truth, noise_v, rng) for truth in truths]

@@ -50,7 +50,7 @@ def test_mean_slope_and_scatter_come_back(seed):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_runs_on_another_branch_neither_pull_the_mean_nor_blow_up_the_scale(seed):
+def test_outlying_runs_bias_neither_mean_nor_scale(seed):
     # One run in seven lies 10 to 50 standard deviations off, always on one side:
     # plain regression would be off by up to 7 and state up to 18.
     prediction = drawn(seed, outliers=0.15).predict(np.array([0.1]))
@@ -58,7 +58,7 @@ def test_runs_on_another_branch_neither_pull_the_mean_nor_blow_up_the_scale(seed
     assert np.median(prediction.std / SCALE) < 6.0
 
 
-def test_a_phase_near_180_degrees_is_not_torn():
+def test_phase_near_180_degrees_is_continuous():
     emulator = drawn(0)
     emulator.channels[:, 1] = np.angle(np.exp(1j * (emulator.channels[:, 1] + np.pi)))
     prediction = emulator.predict(np.array([0.1]))
@@ -67,7 +67,7 @@ def test_a_phase_near_180_degrees_is_not_torn():
     assert prediction.std[1].max() < 0.1
 
 
-def test_reach_grows_until_draws_suffice_and_then_it_says_so():
+def test_reach_grows_until_draws_suffice_or_raises():
     emulator = drawn(0, count=30)
     assert np.all(np.isfinite(emulator.predict(np.array([0.0])).mean))
     with pytest.raises(AnalysisError, match="simulated machines"):

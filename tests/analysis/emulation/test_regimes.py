@@ -21,7 +21,7 @@ def motions(quiet, seen, first=(0,)):
     return Regimes(np.array(quiet, dtype=bool), np.array(seen, dtype=np.int8), starts)
 
 
-def test_a_state_is_told_by_the_scatter_above_the_reading_s_noise():
+def test_regime_is_detected_by_scatter_above_noise():
     seen = observation(np.zeros((3, ROWS)))
     floor = 0.5 * np.log(2.0 * seen.noise**2)
     seen.values[2] = floor
@@ -48,7 +48,7 @@ def shares_of(found):
     return log_shares(np.ones(len(found.quiet)), *found.course)
 
 
-def test_shares_are_paid_for_where_a_level_begins_and_where_the_motion_changes():
+def test_regime_shares_count_starts_and_changes():
     quiet = [[True] * 4] * 2 + [[False] * 4] * 6
     shares = shares_of(motions(quiet, [1, 1, 1, 1]))
     assert shares[0] == pytest.approx(np.log(2.5 / 9.0))
@@ -62,7 +62,7 @@ def test_shares_are_paid_for_where_a_level_begins_and_where_the_motion_changes()
     assert not np.any(shares_of(Regimes.unknown(8, 4)))
 
 
-def test_another_observation_brings_its_own_states_where_states_are_known():
+def test_known_regimes_take_those_of_new_observation():
     one = motions([[True, False, True]], [0, -1, 1])
     other = one.against(np.array([True, True, False]))
     assert other.seen.tolist() == [1, -1, 0]
@@ -87,7 +87,7 @@ def surface(seen, values, states):
     return Emulator(seen, places, values, np.array([0.5]), none, np.empty(0), states, 0.005, 4.0)
 
 
-def test_what_is_expected_of_a_quiet_sweep_is_what_quiet_runs_show(branching):
+def test_quiet_prediction_uses_quiet_runs_only(branching):
     seen, values, states, _ = branching
     mean, std = surface(seen, values, states).expected(MIDDLE)
     assert np.abs(mean[:2]).max() < 0.02
@@ -97,7 +97,7 @@ def test_what_is_expected_of_a_quiet_sweep_is_what_quiet_runs_show(branching):
     assert np.abs(again - mean).max() < 0.01
 
 
-def test_a_machine_with_two_motions_is_believed_before_one_that_imitates_one_of_them(branching):
+def test_two_regimes_precede_imitation_of_one(branching):
     seen, values, states, rng = branching
     imitation = 0.01 * rng.standard_normal((RUNS, 3, ROWS)) + 0.02
     always = motions(np.ones((RUNS, ROWS)), np.ones(ROWS))
@@ -108,7 +108,7 @@ def test_a_machine_with_two_motions_is_believed_before_one_that_imitates_one_of_
     assert blurred.fit(MIDDLE).log_likelihood < false.fit(MIDDLE).log_likelihood - 20.0
 
 
-def test_an_unseen_regime_is_compared_at_a_cost():
+def test_unseen_regime_is_compared_with_penalty():
     rng = np.random.default_rng(1)
     seen = observation(np.zeros((3, ROWS)))
     values = 0.01 * rng.standard_normal((RUNS, 3, ROWS))

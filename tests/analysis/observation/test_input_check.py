@@ -67,7 +67,7 @@ def test_a_true_response_passes_whatever_it_hides(path):
     [("practice-03", mistake) for mistake in MADE]
     + [("practice-10", mistake) for mistake in ("conjugate", "inverted", "linear gain", "rad/s")],
 )
-def test_a_mistake_is_named_with_its_cure_and_nothing_is_simulated(name, mistake):
+def test_mistake_is_named_with_remedy_before_simulation(name, mistake):
     true = read_response(PRACTICE / f"{name}.csv")
     unit = load_unit(true.unit)
     with counting() as effort, pytest.raises(InputError) as told:
@@ -79,7 +79,7 @@ def test_a_mistake_is_named_with_its_cure_and_nothing_is_simulated(name, mistake
     assert said in str(told.value)
 
 
-def test_what_a_gain_is_off_by_is_told():
+def test_offset_of_gain_is_stated():
     true = read_response(SETS[0])
     found = check_input(times(true, 10.0), load_unit("adss"))
     shown = float(found.words.split("off by ")[1].split(" dB")[0])
@@ -98,7 +98,7 @@ def test_noise_is_no_response_of_the_unit(seed):
         assert check_input(noise(seed), load_unit(unit)).foreign
 
 
-def test_a_constant_is_no_response_of_the_unit():
+def test_constant_is_no_response_of_unit():
     for gain in (1.0, 0.05, 0.05 + 0.02j, 10.0):
         constant = replace(noise(), gain=np.full(61, gain, dtype=complex))
         with pytest.raises(AnalysisError, match="no response of unit ADSS"):
@@ -109,7 +109,7 @@ def test_what_holds_too_little_is_not_judged():
     assert check_input(noise(rows=7), load_unit("adss")).words == ""
 
 
-def test_without_phase_only_what_the_gain_shows_is_named():
+def test_missing_phase_limits_checks_to_gain():
     true = read_response(SETS[2])
     lacking = replace(true, phase_known=np.zeros(len(true), dtype=bool), gain=np.abs(true.gain))
     assert check_input(lacking, load_unit("adss")).words == ""
@@ -117,7 +117,7 @@ def test_without_phase_only_what_the_gain_shows_is_named():
 
 
 @pytest.mark.parametrize("verb", ["estimate", "diagnose"])
-def test_the_verbs_refuse_a_mistake_in_one_line(verb, tmp_path, capsys):
+def test_verbs_refuse_mistake_in_one_line(verb, tmp_path, capsys):
     path = tmp_path / "sweep.csv"
     write_response(MADE["phase in radians"](read_response(SETS[0])), path)
     assert main([verb, str(path), "--unit", "adss", "--json"]) == 2
@@ -132,7 +132,7 @@ def test_the_verbs_refuse_a_mistake_in_one_line(verb, tmp_path, capsys):
     assert "error: this is no response of unit ADSS" in err
 
 
-def test_as_is_estimates_all_the_same_and_says_it_first(tmp_path, capsys):
+def test_as_is_estimates_and_warns_first(tmp_path, capsys):
     path = tmp_path / "sweep.csv"
     true = read_response(SETS[0])
     few = MADE["inverted"](true.take(np.arange(0, 61, 3)))

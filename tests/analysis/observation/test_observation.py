@@ -30,7 +30,7 @@ def response(levels=(1.5, 2.5), frequencies=(100.0, 110.0, 120.0), **changes):
     return FrequencyResponse.from_arrays(f, v, **{**fields, **changes})
 
 
-def test_channels_are_log_gain_phase_and_log_scatter():
+def test_channels_are_log_gain_phase_log_scatter():
     one = response()
     seen = observe(one)
     np.testing.assert_allclose(seen.values[0], np.log(0.1))
@@ -38,14 +38,14 @@ def test_channels_are_log_gain_phase_and_log_scatter():
     np.testing.assert_allclose(np.exp(seen.values[2]) * DB_PER_NEPER, one.gain_std_db)
 
 
-def test_an_error_counted_along_the_gain_alone_is_half_of_the_scatter():
+def test_gain_only_error_is_half_the_scatter():
     both, along = response(), response(provenance={"gain_std_components": 1})
     np.testing.assert_allclose(
         observe(along).values[2] - observe(both).values[2], 0.5 * np.log(2.0)
     )
 
 
-def test_rows_come_by_level_and_ascending_frequency_whatever_the_file_order():
+def test_rows_are_sorted_by_level_and_frequency():
     one = response()
     order = np.array([4, 1, 5, 0, 3, 2])
     shuffled, plain = observe(one.take(order)), observe(one)
@@ -54,7 +54,8 @@ def test_rows_come_by_level_and_ascending_frequency_whatever_the_file_order():
     assert [(b.start, b.stop) for b in plain.blocks] == [(0, 3), (3, 6)]
 
 
-def test_levels_on_one_grid_make_one_plan_with_the_sweeps_own_procedure():
+def test_levels_on_one_grid_share_plan():
+    """The plan has the procedure of the sweep."""
     ((plan, rows),) = observe(response()).plans
     assert plan.levels_vpk == (1.5, 2.5)
     assert (plan.settle_cycles, plan.integrate_cycles, plan.direction) == (7, 9, "down")
@@ -69,13 +70,13 @@ def test_levels_on_different_grids_are_simulated_apart():
     ]
 
 
-def test_a_dc_offset_that_was_driven_is_one_that_is_simulated():
+def test_driven_dc_offset_is_simulated():
     ((plan, _),) = observe(response(provenance={"dc_offset_v": -0.5})).plans
     assert plan.dc_offset_v == -0.5
 
 
 @pytest.mark.parametrize("stated", ["1 V", True, float("nan"), [1.0]])
-def test_a_dc_offset_that_is_no_voltage_is_refused(stated):
+def test_invalid_dc_offset_is_refused(stated):
     with pytest.raises(InputError, match="is no voltage; give it in V"):
         observe(response(provenance={"dc_offset_v": stated}))
 
@@ -112,7 +113,7 @@ def test_voltages_that_no_bench_has_are_refused(slip, said):
         observe(response(**slip))
 
 
-def test_two_readings_of_one_frequency_are_named_by_frequency_and_level():
+def test_repeated_reading_is_named_by_frequency_level():
     twice = response(frequencies=(100.0, 110.015625, 110.015625))
     said = r"holds 110\.015625 Hz more than once at source level 1\.5 V, .*; leave one row of it"
     with pytest.raises(InputError, match=said):
@@ -139,7 +140,7 @@ def test_a_long_sweep_is_not():
     assert 9000.0 < plan.duration_s < 14_400.0
 
 
-def test_sweeps_of_one_unit_stand_together_by_level_each_with_its_own_plan():
+def test_sweeps_combine_by_level_with_own_plans():
     high, low = (100.0, 105.0, 115.0, 120.0), (100.0, 120.0)
     first = response()
     second = response((2.5,), high, direction="up", provenance={"dc_offset_v": 1.0})
@@ -187,7 +188,7 @@ def test_spoilt_and_overloaded_points_do_not_count():
         observe(response(flags=PointFlag.SPOILT))
 
 
-def test_an_unknown_source_level_is_refused_in_words():
+def test_unknown_source_level_is_refused_in_words():
     with pytest.raises(AnalysisError, match="at which source level"):
         observe(response(levels=(np.nan,)))
 
@@ -205,7 +206,7 @@ def test_noise_is_that_of_the_quietest_points():
     assert observe(one).noise_v == pytest.approx(5e-4, rel=0.1)
 
 
-def test_a_file_without_noise_is_read_as_by_the_best_of_analysers():
+def test_noise_free_reading_takes_analyser_floor():
     quiet, loud, unknown = 1e-12, 1.0, 0.0
     gain = np.array([0.2, 0.1, 0.1], dtype=complex)
     one = response((2.0,), gain=gain, gain_std_db=np.array([loud, quiet, unknown]))
@@ -218,7 +219,7 @@ def test_a_file_without_noise_is_read_as_by_the_best_of_analysers():
     assert silent.noise_v == pytest.approx(LEAST_NOISE * 0.1 * 4.0)
 
 
-def test_a_point_that_drowned_in_noise_says_that_next_to_nothing_moved():
+def test_point_lost_in_noise_bounds_the_motion():
     """500 readings of a servo that friction holds: what is left of their noise is of no weight."""
     rng, noise_v, level = np.random.default_rng(5), 5e-4, 1.5
     noise = noise_v / level

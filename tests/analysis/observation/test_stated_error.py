@@ -50,7 +50,7 @@ def columns():
 
 
 @pytest.mark.parametrize("errors", list(columns()))
-def test_an_error_column_that_is_not_declared_changes_nothing(swept, errors):
+def test_undeclared_error_column_changes_nothing(swept, errors):
     without, given = foreign(swept, np.nan), foreign(swept, errors)
     assert same(observe(given), observe(without))
     assert not same(observe(swept), observe(without))
@@ -61,7 +61,7 @@ def test_an_error_column_that_is_not_declared_changes_nothing(swept, errors):
 
 
 @pytest.mark.parametrize("errors", list(columns())[:4])
-def test_nor_does_one_in_a_file_that_gives_cycles_but_no_kind(swept, errors, tmp_path):
+def test_cycles_without_kind_leave_error_unused(swept, errors, tmp_path):
     path = tmp_path / "theirs.csv"
     write_response(foreign(swept, errors), path)
     path.write_text(path.read_text().replace('# kind = "measured"\n', ""))
@@ -75,7 +75,7 @@ def test_nor_does_one_in_a_file_that_gives_cycles_but_no_kind(swept, errors, tmp
     "words",
     [{"gain_std_components": 1}, {"gain_std_is": error_words(30)}],
 )
-def test_what_is_declared_is_used_and_constant_errors_are_no_scatter_even_then(swept, words):
+def test_declared_constant_errors_are_no_scatter(swept, words):
     assert stated_error(foreign(swept, swept.gain_std_db, **words)).doubt == ""
     assert same(observe(foreign(swept, swept.gain_std_db, **words)), observe(swept))
     constant = foreign(swept, 0.2, **words)
@@ -96,7 +96,7 @@ def test_words_are_read_as_they_are_written(swept):
         assert len(doubt) < 400
 
 
-def test_cycles_that_contradict_each_other_are_refused_and_missing_ones_are_taken(swept):
+def test_contradictory_cycles_are_refused_missing_are_taken(swept):
     said = {"gain_std_is": error_words(12)}
     with pytest.raises(InputError, match="counts 12 cycles and integrate_cycles is 30"):
         observe(foreign(swept, swept.gain_std_db, **said))
@@ -106,7 +106,7 @@ def test_cycles_that_contradict_each_other_are_refused_and_missing_ones_are_take
 
 
 @pytest.mark.parametrize("path", sorted(PRACTICE.glob("*.csv")), ids=lambda p: p.stem)
-def test_sets_of_the_plain_format_are_read_as_scatter_of_both_components(path):
+def test_plain_format_errors_are_component_scatter(path):
     response = read_response(path)
     assert stated_error(response).components == 2
     scatter = np.exp(observe(response).values[2])
@@ -119,7 +119,7 @@ def test_sets_of_the_plain_format_are_read_as_scatter_of_both_components(path):
 
 
 @pytest.mark.parametrize("suffix", ["csv", "h5", "uff", "mat"])
-def test_what_this_program_writes_says_in_words_what_its_errors_are(swept, suffix, tmp_path):
+def test_written_file_states_meaning_of_its_errors(swept, suffix, tmp_path):
     path = tmp_path / f"x.{suffix}"
     write_response(swept, path)
     back = read_response(path)
@@ -128,7 +128,7 @@ def test_what_this_program_writes_says_in_words_what_its_errors_are(swept, suffi
     assert error_doubts([back]) == []
 
 
-def test_estimate_says_which_was_taken_and_answers_as_without_the_column(swept, tmp_path, capsys):
+def test_estimate_states_which_error_it_used(swept, tmp_path, capsys):
     answers = {}
     for name, errors in (("constant", 0.05), ("none", np.nan)):
         path = tmp_path / f"{name}.csv"

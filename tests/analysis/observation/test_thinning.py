@@ -50,7 +50,7 @@ def peak_bytes(work):
         tracemalloc.stop()
 
 
-def test_a_response_of_a_usual_size_is_left_as_it_is():
+def test_usual_size_response_is_not_thinned():
     usual = large([1.5, 2.5, 4.0], MOST_ROWS // 3)
     (kept,), doubts = thin_responses([usual])
     assert kept is usual
@@ -63,7 +63,7 @@ def test_a_response_of_a_usual_size_is_left_as_it_is():
     most=st.integers(8, 200),
     spoilt=st.integers(0, 3),
 )
-def test_what_is_kept_is_part_of_it_and_no_more_than_asked(levels, points, most, spoilt):
+def test_thinned_rows_are_limited_subset(levels, points, most, spoilt):
     flags = np.zeros(len(levels) * points, dtype=int)
     flags[:spoilt] = PointFlag.SPOILT
     whole = large(sorted(levels), points, flags=flags)
@@ -84,13 +84,13 @@ def test_points_are_kept_where_the_gain_changes():
     assert kept.frequency_hz.max() == 1000.0
 
 
-def test_a_level_of_many_points_takes_bounded_memory():
+def test_level_of_many_points_has_bounded_memory():
     whole = large([2.5], 200_000)
     assert peak_bytes(lambda: thin(whole, 366)) < 60e6
     assert peak_bytes(lambda: extract(whole)) < 100e6
 
 
-def test_many_points_are_read_from_means_of_neighbours_and_as_well():
+def test_many_points_are_averaged_without_loss():
     (level,) = extract(large([2.5], 60_000))
     assert "level: read from means of 30 neighbouring points" in level.flags
     # The extrema of the gain itself, on a grid a hundred times finer than the error bars.
@@ -103,7 +103,7 @@ def test_many_points_are_read_from_means_of_neighbours_and_as_well():
     assert not any("means of" in flag for flag in usual.flags)
 
 
-def test_levels_that_nobody_set_are_refused_at_once():
+def test_too_many_levels_are_refused_at_once():
     level = 2.5 + 1e-4 * np.random.default_rng(1).normal(size=100_000)
     measured = FrequencyResponse.from_arrays(np.linspace(100, 180, 100_000), level, 1.0, unit="X")
     with pytest.raises(InputError, match="more than 1000 source levels .* the level that was set"):
@@ -112,7 +112,7 @@ def test_levels_that_nobody_set_are_refused_at_once():
         estimate_response(measured, load_unit("adss"))
 
 
-def test_rows_of_a_csv_are_read_in_a_few_calls_each(tmp_path):
+def test_csv_rows_are_read_in_few_calls(tmp_path):
     path = tmp_path / "large.csv"
     whole = large(0.2 * np.arange(1, 21), 1000, seed=2)
     write_response(whole, path)
@@ -122,7 +122,7 @@ def test_rows_of_a_csv_are_read_in_a_few_calls_each(tmp_path):
     assert pstats.Stats(profile).total_calls < 8 * len(whole)
 
 
-def test_estimate_of_a_large_file_simulates_what_it_says_it_uses(tmp_path, capsys):
+def test_estimate_simulates_the_stated_thinned_rows(tmp_path, capsys):
     path = tmp_path / "large.csv"
     cycles = {"settle_cycles": 1, "integrate_cycles": 2}
     write_response(large(0.2 * np.arange(1, 21), 1000, **cycles), path)
@@ -136,7 +136,7 @@ def test_estimate_of_a_large_file_simulates_what_it_says_it_uses(tmp_path, capsy
     assert found["simulated_s"] < 10 * 460
 
 
-def test_long_work_says_now_and_then_how_far_it_is_without_a_terminal(monkeypatch, capsys):
+def test_progress_without_terminal_is_reported_rarely(monkeypatch, capsys):
     now = [0.0]
     monkeypatch.setattr("time.monotonic", lambda: now[0])
     console = Console()

@@ -33,11 +33,11 @@ def test_a_weak_amplifier_undoes_a_stronger_motor(seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_weak_amplifier_does_not_undo_a_weaker_motor(seed):
+def test_weak_amplifier_does_not_cancel_weaker_motor(seed):
     assert left(GAINS, (2.82, 0.7), seed) > 1.0
 
 
-def test_causes_that_have_nothing_to_do_with_one_another_add_up():
+def test_unrelated_causes_add_without_cancelling():
     assert left((BRAKE, SHAFT), (0.15, 20.0)) > 1.0
 
 
@@ -74,7 +74,7 @@ def held(verdict, values=None):
 
 @pytest.mark.parametrize("word", ["explained", "ambiguous"])
 @pytest.mark.parametrize(("f_p_hz", "sure"), [(361.0, False), (359.0, True), (130.0, True)])
-def test_a_resonance_that_turns_out_to_be_out_of_sight_is_no_explanation(word, f_p_hz, sure):
+def test_resonance_outside_band_is_no_explanation(word, f_p_hz, sure):
     """A heavier load that was withheld was told to be a payload: at 250 Hz, after 110 had been
     measured, and within twice that before all its runs were there."""
     verdict = told(("payload-flexibility",), word)
@@ -105,6 +105,6 @@ def test_what_undoes_itself_is_no_explanation(monkeypatch, share, word):
 @pytest.mark.parametrize(
     "verdict", [told((SHAFT,)), told(GAINS, "ambiguous"), told(GAINS, "unexplained"), told(())]
 )
-def test_only_several_that_are_named_for_sure_are_asked_what_is_left(monkeypatch, verdict):
+def test_only_confident_sets_are_tested_for_cancellation(monkeypatch, verdict):
     monkeypatch.setattr(second_thoughts, "cancellation_ratio", None)
     assert held(verdict) is verdict

@@ -38,7 +38,8 @@ def rivals(verdict):
 
 @pytest.mark.parametrize(("believed", "word"), [(0.951, "explained"), (0.949, "ambiguous")])
 @pytest.mark.parametrize("objection", ["", "leaves structure", "too improbable to be checked"])
-def test_what_shares_more_than_a_twentieth_is_a_rival_refused_or_not(believed, word, objection):
+def test_probability_above_one_twentieth_makes_rival(believed, word, objection):
+    """Whether it was rejected or not."""
     verdict = told(standing((LOAD,), believed), standing((SHAFT,), 1.0 - believed, objection))
     held = require_credible_set(verdict)
     assert held.word == word
@@ -46,7 +47,7 @@ def test_what_shares_more_than_a_twentieth_is_a_rival_refused_or_not(believed, w
     assert rivals(held) == ([(SHAFT,)] if word == "ambiguous" else [])
 
 
-def test_a_further_cause_that_does_no_better_is_no_rival():
+def test_further_cause_without_gain_is_no_rival():
     """What is named is there in both; whether there is more is told as what is not seen."""
     verdict = told(standing((LOAD,), 0.7), standing((BRAKE, LOAD), 0.3))
     held = require_credible_set(verdict)
@@ -54,7 +55,7 @@ def test_a_further_cause_that_does_no_better_is_no_rival():
     assert held.probability == pytest.approx(1.0)
 
 
-def test_a_further_cause_that_does_better_is_a_rival():
+def test_further_cause_with_gain_is_rival():
     better = told(standing((LOAD,), 0.1), standing((LOAD, SHAFT), 0.9))
     # The load is there in either; whether the shaft is, too, is open.
     assert better.probability == pytest.approx(1.0)
@@ -62,21 +63,21 @@ def test_a_further_cause_that_does_better_is_a_rival():
     assert (held.word, rivals(held)) == ("ambiguous", [(LOAD, SHAFT)])
 
 
-def test_what_leads_though_it_is_refused_is_a_rival():
+def test_leading_rejected_set_is_rival():
     verdict = told(standing((LOAD,), 0.4), standing((BRAKE, LOAD), 0.6, "leaves structure"))
     held = require_credible_set(verdict)
     assert (held.word, held.best.effects) == ("ambiguous", (LOAD,))
     assert rivals(held) == [(BRAKE, LOAD)]
 
 
-def test_no_more_are_rivals_than_hold_nearly_all_that_is_believed():
+def test_credible_set_limits_the_rivals():
     others = [standing((effect,), p) for effect, p in ((SHAFT, 0.3), (BRAKE, 0.06))]
     least = standing(("cable-stiffness",), 0.04)
     verdict = told(standing((LOAD,), 0.6), *others, least)
     assert rivals(require_credible_set(verdict)) == [(SHAFT,), (BRAKE,)]
 
 
-def test_what_says_the_same_counts_for_the_best(alike):
+def test_equivalent_set_adds_to_best_probability(alike):
     verdict = told(standing((LOAD,), 0.5), standing(("payload-flexibility",), 0.5))
     assert require_credible_set(verdict).word == "ambiguous"
     alike.add(("payload-flexibility",))
@@ -84,12 +85,12 @@ def test_what_says_the_same_counts_for_the_best(alike):
 
 
 @pytest.mark.parametrize("word", ["consistent", "ambiguous", "unexplained"])
-def test_only_what_is_named_for_sure_is_asked(word):
+def test_only_explained_verdict_needs_credible_set(word):
     verdict = told(standing((LOAD,), 0.5), standing((SHAFT,), 0.5), word=word)
     assert require_credible_set(verdict) is verdict
 
 
-def test_three_causes_are_never_named_without_their_best_part():
+def test_three_causes_have_their_best_part_beside():
     """Three of the chain, of friction and of play made up for a tachometer's gain, with 1.00."""
     three, part = (BRAKE, LOAD, SHAFT), standing((BRAKE, SHAFT), 1e-9, "leaves structure")
     verdict = told(standing(three, 1.0), part, standing((BRAKE,), 1e-12))

@@ -52,7 +52,7 @@ def rivals(monkeypatch):
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize(("sigmas", "sure"), [(1.9, False), (2.1, True), (0.0, False)])
-def test_a_single_value_must_be_off_its_datasheet(sigmas, sign, sure):
+def test_single_value_must_differ_from_datasheet(sigmas, sign, sure):
     verdict, found = told((SHAFT,), [sign * sigmas])
     held = compare_with_datasheet(verdict, found)
     if sure:
@@ -66,13 +66,13 @@ def test_a_single_value_must_be_off_its_datasheet(sigmas, sign, sure):
     assert held.baseline.probability > 0.5 > shaft.probability
 
 
-def test_where_the_plain_model_will_not_do_either_nothing_explains_it():
+def test_rejected_plain_model_gives_unexplained():
     verdict, found = told((SHAFT,), [1.0], objections=("leaves structure",))
     held = compare_with_datasheet(verdict, found)
     assert (held.word, held.best.effects) == ("unexplained", ())
 
 
-def test_what_the_datasheet_does_not_know_is_off_it():
+def test_value_unknown_to_datasheet_differs_from_it():
     verdict, found = told((BRAKE,), [0.0])
     assert compare_with_datasheet(verdict, found) is verdict
 
@@ -83,7 +83,7 @@ def test_a_verdict_that_names_nothing_stays():
 
 
 @pytest.mark.parametrize(("ahead", "may_be"), [(20.1, True), (19.9, False), (-5.0, False)])
-def test_a_rival_that_leads_the_plain_model_may_be_what_is_missing(rivals, ahead, may_be):
+def test_rival_ahead_of_plain_model_may_explain(rivals, ahead, may_be):
     """Not one that would not be named for so little: a shaft was left standing by soft teeth."""
     load = standing((LOAD,), ahead)
     verdict, found = told((SHAFT,), [0.0], word="ambiguous", others=(load,))
@@ -103,9 +103,7 @@ def test_a_rival_that_leads_the_plain_model_may_be_what_is_missing(rivals, ahead
         ((LOAD, SHAFT), [5.0, -5.0], None),
     ],
 )
-def test_the_rest_of_several_is_named_where_one_may_be_as_the_datasheet_says(
-    word, effects, sigmas, left
-):
+def test_remaining_causes_are_named_without_datasheet_value(word, effects, sigmas, left):
     """The whole is no rival: where that value is the datasheet's it is the rest."""
     verdict, found = told(effects, sigmas, word=word)
     held = compare_with_datasheet(verdict, found)
@@ -119,7 +117,7 @@ def test_the_rest_of_several_is_named_where_one_may_be_as_the_datasheet_says(
     assert held.remark(whole) == AS_THE_DATASHEET
 
 
-def test_the_rest_of_several_is_a_rival_where_another_stands_before_it():
+def test_remaining_causes_are_rival_behind_another():
     """It is not likelier than another by what speaks against the whole."""
     verdict, found = told((LOAD, SHAFT), [5.0, 0.0], others=(standing((BRAKE,), 51.0),))
     held = compare_with_datasheet(verdict, found)
@@ -128,14 +126,14 @@ def test_the_rest_of_several_is_a_rival_where_another_stands_before_it():
 
 
 @pytest.mark.parametrize("score", [49.0, 51.0])
-def test_another_set_that_holds_the_rest_does_not_stand_before_it(score):
+def test_containing_set_does_not_precede_remaining_causes(score):
     other = standing((BRAKE, LOAD), score)
     verdict, found = told((LOAD, SHAFT), [5.0, 0.0], others=(other,))
     held = compare_with_datasheet(verdict, found)
     assert (held.word, held.best.effects) == ("explained", (LOAD,))
 
 
-def test_a_rival_of_the_whole_stays_one_of_the_rest(rivals):
+def test_rival_of_whole_set_stays_for_rest(rivals):
     rivals.append(standing((BRAKE,), 49.0))
     verdict, found = told((LOAD, SHAFT), [5.0, 0.0], others=tuple(rivals))
     held = compare_with_datasheet(verdict, found)
@@ -144,7 +142,7 @@ def test_a_rival_of_the_whole_stays_one_of_the_rest(rivals):
 
 
 @pytest.mark.parametrize(("place", "left"), [(0.03, (LOAD,)), (0.05, None)])
-def test_a_further_cause_that_may_be_as_good_as_none_is_not_named(place, left):
+def test_further_cause_near_zero_is_not_named(place, left):
     """A brake whose size reaches the lower end of its range; one standard deviation is 0.02."""
     verdict, found = told((LOAD, BRAKE), [5.0, 0.0])
     found.mean[1 + verdict.best.effects.index(BRAKE)] = place
@@ -152,13 +150,13 @@ def test_a_further_cause_that_may_be_as_good_as_none_is_not_named(place, left):
     assert held.best.effects == (left or (LOAD, BRAKE))
 
 
-def test_one_of_several_that_may_be_none_each_is_there():
+def test_jointly_required_causes_are_kept():
     verdict, found = told((BRAKE, DAMPED), [0.0, 0.0])
     found.mean[1:] = 0.01
     assert compare_with_datasheet(verdict, found) is verdict
 
 
-def test_of_three_causes_two_may_be_the_datasheets():
+def test_two_of_three_may_be_datasheet_values():
     """Of three causes one may be the datasheet's, and of the rest, by runs of its own, another."""
     both = standing((LOAD, BRAKE), 60.0)
     verdict, found = told((LOAD, BRAKE, SHAFT), [5.0, 0.0, 0.0], others=(both,))
@@ -170,7 +168,7 @@ def test_of_three_causes_two_may_be_the_datasheets():
     assert twice.baseline in twice.judged
 
 
-def test_the_rest_of_several_is_a_rival_though_its_own_runs_refuse_it():
+def test_rest_rejected_by_its_runs_is_rival():
     """Its value being the datasheet's, the whole that is believed is that rest."""
     verdict, found = told((LOAD, SHAFT), [5.0, 0.0])
     refused = standing((LOAD,), 50.0, "leaves structure")
@@ -183,7 +181,7 @@ def test_the_rest_of_several_is_a_rival_though_its_own_runs_refuse_it():
     assert held.remark(rival) == ""
 
 
-def test_a_rest_that_nobody_looked_at_is_no_rival():
+def test_unexamined_rest_is_no_rival():
     verdict, found = told((LOAD, SHAFT), [5.0, 0.0])
     judged = tuple(one for one in verdict.judged if one.effects != (LOAD,))
     verdict = replace(verdict, judged=judged)
@@ -192,7 +190,7 @@ def test_a_rest_that_nobody_looked_at_is_no_rival():
 
 @pytest.mark.parametrize("word", ["explained", "ambiguous"])
 @pytest.mark.parametrize(("off", "named"), [(0.9, False), (1.12, False), (0.7, True), (1.4, True)])
-def test_what_is_within_the_tolerance_is_not_named(off, named, word, rivals):
+def test_value_within_tolerance_is_not_named(off, named, word, rivals):
     """Though the plain model does worse than runs of the value, and another such value as well."""
     unit = ADSS.with_tolerance({"default": 0.05})
 

@@ -17,7 +17,7 @@ def test_a_cause_that_is_there_is_named(seed):
     assert verdict.best.probability > 0.95
 
 
-def test_replicates_judge_the_baseline_not_sets_far_behind():
+def test_replicates_judge_baseline_not_distant_sets():
     verdict = judge(seen(TRUE, 1, size=0.9), seed=10)
     far = [one for one in verdict.judged if one.score < verdict.best.score - rules._SURE]
     asked = [one for one in verdict.judged if not np.isnan(one.misfit)]
@@ -30,7 +30,8 @@ def test_replicates_judge_the_baseline_not_sets_far_behind():
             assert not one.refused, "nobody asked whether it fits like its replicates"
 
 
-def test_parts_of_the_leader_are_held_against_their_own_runs_however_far_behind():
+def test_parts_of_leader_are_always_judged():
+    """By their own runs, however far behind they are."""
     pair = tuple(sorted(TRUE + WRONG))
     score = {(): 0.0, TRUE: 100.0, ("cable-stiffness",): 200.0, pair: 600.0}
     verdict = judge(seen(TRUE, 1), tuple(score), 1, score)
@@ -46,7 +47,7 @@ def test_nothing_is_named_where_nothing_is_hidden(seed):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_cause_that_imitates_one_branch_of_the_plain_motion_is_not_blamed(seed, monkeypatch):
+def test_imitation_of_plain_branch_is_not_named(seed, monkeypatch):
     from worlds import synthetic
 
     plain, branch = synthetic.read, 0.3 * shape(55)
@@ -71,13 +72,13 @@ def test_a_cause_that_imitates_one_branch_of_the_plain_motion_is_not_blamed(seed
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_cause_that_nobody_knows_is_not_blamed_on_another(seed):
+def test_unknown_cause_is_not_replaced_by_another(seed):
     values = read((), np.array([0.5]), np.random.default_rng(seed)) + 0.3 * shape(77)
     verdict = judge(observation(values), seed=10 * seed)
     assert verdict.word == "unexplained"
 
 
-def test_a_cause_that_leaves_a_shape_behind_is_not_blamed():
+def test_cause_leaving_structure_is_not_named():
     """It fits nearly as well as its own runs do, and predicts the other level: of these eight three
     are told by the fit, and four by the structure alone."""
     refused = []
@@ -90,7 +91,7 @@ def test_a_cause_that_leaves_a_shape_behind_is_not_blamed():
     assert sum(refused) >= 3
 
 
-def test_two_causes_that_look_the_same_are_both_named(monkeypatch):
+def test_two_equivalent_causes_are_both_named(monkeypatch):
     from worlds import synthetic
 
     plain = synthetic.effect_slope
@@ -104,7 +105,7 @@ def test_two_causes_that_look_the_same_are_both_named(monkeypatch):
 
 
 @pytest.mark.parametrize("chance", [-2.0, 2.0])
-def test_of_equivalent_sets_the_rare_one_is_rival(monkeypatch, chance):
+def test_rare_equivalent_set_is_rival(monkeypatch, chance):
     """The network holds it for ten times less likely, and scores differ by chance by about 2."""
     from worlds import synthetic
 
@@ -143,7 +144,7 @@ def test_a_small_cause_ties_with_the_baseline(
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_second_cause_is_not_named_where_one_does(seed):
+def test_second_cause_needs_a_gain(seed):
     """The pair does all that the single cause does; the network holds it for less likely."""
     pair = tuple(sorted((*TRUE, *WRONG)))
     observed = seen(TRUE, seed)
@@ -154,13 +155,13 @@ def test_a_second_cause_is_not_named_where_one_does(seed):
     assert whole not in verdict.rivals
 
 
-def test_a_pair_that_leads_is_named_with_both_of_its_causes():
+def test_leading_pair_is_named_with_both_causes():
     pair = tuple(sorted((*TRUE, *WRONG)))
     score = {(): 0.0, TRUE: 500.0, pair: 530.0}
     assert judge(seen(TRUE, 1), tuple(score), 1, score).best.effects == pair
 
 
-def test_parts_of_those_that_are_judged_are_judged_however_many_stand_before_them():
+def test_parts_of_judged_sets_are_judged_too():
     """Six pairs with one cause stood before it alone, and one of them was named."""
     others = ("amplifier-gain", "amplifier-lag", "cable-stiffness", "motor-resistance",
               "motor-constant", "total-backlash", "shaft-stiffness")  # fmt: skip
@@ -173,5 +174,5 @@ def test_parts_of_those_that_are_judged_are_judged_however_many_stand_before_the
     assert set(chosen[6:]) == {TRUE, ()}
 
 
-def test_the_world_of_these_tests_is_not_flat():
+def test_synthetic_response_is_not_flat():
     assert np.ptp(BASE[0]) > 0.5

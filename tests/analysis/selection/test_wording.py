@@ -31,12 +31,12 @@ def test_a_probability_has_one_word(probability, words):
 
 
 @pytest.mark.parametrize("verdict", ["consistent", "explained", "ambiguous", "unexplained"])
-def test_how_likely_it_is_that_nothing_is_hidden_is_always_said_with_its_number(verdict):
+def test_probability_of_nothing_hidden_has_its_number(verdict):
     said = " ".join(verdict_words(document(verdict, 0.62, causes=["load-inertia"])))
     assert "that nothing is hidden has probability 0.62: more likely than not" in said
 
 
-def test_what_remains_open_is_said_where_nothing_is_missing():
+def test_consistent_verdict_states_what_remains_open():
     """The report that told of nothing else to look for: 0.62, and 6.9 standard deviations."""
     rivals = [other("load-inertia", 0.3), other("shaft-damping", 0.06), other("x", 0.02)]
     said = " ".join(verdict_words(document(nothing=0.62, rivals=rivals, residual=[6.9, -3.2, 2.0])))
@@ -48,12 +48,12 @@ def test_what_remains_open_is_said_where_nothing_is_missing():
     assert "nothing else" not in said
 
 
-def test_what_a_set_is_refused_for_does_not_leave_it_open():
+def test_rejected_set_is_not_stated_open():
     rivals = [other("load-inertia", 0.3, "fits worse than replicates of this model")]
     assert "Still open" not in " ".join(verdict_words(document(nothing=0.7, rivals=rivals)))
 
 
-def test_a_sure_and_clean_answer_leaves_nothing_open():
+def test_certain_answer_leaves_nothing_open():
     assert verdict_words(document(nothing=0.97)) == [
         "Nothing beyond tolerance is needed to explain this response.",
         "Among the sets judged, that nothing is hidden has probability 0.97: extremely likely.",
