@@ -63,7 +63,7 @@ def history(tmp_path_factory):
 
 
 @pytest.mark.parametrize("page", pages(), ids=name_of)
-def test_everything_that_a_page_prints_can_be_run(page, history, tmp_path, monkeypatch):
+def test_everything_printed_on_a_page_runs(page, history, tmp_path, monkeypatch):
     printed = list(pieces(page))
     if name_of(page) in ELSEWHERE:
         printed = [piece for piece in printed if piece[0] == "command"]
@@ -98,7 +98,7 @@ def test_commands_in_running_text_have_these_options(page, capsys):
         assert set(options) <= known, mention
 
 
-def test_a_page_that_prints_what_does_not_work_is_found(tmp_path, monkeypatch):
+def test_page_with_failing_command_is_found(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     wrong = (
         "lashbench simulat --unit adss",
@@ -124,7 +124,7 @@ def test_a_page_that_prints_what_does_not_work_is_found(tmp_path, monkeypatch):
     ]
 
 
-def test_the_page_of_the_interface_is_that_of_the_code():
+def test_interface_page_matches_the_code():
     assert api_page.page() == api_page.PAGE.read_text(), "run python tests/api_page.py"
 
 
@@ -134,7 +134,7 @@ def test_everything_public_says_what_it_is():
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
-def test_an_example_is_short_and_uses_public_names_only(example):
+def test_example_is_short_and_uses_public_names(example):
     text = example.read_text(encoding="utf-8")
     assert len(text.splitlines()) < 50
     public = {
@@ -159,7 +159,7 @@ def test_the_table_of_verbs_is_whole():
     assert sorted(re.findall(r"^\| `([a-z-]+)`", table, re.MULTILINE)) == sorted(cli.VERBS)
 
 
-def test_every_page_can_be_reached_from_the_index():
+def test_every_page_is_linked_from_index():
     reached, waiting = set(), [ROOT / "docs" / "index.md"]
     while waiting:
         page = waiting.pop()
@@ -171,7 +171,7 @@ def test_every_page_can_be_reached_from_the_index():
     assert set(pages()) - {ROOT / "README.md"} <= reached
 
 
-def test_the_architecture_lists_every_decision_by_its_title():
+def test_architecture_lists_every_decision_by_title():
     page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
     listed = re.findall(r"^- \[(\d+\. .+)\]\(decisions/(.+\.md)\)$", page, re.MULTILINE)
     records = sorted((ROOT / "docs" / "decisions").glob("[0-9]*.md"))
@@ -180,7 +180,7 @@ def test_the_architecture_lists_every_decision_by_its_title():
         assert file.read_text(encoding="utf-8").startswith(f"# {title}\n")
 
 
-def test_a_decision_record_has_the_usual_parts_and_is_short():
+def test_decision_record_has_usual_parts_under_limit():
     parts = ["Status", "Context", "Decision", "Evidence", "Consequences"]
     for file in sorted((ROOT / "docs" / "decisions").glob("[0-9]*.md")):
         text = file.read_text(encoding="utf-8")
@@ -188,7 +188,7 @@ def test_a_decision_record_has_the_usual_parts_and_is_short():
         assert len(re.findall(r"\S*\w\S*", text)) < 300, file.name
 
 
-def test_every_number_is_a_record_or_a_line_of_the_archive():
+def test_every_number_has_record_or_archive_line():
     folder = ROOT / "docs" / "decisions"
     kept = [int(file.name[:4]) for file in folder.glob("[0-9]*.md")]
     lines = re.findall(r"^- \*\*(\d+)\*\* ", (folder / "archive.md").read_text(), re.MULTILINE)
@@ -209,7 +209,7 @@ def test_the_physics_tells_of_every_effect():
     assert re.findall(r"^\| ([a-z0-9-]+) \|", table, re.MULTILINE)[2:] == list(BUILT_IN)
 
 
-def test_the_effect_of_the_page_is_the_file_of_the_example():
+def test_effect_on_page_equals_example_file():
     (code,) = [text for kind, text in pieces(ROOT / "docs/your-own-gimbal.md") if kind == "python"]
     file = (ROOT / "docs/examples/own-effect/tight_bearing.py").read_text(encoding="utf-8")
     assert code == file.partition("\n\n")[2]

@@ -19,7 +19,7 @@ from daq.store import Store
 ROOT = Path(__file__).parents[1]
 
 
-def test_nothing_heavy_is_loaded_before_a_name_is_used():
+def test_heavy_libraries_load_only_on_use():
     program = "import sys, lashbench as lb; print([n for n in lb.__all__ if not hasattr(lb, n)]);"
     program += "print({'numpy', 'scipy', 'matplotlib', 'textual', 'cyclopts'} & set(sys.modules))"
     run = subprocess.run(
@@ -40,7 +40,7 @@ def test_a_result_is_shown_escaped():
     assert len(shown.plot().axes) == 2
 
 
-def test_a_sweep_is_measured_and_kept_with_the_source_off(tmp_path, capsys):
+def test_sweep_is_stored_with_source_off(tmp_path, capsys):
     plan = SweepPlan((130.0, 150.0), (2.5,), settle_cycles=2, integrate_cycles=3)
     measured = lb.measure(plan, "adss", "sim:?ratio=0.3&seed=1", db=tmp_path / "lab.db")
     assert capsys.readouterr().out == ""
@@ -61,7 +61,7 @@ def test_hardware_is_not_driven_unasked(tmp_path):
 
 
 @pytest.mark.parametrize("instrument", ["sim:", "simulated:", "SIM:"])
-def test_what_cannot_be_measured_is_refused_before_a_history_is_made(tmp_path, instrument):
+def test_impossible_sweep_is_refused_without_history(tmp_path, instrument):
     """By a bench of one's own, by the instrument, and by what is no address."""
     narrow = tmp_path / "narrow.toml"
     text = config_path("benches", "default").read_text(encoding="utf-8")
@@ -72,7 +72,7 @@ def test_what_cannot_be_measured_is_refused_before_a_history_is_made(tmp_path, i
     assert not (tmp_path / "lab.db").exists()
 
 
-def test_a_fault_says_what_is_kept_and_that_the_source_is_off(tmp_path):
+def test_fault_states_stored_points_and_source_off(tmp_path):
     frequencies = tuple(float(hz) for hz in range(130, 160))
     plan = SweepPlan(frequencies, (2.5,), settle_cycles=2, integrate_cycles=3)
     with (

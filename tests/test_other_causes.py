@@ -17,7 +17,7 @@ HZ = np.array([105.0, 150.0])
 
 
 @pytest.mark.parametrize("cause", CAUSES)
-def test_every_other_cause_changes_what_is_read_by_more_than_the_noise(cause):
+def test_every_other_cause_exceeds_the_noise(cause):
     unit = load_unit("adss")
     drawn = CAUSES[cause].draw(unit, np.random.default_rng(3))
 
@@ -33,7 +33,7 @@ def test_every_other_cause_changes_what_is_read_by_more_than_the_noise(cause):
     assert words(drawn.size) != words(2.0 * drawn.size)
 
 
-def test_its_table_lists_named_causes_and_datasheet_errors(tmp_path):
+def test_table_lists_named_causes_and_datasheet_errors(tmp_path):
     kept = Kept(str(tmp_path / "lines.jsonl"))
     common = {
         "seed": 1,

@@ -50,7 +50,7 @@ def test_an_offending_docstring_is_found(tmp_path):
     assert found == ["analysis/module.py: banned: 'purse'"]
 
 
-def test_what_is_private_or_generated_is_not_asked(tmp_path):
+def test_private_and_generated_text_is_exempt(tmp_path):
     folder = project(tmp_path)
     (folder / "docs" / "api.md").write_text("Whoever leads.\n")
     (folder / "analysis" / "other.py").write_text('def _spend():\n    """Spend the purse."""\n')

@@ -27,7 +27,7 @@ def test_another_version_is_told(name):
     assert differences(missing, OWN) == [f"{name}: {installed} is installed, none is in the lock"]
 
 
-def test_what_is_not_pinned_or_not_there_is_told():
+def test_unpinned_or_absent_requirement_is_reported():
     assert differences(f"{LOCKED}some-package\n", OWN) == ["some-package: pins no version"]
     absent, newer = Requirement("no-such-package"), Requirement("numpy>=99")
     assert differences(LOCKED, [absent]) == ["no-such-package: is required and not installed"]
@@ -60,11 +60,11 @@ WEAK = {"name": "c", "version": "2.0", "vulns": [
         ("", "", 2, "nothing was audited: no answer"),
     ],
 )  # fmt: skip
-def test_what_was_not_asked_about_is_not_called_sound(said, complaints, code, line):
+def test_skipped_requirement_is_not_called_sound(said, complaints, code, line):
     assert verdict(said, complaints) == (code, [line])
 
 
-def test_a_weakness_counts_more_than_what_was_left_out():
+def test_weakness_precedes_skipped_requirement():
     code, lines = verdict(answer(WEAK, SKIPPED), "")
     assert code == 1
     assert lines[-1] == "not audited: b"

@@ -43,7 +43,7 @@ def dangers(source: str) -> list[str]:
     return found
 
 
-def test_nothing_in_the_package_can_run_what_it_reads():
+def test_package_cannot_execute_what_it_reads():
     """But for one place: effects of a unit's own, which a person asks for (--trust-effects)."""
     assert len(SOURCES) > 150
     found = {str(path.relative_to(ROOT)): dangers(path.read_text()) for path in SOURCES}
@@ -63,7 +63,7 @@ def test_what_could_is_found(source):
     assert not dangers("exec('')"), "it runs nothing"
 
 
-def test_the_simulated_analyser_is_not_to_be_had_from_outside():
+def test_simulated_analyser_is_unreachable_from_outside():
     instrument = Analyser35670A(LinearPlant(lambda hz: 0.1), Choices())
     with Server(instrument, tcp=0, prologix_tcp=0) as server:
         for name in ("tcp", "prologix_tcp"):
@@ -113,7 +113,7 @@ def half_written(source: str) -> list[str]:
     return found
 
 
-def test_no_file_is_written_under_its_own_name():
+def test_no_file_is_written_in_place():
     """Half of it could be seen there; only what grows line by line is, each line whole."""
     assert {str(path): half_written(path.read_text()) for path in SOURCES
             if half_written(path.read_text())} == {}  # fmt: skip

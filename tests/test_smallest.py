@@ -18,7 +18,7 @@ FOUR_IN_FIVE = np.log(4.0)
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_thresholds_of_many_staircases_are_found_within_their_errors(seed):
+def test_staircases_find_thresholds_within_errors(seed):
     rng = np.random.default_rng(seed)
     centres, width = rng.uniform(0.05, 0.8, 40), 0.05
     trials = [[] for _ in centres]
@@ -34,7 +34,7 @@ def test_thresholds_of_many_staircases_are_found_within_their_errors(seed):
     assert np.all(std < 0.2)
 
 
-def test_a_staircase_goes_down_where_a_cause_is_named():
+def test_staircase_descends_after_named_cause():
     assert next_strength([]) == 0.5
     assert next_strength([(0.5, True)]) == 0.25
     assert next_strength([(0.5, True), (0.25, False)]) == pytest.approx(0.4)
@@ -42,7 +42,7 @@ def test_a_staircase_goes_down_where_a_cause_is_named():
 
 
 @pytest.mark.parametrize("effect", EVERY_EFFECT)
-def test_every_cause_can_be_hidden_at_any_strength_and_grows_with_it(effect):
+def test_every_cause_grows_with_its_strength(effect):
     plain = drivetrain_with(UNIT, 0.4, ()).system()
     sizes = []
     for strength in (0.0, 0.5, 1.0):

@@ -44,7 +44,7 @@ def run_installed(installed, cwd, program, *words):
     )
 
 
-def test_it_holds_the_four_floors_the_notebook_names_and_nothing_beside_them(wheel):
+def test_wheel_holds_floors_and_notebook_names_only(wheel):
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
     top = {name.split("/")[0] for name in names}
@@ -55,7 +55,7 @@ def test_it_holds_the_four_floors_the_notebook_names_and_nothing_beside_them(whe
     assert sources <= set(names)
 
 
-def test_its_metadata_are_those_that_an_index_shows(wheel):
+def test_metadata_are_those_an_index_shows(wheel):
     with zipfile.ZipFile(wheel) as archive:
         (place,) = [name for name in archive.namelist() if name.endswith(".dist-info/METADATA")]
         metadata = message_from_string(archive.read(place).decode())
@@ -85,7 +85,7 @@ def test_the_citation_is_of_this_version():
         assert {"name"} <= set(author) or {"family-names", "given-names"} <= set(author)
 
 
-def test_tests_pass_on_it_away_from_the_checkout(installed, tmp_path):
+def test_tests_pass_outside_the_checkout(installed, tmp_path):
     program = (
         "import sys, pytest, daq, tui; print(daq.__file__, tui.__file__);"
         "sys.exit(pytest.main(['-p', 'no:cacheprovider', *sys.argv[1:]]))"
@@ -100,7 +100,7 @@ def test_tests_pass_on_it_away_from_the_checkout(installed, tmp_path):
     )
 
 
-def test_what_comes_with_it_is_found_away_from_the_checkout(installed, tmp_path):
+def test_shipped_files_are_found_outside_checkout(installed, tmp_path):
     program = (
         "import daq, sim.unit, daq.configs as c; print(daq.__file__);"
         "print(c.config_names('units'), sim.unit.load_unit('edss').name);"

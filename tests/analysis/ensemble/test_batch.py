@@ -60,7 +60,7 @@ def same(some, others):
     [(TWO, 1, [2, 1, 2]), (TWO, 2, [2, 1, 1, 1]), (2, 1, [2, 3]), (2, 4, [1, 1, 1, 2]),
      (40, 1, [1] * 5)],
 )  # fmt: skip
-def test_families_are_read_in_lots_as_they_are_one_by_one(machines, cores, lots):
+def test_families_read_in_batches_are_equal(machines, cores, lots):
     known, executor, told = families(machines), Noting(cores), []
     with counting() as effort:
         found = read_families(known, executor, told.append)

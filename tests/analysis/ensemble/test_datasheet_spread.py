@@ -22,7 +22,8 @@ def changed(unit, deviations):
     return unit.with_parameters(**{s: known[s] * (1.0 + d) for s, d in deviations})
 
 
-def test_up_to_seven_values_are_ways_of_their_own():
+def test_few_values_are_coordinates_of_their_own():
+    """Up to seven."""
     spread = spread_of(ADSS)
     assert spread.symbols == ("R_m", "k_t", "J_L", "k_s1", "k_a")
     np.testing.assert_array_equal(spread.ways, np.eye(5))
@@ -31,7 +32,7 @@ def test_up_to_seven_values_are_ways_of_their_own():
 
 
 @pytest.mark.parametrize("unit", [ADSS, EDSS])
-def test_of_seventeen_values_a_few_ways_hold_all_that_shows(unit):
+def test_seventeen_values_reduce_to_few_coordinates(unit):
     """What is left of the change of a response by chance values of all is under 1 % of it."""
     wide = unit.with_tolerance({"default": 0.05})
     spread = spread_of(wide)
@@ -47,7 +48,7 @@ def test_of_seventeen_values_a_few_ways_hold_all_that_shows(unit):
     assert np.sqrt(np.mean(np.square(left))) < 0.06 * np.sqrt(np.mean(np.square(whole)))
 
 
-def test_coordinates_come_back_and_are_drawn_as_told():
+def test_coordinates_are_invertible_and_drawn_as_stated():
     spread = spread_of(ADSS.with_tolerance({"default": 0.05, "R_m": 0.2}))
     along = np.linspace(-0.1, 0.2, len(spread))
     np.testing.assert_allclose(spread.along(spread.deviations(along)), along, atol=1e-6)
@@ -56,20 +57,20 @@ def test_coordinates_come_back_and_are_drawn_as_told():
     np.testing.assert_allclose(drawn.std(axis=0), spread.sigmas, rtol=0.1)
 
 
-def test_what_is_all_exact_is_computed_with_all_the_same():
+def test_exact_datasheet_still_has_one_coordinate():
     spread = spread_of(ADSS.with_tolerance({"default": 0.0}))
     assert len(spread) == 1
     assert spread.gain == spread.sigmas[0] == 1e-4
 
 
-def test_name_and_limits_do_not_turn_the_ways():
+def test_name_and_limits_keep_the_coordinates():
     wide = ADSS.with_tolerance({"default": 0.05})
     limits = wide.limits.model_copy(update={"source_vpk": 3.0})
     other = wide.model_copy(update={"name": "mine", "limits": limits})
     np.testing.assert_array_equal(spread_of(other).ways, spread_of(wide).ways)
 
 
-def test_features_spread_as_the_root_of_stiffness_over_inertia():
+def test_features_spread_as_root_stiffness_over_inertia():
     frequency, gain = feature_spread(ADSS)
     assert frequency == pytest.approx(0.00354, abs=1e-5)
     assert gain == pytest.approx(0.01)

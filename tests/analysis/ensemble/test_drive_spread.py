@@ -13,7 +13,7 @@ from daq.plan import SweepPlan
 LATE = drives.DRIVES["encoder, speed"]
 
 
-def test_a_delay_is_exact_unless_its_tolerance_is_stated():
+def test_delay_is_exact_without_stated_tolerance():
     unit = drives.unit(LATE)
     assert unit.tolerances["delay_s"] == 0.0
     told = unit.with_tolerance({"default": 0.0, "delay_s": 0.3})
@@ -24,7 +24,7 @@ def test_a_delay_is_exact_unless_its_tolerance_is_stated():
         drives.unit({}).with_tolerance({"delay_s": 0.3})
 
 
-def test_a_machine_with_another_delay_is_late_by_it():
+def test_deviating_delay_delays_the_machine():
     unit = drives.unit(LATE, free=True)
     plan = SweepPlan((60.0, 200.0), (2.5,), settle_cycles=8, integrate_cycles=4)
     machines = [Machine(0.5, 1), Machine(0.5, 1, None, (("delay_s", 0.4),))]
@@ -35,7 +35,7 @@ def test_a_machine_with_another_delay_is_late_by_it():
 
 
 @pytest.mark.parametrize("name", drives.DRIVES)
-def test_every_tolerated_value_of_a_drive_may_be_off(name):
+def test_every_toleranced_drive_value_may_deviate(name):
     """By 5 % of all, as an answer about it takes for granted: every way has a finite effect."""
     unit = drives.unit(drives.DRIVES[name])
     spread = spread_of(unit)
@@ -46,6 +46,6 @@ def test_every_tolerated_value_of_a_drive_may_be_off(name):
     assert np.all(np.isfinite(shown))
 
 
-def test_a_coupling_is_one_of_the_values_that_spread():
+def test_coupling_stiffness_belongs_to_datasheet_spread():
     couplings = drives.unit(drives.COUPLINGS).with_tolerance({"default": 0.0, "k_cL": 0.1})
     assert spread_of(couplings).symbols == ("k_cL",)

@@ -16,7 +16,7 @@ UNITS = {name: load_unit(name) for name in ("adss", "edss")}
     ratio=st.floats(0.0, 1.0),
     u=st.floats(0.0, 1.0),
 )
-def test_places_and_physical_values_are_each_others_inverse(name, effects, ratio, u):
+def test_places_and_physical_values_are_inverse(name, effects, ratio, u):
     hypothesis = Hypothesis(UNITS[name], tuple(sorted(effects)))
     place = np.array([ratio, *[u] * (hypothesis.d - 1)])
     values = hypothesis.values(place)
@@ -26,7 +26,7 @@ def test_places_and_physical_values_are_each_others_inverse(name, effects, ratio
 
 @pytest.mark.parametrize("name", sorted(UNITS))
 @pytest.mark.parametrize("corner", [0.0, 1.0])
-def test_every_cause_makes_a_machine_at_both_ends_of_its_range(name, corner):
+def test_range_ends_of_causes_make_machines(name, corner):
     for hypothesis in every_single_cause(UNITS[name]):
         place = np.array([0.3, *[corner] * (hypothesis.d - 1)])
         machine = hypothesis.machine(place, seed=1)
@@ -35,13 +35,14 @@ def test_every_cause_makes_a_machine_at_both_ends_of_its_range(name, corner):
         assert machine.servo(UNITS[name]).system.A.shape[0] >= 13
 
 
-def test_every_usual_cause_of_the_catalogue_is_looked_at():
+def test_every_usual_cause_is_examined():
     usual = [h.effects[0] for h in every_single_cause(UNITS["adss"])]
     assert usual == [e for e in CATALOGUE if not CATALOGUE[e].rare]
     assert len(usual) == 22
 
 
-def test_datasheet_values_lie_amid_their_range_and_additions_do_not():
+def test_datasheet_values_lie_inside_range_only():
+    """Added effects begin at one end of theirs."""
     amid = {h.effects[0] for h in every_single_cause(UNITS["edss"]) if h.amid == [True]}
     assert amid == {
         "load-inertia", "shaft-stiffness", "total-backlash", "amplifier-gain",
@@ -64,5 +65,5 @@ def test_a_set_says_where_its_causes_sit():
         (("payload-flexibility", "shaft-stiffness"), [np.nan, np.nan, np.nan, 0.5]),
     ],
 )
-def test_sizes_are_where_the_datasheet_has_them_if_it_does(effects, known):
+def test_sizes_have_datasheet_place_if_known(effects, known):
     np.testing.assert_allclose(Hypothesis(load_unit("adss"), effects).datasheet, known)

@@ -42,7 +42,7 @@ def one_by_one(machines):
     return Draws(tuple(machines), mean, variance)
 
 
-def test_families_give_what_machines_one_by_one_give():
+def test_families_equal_machines_run_singly():
     with counting() as effort:
         draws = run_families(ADSS, FAMILIES, SEEN)
     alone = one_by_one([m for family in FAMILIES for m in family])
@@ -51,7 +51,7 @@ def test_families_give_what_machines_one_by_one_give():
     assert effort.simulated_s == pytest.approx(len(alone.machines) * PLAN.duration_s)
 
 
-def test_what_was_kept_is_read_and_costs_nothing(tmp_path):
+def test_cached_runs_are_read_without_simulation(tmp_path):
     executor = Counting()
     with counting() as first:
         made = run_families(ADSS, FAMILIES, SEEN, cache=tmp_path, executor=executor)
@@ -85,7 +85,7 @@ def test_every_family_is_kept_by_itself(tmp_path):
 
 
 @pytest.mark.parametrize("digits", [4, 6, 12])
-def test_a_file_that_rounds_its_frequencies_is_known_again(tmp_path, digits):
+def test_rounded_frequencies_match_the_cache(tmp_path, digits):
     executor = Counting()
     odd = replace(PLAN, frequencies_hz=(120.0 + 1.0 / 3.0, 130.0, 150.0 - 1.0 / 3.0))
     rounded = tuple(round(hz, digits) for hz in odd.frequencies_hz)
@@ -99,7 +99,7 @@ def test_a_file_that_rounds_its_frequencies_is_known_again(tmp_path, digits):
 
 
 @pytest.mark.parametrize("what", ["unit", "plan", "machines"])
-def test_what_differs_is_not_taken_from_the_cache(tmp_path, what):
+def test_different_runs_are_not_taken_from_cache(tmp_path, what):
     executor = Counting()
     run_families(ADSS, FAMILIES, SEEN, cache=tmp_path, executor=executor)
     unit, families, seen = ADSS, FAMILIES, SEEN
@@ -133,13 +133,13 @@ def test_a_damaged_file_is_simulated_anew(tmp_path, damage):
     np.testing.assert_array_equal(again.channels(SEEN), whole.channels(SEEN))
 
 
-def test_a_cache_that_cannot_be_written_costs_time_only(tmp_path):
+def test_unwritable_cache_only_costs_time(tmp_path):
     (tmp_path / "file").write_text("")
     draws = run_families(ADSS, FAMILIES[:1], SEEN, cache=tmp_path / "file" / "below")
     np.testing.assert_array_equal(draws.channels(SEEN), one_by_one(FAMILIES[0]).channels(SEEN))
 
 
-def test_no_damaged_byte_of_a_kept_file_ends_the_work(tmp_path):
+def test_damaged_cache_file_does_not_end_work(tmp_path):
     """Every one of sixty-four places, spoilt by itself: read whole or made anew."""
     whole = run_families(ADSS, FAMILIES[:1], SEEN, cache=tmp_path)
     (file,) = tmp_path.glob("runs-*.npz")
@@ -155,7 +155,7 @@ def test_no_damaged_byte_of_a_kept_file_ends_the_work(tmp_path):
     assert anew > 32
 
 
-def test_a_file_that_cannot_be_written_to_its_end_is_not_kept(tmp_path):
+def test_incompletely_written_file_is_not_kept(tmp_path):
     resource = pytest.importorskip("resource")
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     # No file may grow beyond this: writing on is an error, as on a full disk.

@@ -21,7 +21,7 @@ def runs(groups, seed=0, about=None):
     return simulate_groups(ADSS, groups, unread(SHORT, 1e-4), rng, about=about)
 
 
-def test_runs_are_kept_by_hypothesis_with_their_places():
+def test_runs_are_stored_by_hypothesis_and_place():
     inertia = Hypothesis(ADSS, ("load-inertia",))
     groups = [Group(Hypothesis(ADSS), RATIOS, np.empty(0)), Group(inertia, RATIOS, np.array([0.6]))]
     found = runs(groups)
@@ -36,7 +36,7 @@ def test_no_groups_are_no_runs():
     assert runs([]) == {}
 
 
-def test_neighbouring_groups_deviate_in_opposite_ways_by_one_tolerance():
+def test_neighbouring_groups_deviate_oppositely_by_one_tolerance():
     found = runs([Group(Hypothesis(ADSS), RATIOS, np.empty(0))] * 14)
     off = found[()].deviations[:: len(RATIOS)]
     np.testing.assert_allclose(off[::2], -off[1::2])
@@ -45,7 +45,7 @@ def test_neighbouring_groups_deviate_in_opposite_ways_by_one_tolerance():
     assert np.linalg.cond(off) < 3.0
 
 
-def test_groups_deviate_about_where_the_datasheet_values_are_known_to_lie():
+def test_groups_deviate_about_known_datasheet_values():
     known = DatasheetRange(np.array([0.01, -0.01, 0.0, 0.0, 0.02]), np.full(5, 0.001))
     groups = [Group(Hypothesis(ADSS, key), RATIOS, np.full(len(key), 0.5)) for key in ((), LOAD)]
     found = runs(groups * 4, about={(): known})
@@ -61,7 +61,7 @@ def test_the_same_seed_gives_the_same_runs():
     np.testing.assert_array_equal(runs(groups)[()].mean, runs(groups)[()].mean)
 
 
-def test_a_step_too_long_is_halved_before_giving_up(monkeypatch):
+def test_too_long_step_is_halved_before_error(monkeypatch):
     import sim.response as module
 
     steps = []

@@ -26,7 +26,7 @@ def drawn(hypothesis, found, rng, count=400_000):
 
 
 @pytest.mark.parametrize("correlation", [-0.9, 0.0, 0.9])
-def test_ratio_and_total_are_taken_with_their_correlation(correlation):
+def test_ratio_and_total_use_their_correlation(correlation):
     hypothesis = Hypothesis(ADSS, WORN)
     std = np.array([0.05, 0.03, 0.06])
     matrix = np.eye(3)
@@ -48,7 +48,7 @@ def test_ratio_and_total_are_taken_with_their_correlation(correlation):
     assert told.contribution_ratio.std == pytest.approx(0.05)
 
 
-def test_a_total_that_is_no_cause_is_the_units_and_has_no_interval():
+def test_total_from_datasheet_has_no_interval():
     told = backlash_of_sizes(
         Hypothesis(ADSS, ("load-inertia",)),
         ParameterPosterior(np.array([0.3, 0.5]), 4e-4 * np.eye(2)),
@@ -70,7 +70,7 @@ def test_an_interval_ends_where_a_ratio_does(mean):
     assert told.b2_deg.interval95 == pytest.approx(((1 - high) * B_T, (1 - low) * B_T))
 
 
-def test_a_drive_with_one_stage_holds_all_of_its_play_there():
+def test_one_stage_drive_holds_all_backlash():
     one = load_unit(str(config_path("templates", "one-stage")))
     hypothesis = Hypothesis(one, ("total-backlash",))
     found = ParameterPosterior(np.array([1.0, 0.5]), np.diag([0.0, 0.05**2]))
@@ -80,7 +80,7 @@ def test_a_drive_with_one_stage_holds_all_of_its_play_there():
     assert (told.b2_deg.value, told.b2_deg.std) == (0.0, 0.0)
 
 
-def test_a_posterior_on_places_is_told_by_its_weights():
+def test_weighted_places_give_posterior_mean():
     ratios, total = np.array([0.2, 0.4]), np.array([0.05, 0.1])
     told = backlash_of_places(ADSS, ratios, total, np.array([0.25, 0.75]))
     assert told.b_t_deg.value == pytest.approx(0.0875)

@@ -25,7 +25,7 @@ def ratios(families):
     return np.array([machine.ratio for family in families for machine in family])
 
 
-def test_close_answers_are_held_against_the_same_machines():
+def test_close_answers_use_same_machines():
     here, beside = near(0.41, 0.03), near(0.38, 0.035)
     assert near(0.41, 0.02) == here
     assert len(set(here) & set(beside)) >= len(here) - 1
@@ -36,7 +36,7 @@ def test_close_answers_are_held_against_the_same_machines():
 
 
 @pytest.mark.parametrize(("mean", "std"), [(-0.3, 0.01), (0.0, 0.05), (0.97, 0.2), (0.5, 5.0)])
-def test_machines_lie_in_range_and_reach_past_the_answer(mean, std):
+def test_machines_lie_in_range_beyond_answer(mean, std):
     at = ratios(near(mean, std))
     assert at.min() >= 0.0
     assert at.max() <= 1.0
@@ -54,14 +54,14 @@ def test_most_machines_lie_where_the_answer_does(mean):
     assert np.count_nonzero(np.abs(at - mean) < 0.05) > 20
 
 
-def test_an_answer_hardly_known_costs_little_more_and_is_looked_at_everywhere():
+def test_vague_answer_costs_little_more():
     vague = near(0.5, 1.0)
     assert len(near(0.5, 0.01)) <= 9 < len(vague) == 12
     assert np.diff(np.sort(ratios(vague))).max() < 0.03
 
 
 @pytest.mark.parametrize("axes", [(RATIO,), BOTH])
-def test_every_family_that_an_answer_may_ask_for_is_among_all(axes):
+def test_all_requested_families_are_among_every_family(axes):
     known = set(every_family(axes, SEEN, SPREAD, 0))
     assert set(wide_families(axes, SEEN, SPREAD, 0)) <= known
     rng = np.random.default_rng(4)
@@ -74,12 +74,12 @@ def test_every_family_that_an_answer_may_ask_for_is_among_all(axes):
         assert set(asked) <= known
 
 
-def test_half_of_the_machines_start_anywhere_in_their_play():
+def test_half_of_machines_start_anywhere_in_backlash():
     spreads = [m.start_spread for family in every_family((RATIO,), SEEN, SPREAD, 0) for m in family]
     assert 0.4 < np.mean(np.array(spreads) == 1.0) < 0.6
 
 
-def test_a_family_fills_the_lanes_with_all_levels():
+def test_family_fills_lanes_with_all_levels():
     assert {len(family) for family in near(0.5, 0.1)} == {21}
     one_level = unread(SweepPlan((120.0, 130.0), (2.5,)), 5e-4)
     lone = near_families((RATIO,), np.array([0.5]), np.array([0.1]), one_level, SPREAD, 0)

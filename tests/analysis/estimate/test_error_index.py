@@ -29,13 +29,14 @@ def test_published_table_by_hand(unit, ratio, index):
 
 
 @given(HZ, HZ, HZ, HZ)
-def test_is_twice_the_range_of_the_misfits_and_nothing(arf_s, rf_s, arf_e, rf_e):
+def test_error_index_is_twice_misfit_range(arf_s, rf_s, arf_e, rf_e):
+    """The range includes zero."""
     misfits = (0.0, arf_s - arf_e, rf_s - rf_e)
     index = error_index(arf_s, rf_s, arf_e, rf_e).value_hz
     assert index == pytest.approx(2.0 * (max(misfits) - min(misfits)), abs=1e-9)
 
 
-def test_far_from_a_kink_the_error_is_the_gradient_s():
+def test_error_follows_gradient_far_from_kink():
     # rf_misfit > arf_misfit > 0: the index is 2 rf_misfit and ARF does not count.
     got = error_index(50.0, 90.0, 40.0, 60.0, arf_s_std_hz=0.3, rf_s_std_hz=0.4, rf_e_std_hz=0.3)
     assert got.std_hz == pytest.approx(2.0 * 0.5, rel=1e-6)
@@ -56,7 +57,7 @@ def test_error_is_the_spread_seen_in_draws(seed, arf, rf, arf_std, rf_std):
     assert told == pytest.approx(seen, rel=0.07, abs=1e-8 + 0.01 * (arf_std + rf_std))
 
 
-def test_arrays_broadcast_and_an_unknown_error_stays_unknown():
+def test_arrays_broadcast_and_unknown_error_stays_unknown():
     ratios = np.array([48.0, 50.0, 52.0])
     got = error_index(ratios, 80.0, 40.0, 75.0, arf_s_std_hz=[0.1, np.nan, 0.1])
     assert got.value_hz.shape == got.std_hz.shape == (3,)
@@ -64,7 +65,7 @@ def test_arrays_broadcast_and_an_unknown_error_stays_unknown():
     assert error_index(ratios, 80.0, 40.0, 75.0).std_hz.shape == (3,)
 
 
-def test_the_index_alone_of_very_many_runs_has_no_error_and_takes_no_room():
+def test_index_of_million_runs_needs_little_memory():
     """Spread over 24 nodes each way it would take gigabytes, and did take most of a diagnosis."""
     arf_hz = np.linspace(120.0, 130.0, 1_000_000)
     index = error_index(arf_hz, 137.0, 125.0, 137.0)

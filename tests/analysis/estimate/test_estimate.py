@@ -47,7 +47,7 @@ def within(found, truth, sigmas):
 
 
 @pytest.mark.parametrize("ratio", [0.15, 0.6])
-def test_a_short_sweep_tells_the_ratio_of_a_machine_off_its_datasheet(ratio, cache):
+def test_short_sweep_estimates_ratio_off_datasheet(ratio, cache):
     unit = load_unit("adss")
     machine = unit.with_parameters(
         R_m=1.004 * unit.motor.R_m, J_L=0.995 * unit.load.J_L, k_ts=1.005 * unit.electronics.k_ts
@@ -67,7 +67,7 @@ def test_a_short_sweep_tells_the_ratio_of_a_machine_off_its_datasheet(ratio, cac
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.study) for n in (1, 2))])
-def test_two_sweeps_of_one_machine_are_estimated_from_together(seed, cache):
+def test_two_sweeps_are_estimated_together(seed, cache):
     """Other levels, band and direction."""
     unit = load_unit("adss")
     lower = replace(SHORT, frequencies_hz=SHORT.frequencies_hz[:13])
@@ -91,7 +91,7 @@ def test_two_sweeps_of_one_machine_are_estimated_from_together(seed, cache):
         estimate_response(first, unit, further=[first])
 
 
-def test_the_error_index_of_several_sweeps_is_that_of_the_first():
+def test_error_index_uses_first_of_several_sweeps():
     """From the same runs, read with the same noise, though the second holds the same level."""
     unit = load_unit("adss")
     plan = replace(SHORT, frequencies_hz=spaced_frequencies(110.0, 170.0, 31))
@@ -110,7 +110,7 @@ def test_the_error_index_of_several_sweeps_is_that_of_the_first():
     assert np.max(np.abs(other.hz - alone.hz)) > 0.1
 
 
-def test_a_dc_offset_that_was_driven_is_not_taken_for_backlash():
+def test_driven_dc_offset_is_no_backlash():
     """It leans the gears on one side: taken for none, the ratio came out at 0.64 for 0.4."""
     unit, leaning = load_unit("adss"), replace(SHORT, dc_offset_v=1.0)
     measured = on_a_bench(simulate(unit, 0.4, leaning, seed=3), seed=4)
@@ -123,7 +123,7 @@ def test_a_dc_offset_that_was_driven_is_not_taken_for_backlash():
 
 
 @pytest.mark.parametrize(("level_vpk", "seed"), [(0.25, 1), (0.5, 2), (0.5, 3)])
-def test_a_sweep_that_says_nothing_of_the_ratio_leaves_all_of_it_open(level_vpk, seed, cache):
+def test_uninformative_sweep_leaves_ratio_open(level_vpk, seed, cache):
     """The motor is held by friction, or moves within its play: every ratio shows the same.
 
     It said 0.06 +- 0.04 for 0.4.
@@ -138,7 +138,7 @@ def test_a_sweep_that_says_nothing_of_the_ratio_leaves_all_of_it_open(level_vpk,
     assert high > 0.8
 
 
-def test_a_level_at_which_friction_holds_the_servo_does_no_harm(cache):
+def test_level_held_by_friction_does_no_harm(cache):
     """Its simulation moves by nothing, and what was read there is the noise of the reading."""
     unit, both = load_unit("adss"), replace(SHORT, levels_vpk=(0.25, 2.5))
     measured = on_a_bench(simulate(unit, 0.6, both, seed=9), seed=6)
@@ -151,7 +151,7 @@ def test_a_level_at_which_friction_holds_the_servo_does_no_harm(cache):
     assert not found.refuted
 
 
-def test_without_phase_and_errors_it_still_answers_and_is_not_surer(cache):
+def test_missing_phase_and_errors_widen_answer(cache):
     unit = load_unit("adss")
     measured = on_a_bench(simulate(unit, 0.5, SHORT, seed=5), seed=2)
     bare = FrequencyResponse.from_arrays(
@@ -168,7 +168,7 @@ def test_without_phase_and_errors_it_still_answers_and_is_not_surer(cache):
     assert less.contribution_ratio.std > 0.8 * full.contribution_ratio.std
 
 
-def test_the_same_seed_gives_the_same_answer_from_kept_machines_or_new_ones(tmp_path):
+def test_seed_gives_same_answer_with_cached_machines(tmp_path):
     unit = load_unit("adss")
     measured = on_a_bench(simulate(unit, 0.4, SHORT, seed=9), seed=3)
     new, kept = (
@@ -205,7 +205,7 @@ def test_practice_sets_with_nothing_hidden(name, truth):
         *(pytest.param(n, marks=pytest.mark.study) for n in ("02", "03", "05", "06", "07", "08")),
     ],
 )
-def test_practice_sets_that_hide_something_get_no_advice_before_a_diagnosis(number):
+def test_hidden_causes_give_no_advice_before_diagnosis(number):
     response = read_response(PRACTICE / f"practice-{number}.csv")
     unit = load_unit(response.unit)
     document = estimate_response(response, unit).to_json()

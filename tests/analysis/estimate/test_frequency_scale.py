@@ -22,7 +22,7 @@ def first_warning(name, factor=1.0):
 
 
 @pytest.mark.parametrize("factor", [1.1])
-def test_a_wrong_time_base_is_the_first_thing_that_is_said(factor):
+def test_wrong_time_base_is_stated_first(factor):
     found = re.match(
         r"frequencies are likely ([0-9.]+) times what they should be",
         first_warning("practice-09", factor),
@@ -32,5 +32,5 @@ def test_a_wrong_time_base_is_the_first_thing_that_is_said(factor):
 
 
 @pytest.mark.parametrize("name", ["practice-01", "practice-02"])
-def test_a_hidden_cause_is_no_wrong_time_base(name):
+def test_hidden_cause_is_no_wrong_time_base(name):
     assert "frequencies are likely" not in first_warning(name)

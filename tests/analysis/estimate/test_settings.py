@@ -32,7 +32,7 @@ def first_warning(response):
     return [*estimate_response(response, load_unit("adss")).warnings, ""][0]
 
 
-def test_levels_in_another_measure_are_the_first_thing_that_is_said():
+def test_levels_in_other_measure_are_stated_first():
     said = first_warning(stated(swept(), 0.5))
     assert "taken for peak-to-peak and halved: multiply source_vpk by 2" in said
     # One factor on friction and backlash does as much, and nothing can tell.
@@ -45,7 +45,7 @@ def test_a_hidden_cause_is_no_mistake():
     assert not any("source levels" in text or "direction" in text for text in warnings)
 
 
-def test_a_time_base_that_is_off_is_refused_before_the_search(tmp_path, capsys):
+def test_wrong_time_base_is_refused_before_search(tmp_path, capsys):
     path, true = tmp_path / "sweep.csv", swept()
     write_response(replace(true, frequency_hz=1.1 * true.frequency_hz), path)
     assert main(["diagnose", str(path), "--unit", "adss", "--json"]) == 2

@@ -25,7 +25,7 @@ def batch(scales):
     return simulate_batch(scales.prior, scales.marks, 5, 4)
 
 
-def test_training_sees_half_of_the_examples_without_a_band(scales, batch):
+def test_training_omits_band_in_half_of_examples(scales, batch):
     """A quarter of the points at most, at the same frequencies of every level."""
     lacking, rng = [], np.random.default_rng(1)
     for _ in range(12):
@@ -43,7 +43,7 @@ def test_a_measurement_lacks_no_band(scales, batch):
     assert np.all((filled == filled.max()) | (filled == 0.0))
 
 
-def test_every_reading_of_a_run_is_another_realisation(scales, batch):
+def test_readings_of_a_run_are_different_realisations(scales, batch):
     """As far apart as its cycle-to-cycle scatter allows, and no further."""
     scattered = replace(batch, variance=np.full_like(batch.variance, 0.5**2))
     steady = replace(batch, variance=np.zeros_like(batch.variance))

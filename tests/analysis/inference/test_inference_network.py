@@ -77,7 +77,7 @@ def test_factor_reads_as_log_gain(scales, factor):
     np.testing.assert_allclose(points[0, 0, CHANNELS.index("gain"), :20], expected, rtol=1e-5)
 
 
-def test_many_points_are_averaged_with_no_point_lost():
+def test_many_points_are_averaged_without_loss():
     frequency_hz = np.linspace(100.0, 180.0, 200)
     ramp = np.exp(np.linspace(0.0, 1.0, 200))
     one = swept(ramp[None, None], frequency_hz, [1.0])
@@ -109,7 +109,7 @@ def inputs_of(posterior, levels, rng):
     return points, rows, conditions.astype(np.float32)
 
 
-def test_order_and_padding_of_levels_do_not_matter(posterior):
+def test_order_and_padding_of_levels_are_irrelevant(posterior):
     weights, shape = posterior.checkpoint.weights, posterior.checkpoint.shape
     points, rows, conditions = inputs_of(posterior, [1.0, 2.0, 3.0], np.random.default_rng(1))
     first = summarise(weights, shape, points, rows, conditions)

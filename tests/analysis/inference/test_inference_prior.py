@@ -74,7 +74,7 @@ def test_machines_of_group_share_linear_part(prior):
 
 
 @pytest.mark.parametrize("name", ["irb", "r3-1", "walkman-b11"])
-def test_every_machine_of_a_drive_that_is_not_the_papers_can_be_built(name):
+def test_every_machine_of_other_drives_is_possible(name):
     """Counts, clock and current limit of a drive are no values of a datasheet that deviate."""
     unit, rng = load_unit(name), np.random.default_rng(4)
     drawn = [one for _ in range(10) for one in Prior(unit).draw_group(2, rng)]

@@ -17,7 +17,7 @@ def observed(effects, sizes, seed=1):
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_what_is_hidden_is_found_among_what_is_proposed(world, seed):
+def test_hidden_cause_is_found_among_proposed_ones(world, seed):
     """A network that favours three causes alike, and says nothing of the ratio."""
     found = refine(
         Untrained((LAG, LOAD, MESH)), observed((LOAD,), [0.8], seed), seed=seed, executor=world
@@ -32,7 +32,7 @@ def test_what_is_hidden_is_found_among_what_is_proposed(world, seed):
     assert verdict.best.candidate.best.place == pytest.approx([0.4, 0.8], abs=0.1)
 
 
-def test_a_pair_is_found_where_only_its_causes_were_proposed(world):
+def test_pair_is_found_from_its_proposed_causes(world):
     """Sets that hold the leader and one more cause are looked at, too."""
     found = refine(Untrained((LAG, LOAD)), observed((LAG, LOAD), [0.7, 0.3]), executor=world)
     leader = found.candidates[0]
@@ -40,7 +40,7 @@ def test_a_pair_is_found_where_only_its_causes_were_proposed(world):
     assert leader.best.place == pytest.approx([0.4, 0.7, 0.3], abs=0.1)
 
 
-def test_every_part_of_what_is_proposed_first_is_looked_at(world):
+def test_every_part_of_first_proposal_is_examined(world):
     found = refine(
         Untrained((LAG, LOAD, MESH)), observed((LAG, LOAD, MESH), [0.8, 0.3, 0.7]), executor=world
     )
@@ -52,13 +52,13 @@ def test_every_part_of_what_is_proposed_first_is_looked_at(world):
     assert {(), (LAG, LOAD, MESH)} <= keys <= set(found.log_prior)
 
 
-def test_every_part_of_what_leads_is_looked_at(world):
+def test_every_part_of_leading_set_is_examined(world):
     """Three causes are proposed and two are there: the two are compared with the three."""
     found = refine(Untrained((LAG, LOAD, MESH)), observed((LAG, MESH), [0.8, 0.7]), executor=world)
     assert (LAG, MESH) in {one.hypothesis.effects for one in found.candidates}
 
 
-def test_what_is_left_out_of_the_catalogue_is_not_simulated(world):
+def test_withheld_cause_is_not_simulated(world):
     found = refine(
         Untrained((LAG, LOAD)), observed((LOAD,), [0.8]), without=(LOAD,), executor=world
     )

@@ -131,7 +131,7 @@ def test_training_that_makes_it_worse_changes_nothing(runs, tmp_path):
         np.testing.assert_allclose(again.weights[name], values, rtol=2e-3, atol=1e-4)
 
 
-def test_ranks_of_the_truth_are_those_of_its_density(simulated):
+def test_ranks_of_truth_match_its_density(simulated):
     """Untrained, the ratio has a flat density, of which the truth's rank is the ratio itself."""
     from scipy.stats import norm
 

@@ -21,7 +21,7 @@ def looking(world):
     return begun
 
 
-def test_a_look_close_about_a_place_stays_there(looking):
+def test_local_runs_stay_near_their_centre(looking):
     hunt = looking(1)
     key, place = ("amplifier-lag", "load-inertia"), np.array([0.4, 0.5, 0.8])
     hunt.simulate_about({key: (place, (0.1, 0.02))}, 3)
@@ -30,7 +30,7 @@ def test_a_look_close_about_a_place_stays_there(looking):
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_further_runs_close_in_on_what_is_there(looking, seed):
+def test_further_runs_concentrate_on_true_model(looking, seed):
     hunt = looking(seed)
     reach = (0.3, 0.3)
     hunt.simulate_about({LOAD: (np.array([0.55, 0.6]), reach), (): (np.array([0.5]), reach)}, 6)

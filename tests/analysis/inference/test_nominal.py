@@ -49,7 +49,7 @@ def swept(mean, variance):
     )
 
 
-def test_regression_reproduces_what_is_linear_in_the_ratio():
+def test_regression_reproduces_linear_ratio_dependence():
     ratio = np.linspace(0.015, 0.985, RUNS)
     mean = np.exp((0.3 + 0.5 * ratio) * (1.0 + 0.2j))[:, None, None].astype(np.complex64)
     found = expected(mean, np.full(mean.shape, 1e-4, dtype=np.float32))
@@ -59,7 +59,7 @@ def test_regression_reproduces_what_is_linear_in_the_ratio():
     np.testing.assert_allclose(found.mean[:, 2, 0, 0], np.log(0.01), atol=1e-2)
 
 
-def test_machine_of_the_datasheet_departs_by_its_own_scatter(runs, machines):
+def test_datasheet_machine_departs_by_its_scatter(runs, machines):
     """Its ratio is found, and a typical reading lies within a standard deviation or so."""
     (departures,), facts = relative([(swept(*machines), expected(*runs))])
     assert departures.shape == (12, 4, 2, 25)

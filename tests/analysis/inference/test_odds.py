@@ -30,12 +30,13 @@ def with_likelihood(one, value):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_what_is_hidden_leads_what_cannot_explain_it(seed):
+def test_hidden_cause_precedes_wrong_ones(seed):
     found = odds(*world(10 * seed))
     assert found[TRUE] > max(found[()], found[WRONG]) + 3.0
 
 
-def test_a_set_is_no_less_likely_over_all_points_than_its_parts():
+def test_set_is_never_below_its_parts():
+    """Over all points."""
     observed, found = world()
     poor = found | {PAIR: with_likelihood(found[PAIR], found[TRUE].best.log_likelihood - 300.0)}
     poorer = found | {PAIR: with_likelihood(found[PAIR], found[TRUE].best.log_likelihood - 900.0)}
@@ -45,7 +46,7 @@ def test_a_set_is_no_less_likely_over_all_points_than_its_parts():
     assert gain == pytest.approx(1.0)
 
 
-def test_what_the_network_rules_out_counts_for_a_millionth():
+def test_excluded_set_has_prior_of_a_millionth():
     observed, found = world()
     ruled_out = odds(observed, found, dict.fromkeys(found, -1.0) | {WRONG: -200.0})
     assert ruled_out[WRONG] - odds(observed, found)[WRONG] == pytest.approx(np.log(1e-6) + 1.0)

@@ -17,7 +17,7 @@ from analysis.inference.run_design import runs_about
     ],
 )
 @pytest.mark.parametrize("seed", range(3))
-def test_every_size_and_the_ratio_are_spread_evenly_over_the_reach(effects, size_reach, seed):
+def test_sizes_and_ratio_cover_reach_evenly(effects, size_reach, seed):
     hypothesis = Hypothesis(synthetic.ADSS, effects)
     best, rng = np.full(hypothesis.d, 0.5), np.random.default_rng(seed)
     groups = list(runs_about(hypothesis, best, 4, rng, (0.14, size_reach)))
@@ -37,7 +37,7 @@ def test_groups_stay_inside_the_plausible_range():
         assert np.all((group.places >= 0.0) & (group.places <= 1.0))
 
 
-def test_the_plain_model_has_no_sizes_to_spread():
+def test_plain_model_has_no_sizes_to_spread():
     rng = np.random.default_rng(2)
     groups = list(runs_about(Hypothesis(synthetic.ADSS), np.array([0.4]), 3, rng, (0.14, 0.06)))
     assert [group.sizes.shape for group in groups] == [(0,)] * 3

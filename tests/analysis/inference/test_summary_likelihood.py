@@ -56,7 +56,7 @@ def test_true_set_wins_on_average():
         assert max(mean, key=lambda key: mean[key]) == true
 
 
-def test_a_coordinate_without_effect_costs_nothing_but_its_regression():
+def test_coordinate_without_effect_costs_only_its_regression():
     rng = np.random.default_rng(6)
     plain = runs_of((), 2000, rng)
     idle = SummaryRuns(

@@ -56,7 +56,7 @@ def changed(vocabulary):
     return Vocabulary(effects, sizes, symbols)
 
 
-def test_what_both_units_have_is_answered_as_before(trained):
+def test_transferred_posterior_keeps_answers_of_shared_effects(trained):
     wanted = changed(ADSS)
     made = transfer_weights(trained, ADSS, wanted)
     assert (made.shape.effects, made.shape.parameters, made.shape.symbols) == (
@@ -82,7 +82,7 @@ def test_what_both_units_have_is_answered_as_before(trained):
             assert mine[name] == pytest.approx(theirs[name], abs=2e-3)
 
 
-def test_what_is_new_changes_nothing_before_it_is_trained(trained):
+def test_untrained_symbol_has_no_influence(trained):
     """A tolerance that the network has not met says nothing to it."""
     more = replace(ADSS, symbols=(*ADSS.symbols, "bandwidth_hz"))
     made = transfer_weights(trained, ADSS, more)
@@ -92,7 +92,7 @@ def test_what_is_new_changes_nothing_before_it_is_trained(trained):
 
 
 @pytest.mark.parametrize("name", ["r3-1", "irb", "walkman-2300", "edss"])
-def test_every_shipped_drive_can_begin_with_the_posterior_of_the_paper(name, trained):
+def test_every_shipped_drive_accepts_paper_posterior_weights(name, trained):
     wanted = vocabulary_of(Prior(load_unit(name)))
     made = transfer_weights(trained, ADSS, wanted)
     logits = answers(made, wanted, {}, [(), ("load-inertia",)])[0]

@@ -39,7 +39,7 @@ def judged(upper):
     return judge(LimitSet("outgoing", table), estimate=makings.ESTIMATE)
 
 
-def test_a_certificate_says_all_of_it_and_its_document_too(report):
+def test_certificate_and_its_document_are_complete(report):
     path, page = report(certificate=FULL, judgement=judged(0.4))
     for words in ("C-7/2026", "Gear Lab", "2025-03-01, due 2026-03-01, certificate 4711",
                   "22.5 degC", "Q. Manager", "A. B.", "Decision rule: ISO 14253-1"):  # fmt: skip
@@ -51,7 +51,7 @@ def test_a_certificate_says_all_of_it_and_its_document_too(report):
     assert "counter(pages)" in path.read_text(encoding="utf-8")
 
 
-def test_a_unit_out_of_limits_is_the_first_thing_that_is_said(report):
+def test_unit_out_of_limits_is_stated_first(report):
     _, page = report(judgement=judged(0.1))
     assert page.text.index("FAIL by limits outgoing; out of limits: b1.") < 160
     assert "No limits are set" not in page.text
@@ -64,7 +64,7 @@ def test_a_calibration_that_was_overdue_is_told(report):
     assert page.data["certificate"]["calibration_overdue"] is True
 
 
-def test_without_a_number_one_is_made_of_date_and_data(report):
+def test_default_number_depends_on_date_and_data(report):
     numbers = {report(**words)[1].data["certificate"]["number"]
                for words in ({}, {}, {"response": makings.response(serial="SN 8")})}  # fmt: skip
     assert len(numbers) == 1
@@ -75,7 +75,7 @@ def test_without_a_number_one_is_made_of_date_and_data(report):
 
 @settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.text(st.characters(codec="utf-8"), min_size=1, max_size=20))
-def test_no_number_breaks_out_of_the_style_sheet(text):
+def test_number_cannot_leave_the_style_sheet(text):
     from analysis.report.certificate import page_style
 
     style = page_style({"certificate": {"number": text}})
@@ -84,7 +84,7 @@ def test_no_number_breaks_out_of_the_style_sheet(text):
     assert style.count('"') == 2 + 4
 
 
-def test_a_logo_is_in_the_page_and_nothing_else_may_be(report, tmp_path):
+def test_only_a_logo_is_embedded(report, tmp_path):
     file = tmp_path / "logo.png"
     file.write_bytes(PNG)
     path, page = report(certificate=Certificate(logo=logo_address(file)))
@@ -107,7 +107,7 @@ def test_what_is_no_logo_is_refused(tmp_path, name, content, words):
         logo_address(path)
 
 
-def test_a_reading_tells_its_numbers_where_its_mark_is(report):
+def test_tooltip_of_reading_lies_at_its_mark(report):
     path, _ = report()
     picture = re.search(r"<svg.*?</svg>", path.read_text(encoding="utf-8"), re.DOTALL)[0]
     root = ET.fromstring(picture)
@@ -122,7 +122,7 @@ def test_a_reading_tells_its_numbers_where_its_mark_is(report):
     assert re.fullmatch(r"100 Hz, 1.5 V: -\d+\.\d+ ± 0\.050 dB", titles[0])
 
 
-def test_a_spoilt_reading_is_told_as_one_and_has_no_phase(report):
+def test_spoilt_reading_is_marked_without_phase(report):
     whole = makings.response()
     flags = whole.flags.copy()
     flags[3] = PointFlag.SPOILT
@@ -145,7 +145,7 @@ def test_a_browser_prints_it_with_page_numbers(report, tmp_path):
     assert 2 <= seen.pages <= 4
 
 
-def test_the_index_links_the_reports_of_its_history(report, tmp_path):
+def test_index_links_reports_of_its_history(report, tmp_path):
     path, _ = report(origin=Origin("measurement 3 of lab.db", facts={"measurement": 3}))
     (tmp_path / "other.html").write_text("<p>no report</p>")
     begun = {3: makings.response().provenance["started"], 4: "2026-01-02T03:04:06+00:00"}

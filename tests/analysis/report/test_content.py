@@ -29,7 +29,7 @@ def test_it_says_what_was_measured_and_how(report):
     assert "SIMULATED" not in page.text
 
 
-def test_the_features_and_the_estimate_stand_in_words_and_numbers(report):
+def test_features_and_estimate_have_words_and_numbers(report):
     _, page = report()
     assert "Adjust stage 2 first: 30 % of the backlash sits in stage 1" in page.text
     assert "backlash of stage 1, b1 0.2079 deg 0.0139 0.1800 to 0.2360" in page.text
@@ -56,7 +56,7 @@ def test_the_features_and_the_estimate_stand_in_words_and_numbers(report):
         ((0.21, 0.1), ["Undecided: stage 1 UNDECIDED; stage 2 PASS", "deg: measure again"]),
     ],
 )
-def test_limits_decide_the_headline_and_the_table_alike(report, limits, said):
+def test_limits_decide_headline_and_table_alike(report, limits, said):
     _, page = report(unit=with_limits(*limits))
     for words in said:
         assert words in page.text
@@ -73,7 +73,8 @@ REFUTED = makings.ESTIMATE | {
 
 
 @pytest.mark.parametrize("limits", [(None, None), (0.3, 0.001)])
-def test_a_refuted_plain_model_gives_no_advice_and_no_stage_before_a_diagnosis(report, limits):
+def test_refuted_plain_model_gives_no_advice(report, limits):
+    """Nor is a stage named before a diagnosis."""
     _, page = report(unit=with_limits(*limits), estimate=REFUTED)
     assert "No advice before a diagnosis" in page.text
     assert WARNED in page.text
@@ -83,7 +84,7 @@ def test_a_refuted_plain_model_gives_no_advice_and_no_stage_before_a_diagnosis(r
     assert page.data["estimate"]["warnings"] == REFUTED["warnings"]
 
 
-def test_with_a_diagnosis_all_numbers_are_those_of_the_model_that_it_accepts(report, explained):
+def test_numbers_are_those_of_accepted_model(report, explained):
     _, page = report(estimate=REFUTED, diagnosis=explained)
     document = explained.to_json()
     assert document["verdict"] == "explained"
@@ -100,7 +101,7 @@ def test_with_a_diagnosis_all_numbers_are_those_of_the_model_that_it_accepts(rep
     assert page.text.count("contribution ratio r of stage 1") == 1
 
 
-def test_the_diagnosis_has_its_causes_gain_and_pictures(report, explained):
+def test_diagnosis_shows_causes_gain_and_pictures(report, explained):
     path, page = report(diagnosis=explained)
     document = explained.to_json()
     assert "Explained." in page.text
@@ -119,7 +120,7 @@ def test_the_diagnosis_has_its_causes_gain_and_pictures(report, explained):
     assert f"    To make sure: {cause['check']}.\n" in told
 
 
-def test_sweeps_that_were_taken_together_are_listed_and_departures_say_of_which(report, explained):
+def test_joint_sweeps_are_listed_with_their_departures(report, explained):
     (plan, rows), alone = explained.observation.plans[0], report(diagnosis=explained)[1]
     assert "Taken together" not in alone.text
     first, second = np.array_split(rows, 2)
@@ -170,7 +171,7 @@ def test_every_verdict_has_its_words(report, monkeypatch, hidden, judged, verdic
         assert not one.refused or verdict != "consistent" or one.effects
 
 
-def test_a_tie_is_told_with_the_sweep_that_would_break_it(report):
+def test_tie_is_shown_with_its_resolving_sweep(report):
     class Told:
         def to_json(self):
             from outputs.screen import DIAGNOSIS
@@ -209,7 +210,7 @@ def test_doubts_stand_at_the_top(report):
     assert "not complete: interrupted" in top
 
 
-def test_no_doubt_where_the_unit_is_the_one_that_was_measured(report):
+def test_measured_unit_raises_no_doubt(report):
     from daq.configs import config_path
 
     text = config_path("units", "adss").read_text(encoding="utf-8")

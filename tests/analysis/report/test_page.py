@@ -20,7 +20,7 @@ from daq.errors import AnalysisError, InputError
 from sim.unit import unit_from_mapping
 
 
-def test_the_copy_for_programs_is_whole_and_its_hashes_hold(report, tmp_path):
+def test_machine_readable_copy_and_hashes_are_complete(report, tmp_path):
     file = tmp_path / "data.csv"
     file.write_bytes(b"some bytes")
     response = makings.response()
@@ -55,7 +55,7 @@ def test_the_same_report_is_the_same_file(report, explained):
     assert report(diagnosis=explained)[0].read_bytes() == once
 
 
-def test_nothing_is_fetched_and_no_name_is_given_twice(report, explained):
+def test_nothing_is_fetched_and_identifiers_are_unique(report, explained):
     path, page = report(diagnosis=explained)
     assert "script-src" not in path.read_text()
     assert page.tags.count("script") == 1
@@ -72,7 +72,7 @@ def test_nothing_is_fetched_and_no_name_is_given_twice(report, explained):
     assert "@import" not in path.read_text()
 
 
-def test_every_picture_is_an_image_with_words_and_sound_xml(report):
+def test_every_picture_has_label_and_valid_xml(report):
     path, _ = report()
     pictures = re.findall(r"<svg.*?</svg>", path.read_text(encoding="utf-8"), re.DOTALL)
     assert len(pictures) == 2
@@ -107,7 +107,7 @@ def test_markup_cannot_be_broken(text, other):
     assert json.loads(page.blocks["d"]) == {text: other}
 
 
-def test_markup_is_escaped_once_and_a_number_that_is_none_refused():
+def test_markup_is_escaped_and_nan_is_refused():
     assert element("p", Markup("<i>"), "<i>") == "<p><i>&lt;i&gt;</p>"
     with pytest.raises(ValueError, match="JSON"):
         data_block({"a": float("nan")}, "d")
@@ -121,13 +121,13 @@ def test_what_is_not_seen_is_written_out(report):
     assert page.data["measurement"]["serial"] == "SN\u202e4\x1b[2J"
 
 
-def test_a_long_remark_does_not_fill_the_pages(report):
+def test_long_remark_does_not_fill_pages(report):
     _, page = report(makings.response(notes="word " * 5000))
     assert "the rest is in the data" in page.text
     assert page.data["measurement"]["notes"] == "word " * 5000
 
 
-def test_without_phase_errors_levels_or_words_it_still_is_a_report(report):
+def test_report_needs_no_phase_errors_or_levels(report):
     from daq.frf import FrequencyResponse
 
     bare = FrequencyResponse.from_arrays(
@@ -138,7 +138,7 @@ def test_without_phase_errors_levels_or_words_it_still_is_a_report(report):
     assert page.data["response"]["phase_deg"] == [None] * 21
 
 
-def test_a_place_that_cannot_be_written_and_an_empty_response_are_refused(tmp_path):
+def test_unwritable_place_and_empty_response_are_refused(tmp_path):
     response = makings.response()
     with pytest.raises(InputError, match="no directory"):
         write_report(tmp_path / "no" / "r.html", response, makings.ADSS, Origin("x"))
@@ -147,9 +147,8 @@ def test_a_place_that_cannot_be_written_and_an_empty_response_are_refused(tmp_pa
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_browser_shows_all_of_it_without_complaint_on_two_to_four_pages(
-    report, explained, tmp_path
-):
+def test_browser_shows_report_on_few_pages(report, explained, tmp_path):
+    """On two to four pages, without a complaint of the browser."""
     path, page = report(makings.response(notes=makings.NASTY), diagnosis=explained)
     seen = look(path, tmp_path)
     assert seen.complaints == []

@@ -43,7 +43,7 @@ def test_the_beginning_of_a_unit_is_enough(bench, line, hertz):
         ("SNPS 2,9", 16), ("SNPS 2,2049", 16), ("SSAM 5001 mV", 16), ("SOFF 6", 16),
     ],
 )  # fmt: skip
-def test_what_is_refused_sets_a_bit_and_changes_nothing(bench, line, event):
+def test_refused_command_sets_bit_changes_nothing(bench, line, event):
     questions = "SSTR? 0", "SNPS? 0", "MEAS? 0", "SSAM?", "SOFF?", "MGRP? 1"
     bench.send("MGRP 2,3")
     before = [bench.ask(question) for question in questions]
@@ -59,14 +59,15 @@ def test_a_refused_question_is_not_answered(bench):
     assert bench.events() & 48
 
 
-def test_questions_in_one_line_are_answered_one_by_one(bench):
+def test_queries_in_one_line_are_answered_separately(bench):
     bench.send("SRCO?;MGRP? 0;*STB?")
     replies = [bench.box.talk() for _ in range(3)]
     assert [reply.data for reply in replies] == [b"0\n", b"0\n", b"16\n"]
     assert all(reply.end for reply in replies)
 
 
-def test_settings_of_swept_sine_need_its_group_and_a_live_display(bench):
+def test_swept_sine_settings_need_group_and_display(bench):
+    """The display must be live."""
     bench.send("SSTR 2,300")
     assert bench.events() == 16
     bench.send("MGRP 2,3")
@@ -78,7 +79,7 @@ def test_settings_of_swept_sine_need_its_group_and_a_live_display(bench):
     assert bench.ask("SSTR? 0") == "300"
 
 
-def test_a_level_comes_with_the_index_of_its_unit(bench):
+def test_level_reply_has_index_of_unit(bench):
     bench.send("MGRP 2,3")
     for line, reply in (("SSAM 500 mV", "500,0"), ("SSAM .5 V", "0.5,1"), ("SSAM -20dB", "-20,2")):
         bench.send(line)
@@ -111,7 +112,8 @@ def test_replies_go_where_outx_says_whoever_asked(bench):
     assert bench.take() == b"0\n"
 
 
-def test_a_line_ends_with_line_feed_or_eoi_on_the_bus(bench):
+def test_line_ends_with_line_feed_or_eoi(bench):
+    """On the bus."""
     bench.box.listen(b"SRCO?\n")
     bench.rest()
     assert bench.take() == b"0\n"
@@ -136,7 +138,7 @@ def test_more_than_256_characters_empty_both_buffers(bench):
     assert int(bench.ask("ERRS? 0")) == 1
 
 
-def test_the_bus_is_free_only_when_nothing_executes(bench):
+def test_bus_is_free_when_nothing_executes(bench):
     bench.box.listen(b"SRCO 0", end=True)
     assert not bench.box.serial_poll() & IFC
     bench.rest()
@@ -144,7 +146,7 @@ def test_the_bus_is_free_only_when_nothing_executes(bench):
     assert int(bench.ask("*STB?")) & IFC == 0
 
 
-def test_a_reset_keeps_it_busy_for_twelve_seconds(bench):
+def test_reset_takes_twelve_seconds(bench):
     bench.send("MGRP 2,3")
     bench.send("*RST")
     bench.box.listen(b"MGRP? 0", end=True)
@@ -154,7 +156,7 @@ def test_a_reset_keeps_it_busy_for_twelve_seconds(bench):
     assert bench.take() == b"0\n"
 
 
-def test_a_device_clear_empties_the_buffers_and_lets_a_sweep_go_on():
+def test_device_clear_empties_buffers_but_continues_sweep():
     bench = Bench()
     bench.swept(points=40)
     bench.send("STRT")
@@ -168,7 +170,7 @@ def test_a_device_clear_empties_the_buffers_and_lets_a_sweep_go_on():
 # ------------------------------------------------------------ status
 
 
-def test_words_are_read_whole_or_bit_by_bit_and_cleared_so(bench):
+def test_status_words_clear_whole_or_by_bit(bench):
     bench.swept()
     assert bench.ask("DSPS? 4") == "1"
     assert bench.ask("DSPS? 4") == "0"
@@ -176,7 +178,7 @@ def test_words_are_read_whole_or_bit_by_bit_and_cleared_so(bench):
     assert bench.ask("DSPS?") == "0"
 
 
-def test_an_enabled_bit_shows_in_the_poll_and_requests_service(bench):
+def test_enabled_bit_shows_in_poll_requests_service(bench):
     bench.send("DSPE 16")
     bench.send("*SRE 2")
     assert bench.box.serial_poll() == IFC
@@ -188,7 +190,7 @@ def test_an_enabled_bit_shows_in_the_poll_and_requests_service(bench):
     assert bench.box.serial_poll() == IFC
 
 
-def test_enables_survive_a_power_cycle_only_if_told_so(bench):
+def test_enables_survive_power_cycle_if_set_so(bench):
     bench.send("*ESE 48")
     bench.box.power_on()
     assert bench.ask("*ESE?") == "0"

@@ -60,7 +60,7 @@ def test_views_are_those_of_the_manual(view, shown):
         assert float(bench.ask(f"DSPY? 0,{row}")) == pytest.approx(shown(known_gain(hz)), rel=1e-5)
 
 
-def test_decibels_and_radians_where_they_are_asked_for():
+def test_decibels_and_radians_are_given_on_request():
     bench = Bench()
     bench.swept(VIEW="2,0", UNDB="2,1")
     assert float(bench.ask("DSPY? 0,0")) == pytest.approx(20 * math.log10(abs(known_gain(100))))
@@ -70,7 +70,8 @@ def test_decibels_and_radians_where_they_are_asked_for():
     assert float(bench.ask("DSPY? 0,0")) == pytest.approx(math.atan2(z.imag, z.real), rel=1e-5)
 
 
-def test_a_nyquist_trace_is_pairs_y_first_in_binary_and_x_first_in_text():
+def test_nyquist_pairs_differ_in_binary_and_text():
+    """Binary pairs give y first, text pairs x first."""
     bench = Bench()
     bench.swept(VIEW="2,7")
     z = known_gain(100)
@@ -83,7 +84,7 @@ def test_a_nyquist_trace_is_pairs_y_first_in_binary_and_x_first_in_text():
     assert len(bench.take()) == 8 * 13
 
 
-def test_binary_is_what_text_says_without_header_or_end():
+def test_binary_equals_text_without_header_or_end():
     bench = Bench()
     bench.swept()
     text = bench.trace()
@@ -93,7 +94,8 @@ def test_binary_is_what_text_says_without_header_or_end():
     assert struct.unpack("<13f", data) == pytest.approx(text, rel=1e-6)
 
 
-def test_a_transfer_keeps_the_bus_busy_and_is_given_up_after_a_second():
+def test_transfer_occupies_bus_and_times_out():
+    """It is given up after a second."""
     bench = Bench()
     bench.swept()
     bench.send("DSPB? 0")
@@ -124,9 +126,8 @@ def test_binary_does_not_go_to_rs232(bench):
      ((1, 0.5), (1, 1.0), 100.0, 1.5),
      ((1, 0.0078125), (1, 0.0234375), 100.0, 0.01 + 0.03)],
 )  # fmt: skip
-def test_a_point_takes_cycles_or_time_whichever_is_longer_in_whole_cycles(
-    settle, integrate, hz, seconds
-):
+def test_point_takes_longer_of_cycles_or_time(settle, integrate, hz, seconds):
+    """Rounded up to whole cycles."""
     bench = Bench(point_overhead_s=0.0, command_s=1e-6)
     bench.swept(
         points=10, SSTR=f"2,{hz}", SSTP=f"2,{hz * 1.0001}", SSCY=f"2,{settle[0]}",
@@ -159,7 +160,7 @@ def test_the_source_drives_only_while_it_sweeps():
     assert bench.box.driven_v == 0.0
 
 
-def test_fft_drives_as_soon_as_it_is_entered_with_the_switch_on():
+def test_entering_fft_drives_if_switch_is_on():
     bench = Bench()
     bench.swept(S1AM="2 V")
     assert bench.box.driven_v == 0.0
@@ -182,7 +183,7 @@ def test_a_ramp_takes_its_time():
     assert 0.4 < bench.box.driven_v < 0.6
 
 
-def test_a_change_of_the_grid_throws_the_data_away_and_begins_anew():
+def test_grid_change_discards_data_and_restarts():
     bench = Bench()
     bench.swept(points=40)
     bench.send("STRT")
@@ -196,7 +197,7 @@ def test_a_change_of_the_grid_throws_the_data_away_and_begins_anew():
     assert bench.ask("DSPN? 0") == "21"
 
 
-def test_an_input_range_that_is_too_small_clips_and_says_so():
+def test_too_small_input_range_clips_and_reports():
     bench = Bench(gain=lambda hz: 0.5)
     bench.swept(A2RG="0", I2RG="-12 dBVpk")
     bits = int(bench.ask("INPS?"))
@@ -212,7 +213,7 @@ def test_autorange_goes_up_alone_unless_it_tracks():
         assert bench.ask("I2RG?") == f"{step},0"
 
 
-def test_automatic_resolution_skips_points_and_does_not_say_so():
+def test_automatic_resolution_skips_points_silently():
     bench = Bench()
     bench.swept(points=60, SARS="2,1", SFST="2,3", SSKP="2,10")
     taken = len(bench.box.sweep.bins)
@@ -220,7 +221,7 @@ def test_automatic_resolution_skips_points_and_does_not_say_so():
     assert all(value > FILLER * 0.99 for value in bench.trace()[:-1])
 
 
-def test_automatic_level_holds_the_channel_and_respects_the_maximum():
+def test_automatic_level_respects_maximum():
     bench = Bench(gain=lambda hz: 0.25)
     bench.swept(SSAL="2", SSRF="500 mV", SMAX="5 V", MEAS="2,43", VIEW="2,1", UNPK="2,1")
     assert bench.trace()[0] == pytest.approx(0.5, rel=0.15)
@@ -229,7 +230,7 @@ def test_automatic_level_holds_the_channel_and_respects_the_maximum():
     assert bench.trace()[0] == pytest.approx(0.25, rel=0.01)
 
 
-def test_psd_units_are_switched_in_fft_and_spoil_a_swept_sine():
+def test_psd_units_set_in_fft_distort_sweep():
     bench = Bench()
     bench.send("PSDU 0,1")
     bench.swept()
@@ -239,14 +240,14 @@ def test_psd_units_are_switched_in_fft_and_spoil_a_swept_sine():
     assert bench.ask("PSDU? 0") == "1"
 
 
-def test_the_normalised_variance_is_that_of_a_cycle():
+def test_normalised_variance_is_that_of_cycle():
     bench = Bench(noise_v=1e-3, seed=4)
     bench.swept(points=40, MEAS="2,45", VIEW="2,1", SICY="2,100")
     relative = 1e-3 * math.sqrt(30) / np.abs([known_gain(hz) for hz in np.linspace(100, 200, 40)])
     assert np.median(bench.trace()[:-1] / (2 * relative**2)) == pytest.approx(1.0, rel=0.15)
 
 
-def test_a_unit_holds_characters_of_an_old_code_page():
+def test_unit_has_characters_of_old_code_page():
     bench = Bench()
     bench.swept(MEAS="2,42", VIEW="2,2", PSDU="2,1")
     bench.send("UNIT? 0")
@@ -268,7 +269,7 @@ def test_an_sr780_has_other_numbers():
 
 @settings(max_examples=150)
 @given(st.binary(max_size=300) | st.text("SRCOMGP?2,;0 \n*ESVY", max_size=80).map(str.encode))
-def test_whatever_comes_it_comes_back_to_its_senses(data):
+def test_device_recovers_from_any_input(data):
     bench = Bench()
     bench.box.listen(data, end=True)
     bench.rest(30.0)

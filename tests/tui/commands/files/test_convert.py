@@ -24,7 +24,7 @@ SUFFIXES = (".csv", ".h5", ".uff", ".mat")
 
 
 @pytest.mark.parametrize(("one", "other"), list(permutations(SUFFIXES, 2)))
-def test_a_response_goes_from_any_format_to_any_other(tmp_path, one, other):
+def test_response_converts_between_all_formats(tmp_path, one, other):
     response = measured(flags=None)
     given, made = tmp_path / f"x{one}", tmp_path / f"y{other}"
     write_response(response, given)
@@ -37,7 +37,7 @@ def test_a_response_goes_from_any_format_to_any_other(tmp_path, one, other):
         same(back, response)
 
 
-def test_what_a_file_does_not_say_is_told(tmp_path, capsys):
+def test_missing_value_is_requested_as_option(tmp_path, capsys):
     given, made = tmp_path / "x.h5", tmp_path / "y.csv"
     bare = FrequencyResponse.from_arrays([100.0, 120.0, 140.0], np.nan, 0.5j, unit="unknown")
     write_response(bare, given)
@@ -70,21 +70,21 @@ def test_what_a_file_does_not_say_is_told(tmp_path, capsys):
         (["--profile="], "--profile is empty"),
     ],
 )
-def test_what_contradicts_a_file_or_means_nothing_is_refused(tmp_path, capsys, words, fault):
+def test_contradicting_or_meaningless_option_is_refused(tmp_path, capsys, words, fault):
     out = tmp_path / "y.h5"
     assert main(["convert", str(sample_path("adss-sweep")), str(out), *words]) == 2
     assert fault in capsys.readouterr().err
     assert not out.exists()
 
 
-def test_columns_are_not_told_of_a_file_of_our_own_form(tmp_path, capsys):
+def test_column_options_are_refused_for_own_format(tmp_path, capsys):
     given, out = str(sample_path("adss-sweep")), tmp_path / "y.h5"
     for words in (["--column", "gain_db=3"], ["--as-guessed"], ["--profile", "bode100"]):
         assert main(["convert", given, str(out), *words]) == 2
         assert "is a CSV of lashbench's own form" in capsys.readouterr().err
 
 
-def test_our_own_table_saved_by_a_spreadsheet_is_read_as_a_table(tmp_path, capsys):
+def test_own_table_from_spreadsheet_is_table(tmp_path, capsys):
     given, out = tmp_path / "x.csv", tmp_path / "y.csv"
     text = Path(sample_path("adss-sweep")).read_text()
     given.write_text(text.replace(".", "·").replace(",", ";").replace("·", ","))
@@ -107,7 +107,7 @@ def test_a_file_is_not_written_over_itself(tmp_path, capsys):
     assert path.read_bytes() == before
 
 
-def test_rows_at_0_hz_of_any_format_are_left_out_and_said(tmp_path, capsys):
+def test_zero_frequency_rows_are_omitted_with_note(tmp_path, capsys):
     text = Path(sample_path("adss-sweep")).read_text()
     first = next(line for line in text.splitlines() if line[:1].isdigit())
     level = first.split(",")[1]
@@ -128,7 +128,7 @@ def guessed(tmp_path):
     return path
 
 
-def test_without_an_output_a_file_is_shown_as_it_would_be_read(guessed, tmp_path, capsys):
+def test_missing_output_shows_the_reading_only(guessed, tmp_path, capsys):
     before = sorted(tmp_path.iterdir())
     assert main(["convert", str(guessed)]) == 0
     told = capsys.readouterr()
@@ -143,7 +143,7 @@ def test_without_an_output_a_file_is_shown_as_it_would_be_read(guessed, tmp_path
     assert sorted(tmp_path.iterdir()) == before
 
 
-def test_a_guess_is_written_only_where_a_person_confirms_it(guessed, tmp_path, capsys):
+def test_guess_is_written_only_after_confirmation(guessed, tmp_path, capsys):
     out = tmp_path / "y.h5"
     assert main(["convert", str(guessed), str(out)]) == 2
     assert "--as-guessed" in capsys.readouterr().err
@@ -170,7 +170,7 @@ def typed(words, answer: bytes) -> int:
     return child.returncode
 
 
-def test_a_layout_is_kept_as_a_profile_of_ones_own(guessed, tmp_path, capsys, monkeypatch):
+def test_layout_is_stored_as_own_profile(guessed, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
     columns = ["--column", "frequency_hz=freq", "--column", "gain_db=2", "--column", "phase_deg=3"]
     words = ["convert", str(guessed), str(tmp_path / "y.h5"), *columns]
@@ -185,7 +185,7 @@ def test_a_layout_is_kept_as_a_profile_of_ones_own(guessed, tmp_path, capsys, mo
     capsys.readouterr()
 
 
-def test_what_was_remarked_of_the_original_is_told_once(guessed, tmp_path, capsys):
+def test_remark_on_original_is_given_once(guessed, tmp_path, capsys):
     out = tmp_path / "y.csv"
     words = ["--as-guessed", "--level", "1", "--unit-name", "ADSS"]
     assert main(["convert", str(guessed), str(out), *words]) == 0

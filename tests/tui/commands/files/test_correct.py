@@ -36,7 +36,7 @@ def test_a_correction_is_listed_printed_and_exported(run, db, tmp_path):
         assert list(provenance["corrections"]["person"]) == ["C. D.", "C. D."]
 
 
-def test_a_serial_number_that_was_mended_counts_in_the_trend_of_its_specimen(run, db):
+def test_corrected_serial_number_joins_its_trend(run, db):
     for serial in ("S", "X"):
         run(*measuring("--serial", serial))
     number = {"value": 0.3, "std": 0.05}
@@ -60,7 +60,7 @@ def test_a_serial_number_that_was_mended_counts_in_the_trend_of_its_specimen(run
         ((1, "--serial", "x" * 1001, "--by", "me"), "serial has 1001 characters"),
     ],
 )
-def test_what_cannot_be_corrected_ends_with_2_and_changes_nothing(run, db, words, said):
+def test_invalid_correction_exits_2_changing_nothing(run, db, words, said):
     run(*measuring("--serial", "S"))
     code, out, err = run("correct", *words)
     assert (code, out) == (2, "")
@@ -70,7 +70,7 @@ def test_what_cannot_be_corrected_ends_with_2_and_changes_nothing(run, db, words
         assert store.corrections(1) == []
 
 
-def test_a_value_that_stands_there_already_is_no_correction(run, db):
+def test_equal_value_is_no_correction(run, db):
     run(*measuring("--serial", "S"))
     code, out, err = run("correct", 1, "--serial", "S", "--by", "me")
     assert code == 0

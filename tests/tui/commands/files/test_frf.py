@@ -51,7 +51,7 @@ def off(response):
 
 
 @pytest.mark.parametrize("words", SIGNALS)
-def test_the_kind_of_signal_is_found_and_the_bars_hold_the_truth(words):
+def test_signal_kind_is_detected_errors_cover_truth(words):
     held = []
     for seed in range(3):
         response, notes = response_of_record(
@@ -70,7 +70,8 @@ def test_the_kind_of_signal_is_found_and_the_bars_hold_the_truth(words):
     assert level.rf.frequency_hz == pytest.approx(high, abs=4 * level.rf.std_hz)
 
 
-def test_a_stepped_sine_is_taken_by_dwell_and_level():
+def test_stepped_sine_is_split_into_dwells():
+    """One point for each dwell and level."""
     response, _ = response_of_record(
         record("a stepped sine"), unit="X", settle_cycles=25, integrate_cycles=20
     )
@@ -84,7 +85,7 @@ def test_a_stepped_sine_is_taken_by_dwell_and_level():
     assert low / high == pytest.approx(4.0, rel=0.3)
 
 
-def test_a_dwell_that_still_settles_has_wide_bars():
+def test_unsettled_dwell_has_wide_errors():
     signal = known.stepped([69.0, 69.6, 70.2], cycles=14)
     rng = np.random.default_rng(0)
     response, notes = response_of_record(
@@ -97,7 +98,7 @@ def test_a_dwell_that_still_settles_has_wide_bars():
 
 
 @pytest.mark.parametrize(("estimator", "right"), [("H1", False), ("H2", True)])
-def test_h2_is_right_where_the_noise_is_at_the_input(estimator, right):
+def test_h2_is_right_with_input_noise(estimator, right):
     rng = np.random.default_rng(1)
     x, y = known.driven(known.noise(rng, 120.0), rng, input_noise=0.5)
     response, _ = response_of_record(
@@ -136,7 +137,7 @@ def written(folder, kind, one):
 
 
 @pytest.mark.parametrize("kind", ["csv", "mat", "wav"])
-def test_the_verb_writes_a_response_that_the_other_verbs_read(kind, tmp_path, capsys):
+def test_written_response_is_read_by_other_verbs(kind, tmp_path, capsys):
     path, words = written(tmp_path, kind, record("a periodic signal"))
     out = tmp_path / "response.csv"
     assert main(["frf", str(path), *words, "--out", str(out), "--unit-name", "ADSS"]) == 0
@@ -166,7 +167,7 @@ def test_the_verb_writes_a_response_that_the_other_verbs_read(kind, tmp_path, ca
         (["--input-scale", "0"], "no scale"),
     ],
 )
-def test_what_does_not_fit_is_refused_in_one_line(change, said, tmp_path, capsys):
+def test_inconsistent_options_are_refused_in_one_line(change, said, tmp_path, capsys):
     path, words = written(tmp_path, "csv", record("a periodic signal"))
     out = tmp_path / "out.csv"
     for option, value in zip(change[::2], change[1::2], strict=True):
@@ -215,9 +216,7 @@ def test_columns_that_are_no_record_are_refused(columns, said, tmp_path, capsys)
         ("angle,V_i,V_o", 0.3, "500", False),
     ],
 )
-def test_a_rate_that_a_column_of_times_contradicts_is_refused(
-    header, scale, rate, refused, tmp_path, capsys
-):
+def test_rate_contradicting_time_column_is_refused(header, scale, rate, refused, tmp_path, capsys):
     one = record("a periodic signal")
     path, out = tmp_path / "record.csv", tmp_path / "out.csv"
     rows = np.column_stack([np.arange(len(one)) / one.rate_hz * scale, one.input_v, one.output_v])
@@ -233,7 +232,7 @@ def test_a_rate_that_a_column_of_times_contradicts_is_refused(
 
 @pytest.mark.parametrize("words", SIGNALS)
 @pytest.mark.parametrize("noise", [0.02, 40.0])
-def test_an_output_that_has_little_to_do_with_the_input_is_warned_of(words, noise):
+def test_output_incoherent_with_input_has_warning(words, noise):
     one = record(words, noise=noise)
     _, notes = response_of_record(one, unit="X", start_hz=20.0, stop_hz=110.0)
     assert any(note.startswith("warning") for note in notes) == (noise > 1.0)
@@ -257,7 +256,7 @@ def test_a_spoilt_record_is_refused(spoil, said, tmp_path):
         read_record(path, "1", "2", rate_hz=1000.0)
 
 
-def test_a_wav_file_that_is_cut_short_or_empty_is_refused(tmp_path):
+def test_short_or_empty_wav_file_is_refused(tmp_path):
     path, _ = written(tmp_path, "wav", record("a periodic signal"))
     whole = path.read_bytes()
     path.write_bytes(whole[: len(whole) // 2])
@@ -268,7 +267,7 @@ def test_a_wav_file_that_is_cut_short_or_empty_is_refused(tmp_path):
         read_record(path, "1", "2")
 
 
-def test_uneven_times_are_refused_and_rounded_ones_are_not(tmp_path):
+def test_uneven_times_are_refused_unless_rounded(tmp_path):
     t = np.arange(2000) / 1024.0
     x = np.sin(2 * np.pi * 40 * t)
     path = tmp_path / "record.csv"
@@ -287,7 +286,7 @@ def test_uneven_times_are_refused_and_rounded_ones_are_not(tmp_path):
     st.integers(0, 2**31), st.integers(64, 3000),
     st.sampled_from(["noise", "sine", "square", "ramp", "steps", "tiny", "huge"]),
 )  # fmt: skip
-def test_any_record_becomes_a_finite_response_or_an_error_of_ours(seed, size, kind):
+def test_any_record_gives_finite_response_or_error(seed, size, kind):
     rng = np.random.default_rng(seed)
     t = np.arange(size) / 100.0
     f = rng.uniform(0.1, 49.0)

@@ -59,7 +59,7 @@ def test_several_levels_and_directions(run, db):
     assert response.direction == "down"
 
 
-def test_a_recipe_gives_the_plan_and_options_override_it(run, db):
+def test_options_override_plan_of_recipe(run, db):
     words = ["measure", "--unit", "adss", "--instrument", "sim:", "--recipe", "adss"]
     assert run(*words, "--points", "3", *QUICK)[0] == 0
     with Store(db) as store:
@@ -69,7 +69,7 @@ def test_a_recipe_gives_the_plan_and_options_override_it(run, db):
     assert plan.settle_cycles == 3
 
 
-def test_a_recipe_limits_what_the_bench_would_allow(run, db):
+def test_recipe_limits_apply_within_bench_limits(run, db):
     words = ["measure", "--unit", "adss", "--instrument", "sim:", "--recipe", "adss"]
     code, out, err = run(*words, "--level", "4")
     assert (code, out) == (5, "")
@@ -87,7 +87,7 @@ def test_a_recipe_limits_what_the_bench_would_allow(run, db):
         (["--integrate-cycles", "1000000"], "duration"),
     ],
 )
-def test_a_limit_ends_it_with_5_before_anything_is_touched(run, db, changes, said):
+def test_limit_exits_5_before_any_command(run, db, changes, said):
     plan = ["--level", "2", "--start", "130", "--stop", "170", "--points", "5"]
     words = ["measure", "--unit", "adss", "--instrument", "TCPIP::127.0.0.1::9::SOCKET", "--yes"]
     for name, value in zip(changes[::2], changes[1::2], strict=True):
@@ -121,7 +121,7 @@ def test_a_limit_ends_it_with_5_before_anything_is_touched(run, db, changes, sai
         (measuring(url="sim:?options=AY6"), 1, "swept sine needs 1D2"),
     ],
 )
-def test_what_cannot_be_is_said_in_one_line(run, words, code, said):
+def test_impossible_request_is_one_line(run, words, code, said):
     got, _, err = run(*words)
     errors = [line for line in err.splitlines() if line.startswith("error:")]
     assert got == code
@@ -209,9 +209,7 @@ def test_no_end_of_a_band_is_lost(run, db, band, direction):
     ],
 )
 @pytest.mark.parametrize("dry", [(), ("--dry-run",)])
-def test_what_cannot_be_set_or_shown_is_refused_before_anything_is_opened(
-    run, db, words, code, said, dry
-):
+def test_unsettable_value_is_refused_before_opening(run, db, words, code, said, dry):
     given = {"--unit": "adss", "--instrument": "sim:", "--level": "2", "--points": "5"}
     given |= {"--start": "100", "--stop": "160"} | dict(zip(words[::2], words[1::2], strict=True))
     ended, out, err = run("measure", *chain.from_iterable(given.items()), *dry)

@@ -19,7 +19,7 @@ from daq.store import Store
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR2])
-def test_a_signal_ends_it_safe_and_it_can_be_resumed(run, db, monkeypatch, number):
+def test_signal_ends_safely_and_can_resume(run, db, monkeypatch, number):
     with monkeypatch.context() as patch:
         at_point(patch, 2, lambda: signal.raise_signal(number))
         code, out, err = run(*measuring("--json"))
@@ -36,7 +36,7 @@ def test_a_signal_ends_it_safe_and_it_can_be_resumed(run, db, monkeypatch, numbe
         assert store.measurement(1).state == "complete"
 
 
-def test_what_is_said_to_go_on_with_goes_on(run, db, monkeypatch):
+def test_printed_resume_command_works(run, db, monkeypatch):
     with monkeypatch.context() as patch:
         at_point(patch, 2, lambda: signal.raise_signal(signal.SIGTERM))
         _, _, err = run(*measuring())
@@ -46,9 +46,7 @@ def test_what_is_said_to_go_on_with_goes_on(run, db, monkeypatch):
         assert store.measurement(1).state == "complete"
 
 
-def test_it_goes_on_with_the_unit_bench_and_recipe_that_it_was_begun_with(
-    run, db, monkeypatch, tmp_path
-):
+def test_resume_uses_its_unit_bench_and_recipe(run, db, monkeypatch, tmp_path):
     """Files of one's own are found by their paths, and their limits hold to the end."""
     own = {}
     for kind, name in (("units", "adss"), ("benches", "default"), ("recipes", "adss")):
@@ -83,7 +81,7 @@ def test_ctrl_backslash_aborts_for_good(run, monkeypatch):
     assert "was aborted" in err
 
 
-def test_ctrl_z_does_not_halt_a_program_that_drives(run, monkeypatch):
+def test_ctrl_z_does_not_stop_driving_program(run, monkeypatch):
     at_point(monkeypatch, 2, lambda: signal.raise_signal(signal.SIGTSTP))
     assert run(*measuring())[0] == 0
 
@@ -102,7 +100,7 @@ def test_a_pause_by_signal_and_on(run, monkeypatch, db):
         assert [e.kind for e in store.events(1)].count("pause") == 1
 
 
-def test_key_presses_during_safe_off_do_not_skip_it(run, db, monkeypatch):
+def test_keys_do_not_skip_safe_off(run, db, monkeypatch):
     from daq.hp35670a import HP35670A
 
     whole, begun = HP35670A.make_safe, []
@@ -126,7 +124,7 @@ def test_key_presses_during_safe_off_do_not_skip_it(run, db, monkeypatch):
         assert store.measurement(1).source_state is SourceState.CONFIRMED_OFF
 
 
-def test_a_listener_who_leaves_does_not_end_it(run, db, monkeypatch):
+def test_closed_listener_does_not_end_measurement(run, db, monkeypatch):
     def broken():
         raise BrokenPipeError
 
@@ -136,7 +134,7 @@ def test_a_listener_who_leaves_does_not_end_it(run, db, monkeypatch):
         assert store.measurement(1).state == "complete"
 
 
-def test_resume_needs_no_plan_and_refuses_another_one(run, monkeypatch):
+def test_resume_needs_and_accepts_no_other_plan(run, monkeypatch):
     stopped(run, monkeypatch)
     bare = ["measure", "--unit", "adss", "--instrument", "sim:?ratio=0.3", "--resume", "1"]
     code, _, err = run(*bare, "--points", "6")
@@ -172,7 +170,7 @@ def test_resuming_with_other_unit_values_is_refused(run, db, monkeypatch, tmp_pa
 
 
 @pytest.mark.parametrize("kept", [{"unit": "["}, {"unit": "schema = 1"}, {}])
-def test_an_unreadable_old_unit_file_stops_no_resumption(run, db, monkeypatch, kept):
+def test_unreadable_old_unit_file_permits_resume(run, db, monkeypatch, kept):
     stopped(run, monkeypatch)
     with sqlite3.connect(db) as history:
         history.execute("UPDATE measurements SET configurations = ?", (json.dumps(kept),))
@@ -204,7 +202,7 @@ def test_what_contradicts_the_stored_measurement_is_refused(run, db, words, said
     assert run(*measuring("--resume", 1, *SAID))[0] == 0
 
 
-def test_a_recipe_may_be_given_again_with_what_it_says(run, tmp_path):
+def test_resume_accepts_the_recipe_if_unchanged(run, tmp_path):
     words = ["measure", "--unit", "adss", "--instrument", "sim:", "--recipe", "adss"]
     few = ["--points", "3", "--settle-cycles", "2", "--integrate-cycles", "4"]
     assert run(*words, *few)[0] == 0
@@ -218,7 +216,7 @@ def test_a_recipe_may_be_given_again_with_what_it_says(run, tmp_path):
         assert run(*words[:-1], other, *few[2:], "--resume", "1")[0] == code
 
 
-def test_two_points_are_spaced_as_either_word_says(run):
+def test_two_points_equal_either_spacing(run):
     plan = ["--level", "2.5", "--start", "130", "--stop", "170", "--points", "2"]
     assert run(*measuring(plan=plan))[0] == 0
     for spacing in ("lin", "log"):
@@ -232,7 +230,7 @@ def test_resuming_a_complete_measurement_is_no_fault(run):
     assert json.loads(out)["points"] == 5
 
 
-def test_a_long_point_is_ended_at_once_and_retaken(run, db, tmp_path, monkeypatch):
+def test_long_point_ends_at_once_and_repeats(run, db, tmp_path, monkeypatch):
     monkeypatch.setattr("daq.hp35670a.analyser.calibrate", lambda dialogue: None)
     bench = tmp_path / "bench.toml"
     text = config_path("benches", "default").read_text()
@@ -281,7 +279,7 @@ def test_a_band_without_stored_points_is_refused(run, db, band):
     assert "its 5 points lie from 130 to 170 Hz" in err
 
 
-def test_a_transcript_runs_the_session_again_without_an_instrument(run, db, tmp_path):
+def test_transcript_replays_session_without_instrument(run, db, tmp_path):
     tape = tmp_path / "tape.jsonl"
     assert run(*measuring("--transcript", str(tape)))[0] == 0
     assert run(*measuring(url=f"replay:{tape}"))[0] == 0

@@ -49,7 +49,7 @@ def stalled():
         os.close(theirs)
 
 
-def test_a_terminal_that_takes_no_more_holds_neither_a_session_nor_a_signal_up(tmp_path, stalled):
+def test_blocked_terminal_delays_neither_session_nor_signal(tmp_path, stalled):
     db, out = tmp_path / "bench.db", tmp_path / "out.json"
     with (
         out.open("w") as file,
@@ -72,7 +72,7 @@ def test_a_terminal_that_takes_no_more_holds_neither_a_session_nor_a_signal_up(t
 
 
 @pytest.mark.parametrize("words", [(), ("--json",)])
-def test_who_reads_no_result_does_not_keep_the_error_back(tmp_path, words):
+def test_closed_stdout_does_not_hide_error(tmp_path, words):
     reading, writing = os.pipe()
     os.close(reading)
     with measuring(
@@ -86,7 +86,7 @@ def test_who_reads_no_result_does_not_keep_the_error_back(tmp_path, words):
     assert "SOURCE OFF UNKNOWN: switch it off by hand" in said.splitlines()[-1]
 
 
-def test_narration_is_in_order_and_progress_may_be_dropped(stalled):
+def test_messages_keep_order_and_progress_may_drop(stalled):
     reading, writing = os.pipe()
     with os.fdopen(writing, "w") as stream:
         before = set(threading.enumerate())

@@ -64,7 +64,7 @@ def test_every_wire_gives_the_same_points(tmp_path):
     assert all(readback == readbacks[0] for readback in readbacks)
 
 
-def test_every_wire_of_every_driver_gives_the_same_points(tmp_path):
+def test_all_wires_of_drivers_give_equal_points(tmp_path):
     """Known ones, within what the instrument prints; of the preset to the last bit, see above."""
     for driver in (driver.scheme for driver in DRIVERS if driver.scheme):
         db = tmp_path / f"{driver}.db"
@@ -147,7 +147,7 @@ def test_kill_9_at_random_moments_loses_nothing(tmp_path, driver, wire):
 
 
 @pytest.mark.parametrize("driver", [driver.scheme for driver in DRIVERS])
-def test_after_a_kill_the_watchdog_switches_the_source_off(tmp_path, driver):
+def test_watchdog_switches_source_off_after_kill(tmp_path, driver):
     db = tmp_path / "bench.db"
     with served(simulated(driver, LinearPlant(known_gain)), driver=driver) as url:
         process = start(url, db, 0, (130.0, 170.0, 400, 3, 4, 2.0))
@@ -163,7 +163,7 @@ def test_after_a_kill_the_watchdog_switches_the_source_off(tmp_path, driver):
         assert (found.state, found.ended) == ("interrupted", None)
 
 
-def test_a_watchdog_goes_on_where_the_source_could_not_be_proven_off(tmp_path, monkeypatch, capsys):
+def test_watchdog_continues_after_unproven_source_off(tmp_path, monkeypatch, capsys):
     """The instrument is silent for longer than the session waits, and answers then."""
     monkeypatch.setattr("daq.hp35670a.analyser.Timing", lambda: Timing(reply_s=0.5, block_s=1.0))
     monkeypatch.setattr("daq.hp35670a.safe._BUDGET_S", 0.5)
@@ -184,7 +184,7 @@ def test_a_watchdog_goes_on_where_the_source_could_not_be_proven_off(tmp_path, m
 
 
 @pytest.mark.parametrize("wire", ["prologix_pty", "tcp"])
-def test_an_adapter_that_comes_back_is_found_again(tmp_path, capsys, wire):
+def test_returning_adapter_is_found_again(tmp_path, capsys, wire):
     """It breaks off, is away for a while, has lost its settings, and is another device then."""
     db, away = tmp_path / "bench.db", "link-away:point=3,seconds=3"
     box = linear_analyser(known_gain, [away])
@@ -214,7 +214,7 @@ def test_what_the_watchdog_proves_later_is_told(tmp_path, capsys):
         assert store.measurement(1).source_state is SourceState.CONFIRMED_OFF
 
 
-def test_no_watchdog_is_left_with_what_is_no_analyser(tmp_path, monkeypatch, capsys):
+def test_watchdog_ends_without_an_analyser(tmp_path, monkeypatch, capsys):
     """Somebody gave a wrong address: the next session must not wait."""
     monkeypatch.setattr("daq.hp35670a.analyser.Timing", lambda: Timing(reply_s=0.3, block_s=1.0))
     monkeypatch.setattr("daq.hp35670a.safe._BUDGET_S", 0.5)
@@ -230,7 +230,7 @@ def test_no_watchdog_is_left_with_what_is_no_analyser(tmp_path, monkeypatch, cap
 
 
 @pytest.mark.parametrize("driver", [driver.scheme for driver in DRIVERS])
-def test_without_a_watchdog_the_next_start_finds_the_source_driving(tmp_path, capsys, driver):
+def test_next_start_finds_driving_source_without_watchdog(tmp_path, capsys, driver):
     db = tmp_path / "bench.db"
     box = simulated(driver, LinearPlant(known_gain))
     with served(box, driver=driver) as url:
@@ -292,7 +292,7 @@ def test_two_sessions_do_not_share_a_bench(tmp_path):
         end(process)
 
 
-def test_another_history_is_not_measured_on_an_instrument_in_use(tmp_path, capsys):
+def test_instrument_in_use_refuses_another_history(tmp_path, capsys):
     with served(linear_analyser(known_gain)) as url:
         process = start(url, tmp_path / "bench.db", 0, (130.0, 170.0, 400, 3, 4, 2.0))
         process.stdout.readline()
@@ -307,7 +307,7 @@ def test_another_history_is_not_measured_on_an_instrument_in_use(tmp_path, capsy
         assert cli.main(["measure", "--unit", "adss", *other, *short]) == 0
 
 
-def test_the_lock_is_shared_with_the_watchdog_and_leaves_nothing(tmp_path):
+def test_watchdog_shares_lock_and_removes_it(tmp_path):
     db = tmp_path / "bench.db"
     with served(linear_analyser(known_gain)) as url:
         process = start(url, db, 0, (130.0, 170.0, 400, 3, 4, 2.0))
@@ -322,7 +322,7 @@ def test_the_lock_is_shared_with_the_watchdog_and_leaves_nothing(tmp_path):
     assert not db.with_name("bench.db-lock").exists()
 
 
-def test_a_lock_is_had_again_once_it_is_let_go(tmp_path):
+def test_released_lock_can_be_taken_again(tmp_path):
     db = tmp_path / "bench.db"
     for _ in range(3):
         with BenchLock(db) as lock:
@@ -331,7 +331,7 @@ def test_a_lock_is_had_again_once_it_is_let_go(tmp_path):
                 BenchLock(db)
 
 
-def test_the_lock_of_a_dead_owner_is_waited_for_with_a_bound(tmp_path):
+def test_lock_of_dead_owner_has_bounded_wait(tmp_path):
     db = tmp_path / "bench.db"
     with BenchLock(db):
         db.with_name("bench.db-lock").write_text("999999999\n")

@@ -66,7 +66,7 @@ def run(capsys):
         ("arf_hz = { lower = 132 }\ncoverage_factor = 0.05", FAIL),
     ],
 )  # fmt: skip
-def test_extract_says_its_verdict_by_the_exit_code(run, limits, table, code):
+def test_extract_gives_verdict_by_exit_code(run, limits, table, code):
     found, text, _ = run("extract", SAMPLE, "--judge", limits(table))
     word = {PASS: "PASS", FAIL: "FAIL", UNDECIDED: "UNDECIDED"}[code]
     assert found == code
@@ -74,7 +74,7 @@ def test_extract_says_its_verdict_by_the_exit_code(run, limits, table, code):
     assert max(map(len, text[text.index(f"{word} by") :].splitlines())) <= 80
 
 
-def test_a_program_gets_the_verdict_with_the_features(run, limits):
+def test_json_has_verdict_beside_features(run, limits):
     code, out, _ = run("extract", SAMPLE, "--judge", limits("arf_hz = { lower = 150 }"), "--json")
     document = json.loads(out)
     assert (code, document["judgement"]["verdict"], len(document["levels"])) == (FAIL, "FAIL", 3)
@@ -82,7 +82,7 @@ def test_a_program_gets_the_verdict_with_the_features(run, limits):
     assert document["judgement"]["rule"].startswith("ISO 14253-1")
 
 
-def test_a_reader_who_leaves_does_not_change_the_exit_code(limits):
+def test_closed_reader_does_not_change_exit_code(limits):
     words = [sys.executable, "-m", "tui.cli", "extract", SAMPLE, "--judge"]
     with subprocess.Popen(
         [*words, limits("arf_hz = { lower = 150 }")], stdout=subprocess.PIPE
@@ -107,7 +107,7 @@ def test_a_reader_who_leaves_does_not_change_the_exit_code(limits):
         ("", "there is no limit"),
     ],
 )
-def test_a_wrong_file_is_one_line_with_file_and_key(run, limits, table, words):
+def test_wrong_file_error_names_file_and_key(run, limits, table, words):
     path = limits(table)
     code, out, err = run("extract", SAMPLE, "--judge", path)
     assert (code, out) == (2, "")
@@ -116,7 +116,7 @@ def test_a_wrong_file_is_one_line_with_file_and_key(run, limits, table, words):
     assert words in err
 
 
-def test_a_wrong_file_is_refused_before_anything_is_driven(run, limits, tmp_path):
+def test_wrong_file_is_refused_before_driving(run, limits, tmp_path):
     db = tmp_path / "bench.db"
     for named in (limits("b1 = 1"), tmp_path / "none.toml", "adss"):
         code, _, err = run("measure", "--unit", "adss", "--instrument", "sim:", *PLAN, *QUICK,
@@ -146,7 +146,7 @@ def test_any_table_is_taken_whole_or_refused(limits, table):
     assert {q for q, _ in found.acceptance.bounds()} == table.keys() - {"coverage_factor"}
 
 
-def test_a_unit_file_judges_by_its_own_table_and_limits(run, tmp_path):
+def test_unit_file_judges_by_table_and_limits(run, tmp_path):
     path = tmp_path / "mine.toml"
     text = config_path("units", "adss").read_text(encoding="utf-8")
     path.write_text(text.replace("[limits]", "[limits]\nb1_deg = 0.4"), encoding="utf-8")

@@ -39,7 +39,7 @@ def scanned(data: bytes) -> list[str]:
     return lines
 
 
-def test_a_line_is_judged_rightly_though_it_is_killed_twice(tmp_path):
+def test_line_killed_twice_is_judged_correctly(tmp_path):
     """Six units, two of them bad; the table, the labels, the command and the counts agree."""
     told = tmp_path / "told.jsonl"
     script = f"import sys; open({str(told)!r}, 'a').write(sys.stdin.read())"
@@ -75,7 +75,8 @@ def test_a_line_is_judged_rightly_though_it_is_killed_twice(tmp_path):
     assert "FAIL: SN2, SN3\n  by: ARF at 2 V 2" in out
 
 
-def test_what_was_not_written_is_judged_from_the_history_and_a_retest_is_marked(tmp_path):
+def test_unwritten_result_is_judged_from_history(tmp_path):
+    """A retest is marked."""
     with line_bench(tmp_path) as bench:
         process = bench.start("--on-result", "false")
         assert bench.scan(process, "A", BAD).startswith("FAIL")
@@ -134,7 +135,7 @@ def serials(path):
     return [json.loads(line)["serial"] for line in path.read_text().splitlines()]
 
 
-def test_a_second_file_of_results_takes_up_nothing_of_the_first(here, tmp_path):
+def test_second_results_file_ignores_the_first(here, tmp_path):
     """Each file has its units: none is judged into another, or driven under an old serial."""
     first, second = tmp_path / "first.jsonl", tmp_path / "second.jsonl"
     bench, run = here
@@ -156,7 +157,7 @@ def test_a_second_file_of_results_takes_up_nothing_of_the_first(here, tmp_path):
     assert bench.points(2) < 21
 
 
-def test_the_signs_for_counts_and_end_hold_at_every_question(here, tmp_path):
+def test_count_and_end_work_at_every_question(here, tmp_path):
     bench, run = here
     out = tmp_path / "results.jsonl"
     code, said, err = run(["A", "A", "?", "."], "--out", out, terminal=True)
@@ -167,7 +168,7 @@ def test_the_signs_for_counts_and_end_hold_at_every_question(here, tmp_path):
     assert err.count("serial> ") == 2
 
 
-def test_a_pause_that_comes_between_units_ends_no_line(here, tmp_path):
+def test_pause_between_units_does_not_end_line(here, tmp_path):
     bench, run = here
     out = tmp_path / "results.jsonl"
     hook = ["--on-result", "sh -c 'kill -USR1 $PPID; kill -USR2 $PPID'"]
@@ -178,7 +179,7 @@ def test_a_pause_that_comes_between_units_ends_no_line(here, tmp_path):
     assert err.count("A: not measured again") == 1
 
 
-def test_a_line_goes_on_with_its_own_unit(here, tmp_path):
+def test_line_resumes_with_its_own_unit(here, tmp_path):
     first = tmp_path / "first.jsonl"
     bench, run = here
     assert run("A", "--out", first)[0] == 0
@@ -189,7 +190,7 @@ def test_a_line_goes_on_with_its_own_unit(here, tmp_path):
     assert (serials(first), bench.points(1)) == (["A"], 21)
 
 
-def test_a_silent_unit_is_reported_a_failed_bench_stops(tmp_path):
+def test_silent_unit_is_reported_failed_bench_stops(tmp_path):
     with line_bench(tmp_path) as bench:
         process = bench.start()
         bench.unit.is_dead = True
@@ -206,7 +207,7 @@ def test_a_silent_unit_is_reported_a_failed_bench_stops(tmp_path):
     assert [one["serial"] for one in bench.results()] == ["DEAD", "B"]
 
 
-def test_a_table_that_cannot_be_written_stops_no_line(here, tmp_path):
+def test_unwritable_table_does_not_stop_line(here, tmp_path):
     bench, run = here
     folder, out = tmp_path / "tables", tmp_path / "results.jsonl"
     folder.mkdir()
@@ -247,7 +248,7 @@ def test_lines_end_as_a_scanner_ends_them(data, lines):
 
 
 @given(st.integers(0, 400))
-def test_a_cut_file_of_results_loses_the_last_line_alone(cut):
+def test_truncated_results_lose_only_last_line(cut):
     import tempfile
     from pathlib import Path
 
@@ -265,7 +266,7 @@ def test_a_cut_file_of_results_loses_the_last_line_alone(cut):
 
 @pytest.mark.parametrize("text", ["serial,verdict\n", '{"serial": 1}\n', "[]\n", "{" * 5000 + "\n",
                                   '{"a": 1}', "notes"])  # fmt: skip
-def test_no_file_of_others_is_taken_for_results(tmp_path, text):
+def test_foreign_file_is_not_taken_for_results(tmp_path, text):
     path = tmp_path / "results.jsonl"
     path.write_text(text)
     with pytest.raises(FileFormatError, match="line 1 is no result"):
@@ -283,7 +284,7 @@ def test_a_full_disk_leaves_whole_lines(small_disk):
     assert path.read_bytes().endswith(b"\n")
 
 
-def test_no_link_is_followed_out_of_the_table(tmp_path):
+def test_table_escapes_spreadsheet_formulas(tmp_path):
     results = Results(tmp_path / "r.jsonl", tmp_path / "r.csv")
     results.add(result("=HYPERLINK(1)", failed=["b1", "b2"], verdict="FAIL"))
     results.write_table()
@@ -303,13 +304,13 @@ def test_what_a_command_does_is_told(command, fault):
     assert Hook(command).run("{}", bound_s=0.2 if "sleep" in command else 30.0) == fault
 
 
-def test_a_command_that_cannot_be_is_refused_at_once():
+def test_impossible_command_is_refused_at_once():
     for command in ("", "'", "/no/such/program x"):
         with pytest.raises(InputError, match="--on-result"):
             Hook(command)
 
 
-def test_the_counts_are_of_the_last_verdict_of_each_unit():
+def test_counts_use_last_verdict_of_each_unit():
     results = [
         result("A", 1, "FAIL", failed=["b1"]),
         result("A", 2, "PASS"),
@@ -322,14 +323,14 @@ def test_the_counts_are_of_the_last_verdict_of_each_unit():
     assert "by: not measured: no answer 1" in text
 
 
-def test_what_was_not_judged_counts_for_no_yield():
+def test_unjudged_unit_does_not_count_for_yield():
     results = [result("A"), result("B", verdict="MEASURED"), result("B", 2, "FAIL", failed=["b1"])]
     text = "\n".join(tally_lines(results))
     assert "2 units: 1 PASS, 1 FAIL; 1 retests" in text
     assert "yield 1/2 (50 %), at the first attempt 1/1 (100 %)" in text
 
 
-def test_nothing_is_driven_where_something_is_wrong_before(tmp_path, monkeypatch, capsys):
+def test_invalid_start_drives_nothing(tmp_path, monkeypatch, capsys):
     from tui import cli
 
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"SN1\n")))
