@@ -54,7 +54,7 @@ def test_fft_dev_as_it_is_packaged(box):
         device.close()
 
 
-def test_pymeasure_over_visa_and_over_its_prologix_adapter(box):
+def test_pymeasure_works_over_visa_and_prologix(box):
     """Its adapters and its SCPI mix-in, unchanged; the commands are those of its PR 1435."""
     adapters = pytest.importorskip("pymeasure.adapters")
     instruments = pytest.importorskip("pymeasure.instruments")

@@ -10,12 +10,12 @@ LEFT = {patches: 58, private_names: 31}
 
 
 @pytest.mark.parametrize("look", LEFT, ids=lambda look: look.__name__)
-def test_no_more_of_the_program_is_patched_or_looked_into(look):
+def test_program_is_patched_no_more_than_counted(look):
     found = found_in(Path(__file__).parents[1], look)
     assert len(found) <= LEFT[look], "\n".join(found)
 
 
-def test_what_is_ours_is_told_from_what_is_not():
+def test_own_names_are_distinguished_from_foreign():
     source = """
 import os
 import numpy as np

@@ -205,7 +205,7 @@ def test_a_vxi11_lock_ends_with_its_owner(wires):
         assert two.write(first, b"*CLS\n") == 4  # a link that is gone
 
 
-def test_vxi11_tells_of_a_service_request_over_its_interrupt_channel(wires):
+def test_vxi11_reports_service_requests_by_interrupt_channel(wires):
     with served(box(), "vxi11") as url, socket.create_server(("127.0.0.1", 0)) as listener:
         listener.settimeout(5.0)
         port = listener.getsockname()[1]

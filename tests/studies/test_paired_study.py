@@ -32,7 +32,7 @@ def by_name(records):
     return {one["set"]: one for one in records}
 
 
-def test_study_holds_every_kind_and_any_part_does():
+def test_every_part_of_study_has_all_kinds():
     sets = list(study_sets(1))
     assert {kind: sum(s.kind == kind for s in sets) for kind in KINDS} == KINDS
     assert len({s.name for s in sets}) == len(sets)
@@ -41,7 +41,7 @@ def test_study_holds_every_kind_and_any_part_does():
     assert len(set(singles[:44])) == 44
 
 
-def test_set_does_not_depend_on_how_many_are_drawn():
+def test_set_does_not_depend_on_total_number():
     few = {s.name: s for s in study_sets(1, {"pair": 3})}
     many = {s.name: s for s in study_sets(1)}
     assert all(many[name] == one for name, one in few.items())

@@ -34,7 +34,7 @@ def b1_verdict(document, k=2.0, **bound):
 
 
 @given(NUMBERS, st.floats(0, 1e3), NUMBERS, st.floats(1e-3, 1e3))
-def test_a_verdict_is_that_of_the_whole_interval(value, half, lower, width):
+def test_verdict_is_that_of_whole_interval(value, half, lower, width):
     low, high, upper = value - half, value + half, lower + width
     verdict = decide(low, high, lower, upper)
     assert (verdict == "PASS") == (lower <= low and high <= upper)
@@ -69,7 +69,7 @@ def test_a_stated_interval_that_is_wider_counts():
     assert b1_verdict(estimate(b1_deg=0.3, interval=(0.25, 0.45)), upper=0.4) == "UNDECIDED"
 
 
-def test_what_lies_at_the_physical_end_meets_a_limit_there():
+def test_physical_end_meets_a_limit_there():
     assert b1_verdict(estimate(b1_deg=0.005), lower=0.0, upper=0.4) == "PASS"
 
 
@@ -83,7 +83,7 @@ def test_what_lies_at_the_physical_end_meets_a_limit_there():
         ({**estimate(), "b1_deg": None}, "it is not known"),
     ],
 )
-def test_what_is_not_known_is_undecided_with_its_reason(document, words):
+def test_unknown_value_is_undecided_with_reason(document, words):
     (item,) = judge(limits(b1_deg={"upper": 0.4}), estimate=document).items
     assert (item.verdict, words in item.reason) == ("UNDECIDED", True)
 
@@ -117,7 +117,7 @@ def test_every_model_that_is_left_must_agree():
         assert judge(limits(b1_deg={"upper": 0.4}), diagnosis=document).verdict == verdict
 
 
-def test_a_cause_that_is_not_tolerated_fails_where_every_model_has_it():
+def test_intolerable_cause_in_all_models_fails():
     asked = limits(causes_not_tolerated=["load-inertia"])
     has, lacks = (("load-inertia",), 0.2), (("shaft-stiffness",), 0.2)
     for document, verdict in [
@@ -130,7 +130,7 @@ def test_a_cause_that_is_not_tolerated_fails_where_every_model_has_it():
         assert judge(asked, diagnosis=document).verdict == verdict
 
 
-def test_a_limit_holds_at_its_level_or_at_all():
+def test_limit_holds_at_one_or_all_levels():
     seen = to_json([*extract(swept(130.0, 0.003, 1)), *extract(swept(140.0, 0.003, 2, 4.0))])
     every = judge(limits(arf_hz={"upper": 135.0}), features=seen)
     assert [item.verdict for item in every.items] == ["PASS", "FAIL"]
@@ -181,7 +181,7 @@ def wrong_passes(units: int, seed: int, k: float) -> tuple[int, int]:
     return wrong, units
 
 
-def test_bad_units_pass_no_more_often_than_the_rule_says():
+def test_bad_units_pass_at_stated_rate():
     """False alarm rate: 1e-3 at most, were every unit at the limit itself."""
     wrong, bad = wrong_passes(50, seed=1, k=1.0)
     most = false_pass_share(1.0)

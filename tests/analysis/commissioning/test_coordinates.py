@@ -32,7 +32,7 @@ def test_exact_values_have_no_coordinate():
     assert set(few) == {"R_m", "k_t", "k_a", "k_ts", "k_s1", "J_L", RATIO}
 
 
-def test_a_datasheet_value_of_zero_has_no_coordinate():
+def test_datasheet_value_zero_has_no_coordinate():
     frictionless = ADSS.with_parameters(B_m=0.0, T_f_L=0.0)
     left = set(Coordinates.of(ADSS).symbols) - set(Coordinates.of(frictionless).symbols)
     assert left == {"B_m", "T_f_L"} & set(Coordinates.of(ADSS).symbols)
@@ -51,7 +51,7 @@ def test_slopes_are_derivatives():
     np.testing.assert_allclose(coordinates.slopes(z), np.where(ratio, plain, logs), rtol=1e-6)
 
 
-def test_a_machine_has_the_values_of_its_coordinates():
+def test_machine_has_values_of_its_coordinates():
     coordinates = Coordinates.of(ADSS, total_backlash_unknown=True)
     z = np.full(len(coordinates), 0.7)
     machine, values = coordinates.machine(z, 3), coordinates.values(z)

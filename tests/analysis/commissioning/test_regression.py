@@ -31,7 +31,7 @@ def exact(slopes, std, y):
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("width", [1.0, 0.3])
-def test_the_posterior_is_that_of_the_linear_model(seed, width):
+def test_posterior_is_that_of_linear_model(seed, width):
     """Whether drives are drawn from the prior or close about the answer."""
     rng, slopes, std = world(seed)
     truth = rng.standard_normal(D)
@@ -95,7 +95,7 @@ def test_what_no_coordinate_explains_is_a_misfit():
     assert found.misfit_rank == 1.0
 
 
-def test_a_reading_that_was_not_taken_counts_for_nothing():
+def test_missing_reading_has_no_influence():
     rng, slopes, std = world(2)
     drawn = drawn_from(PRIOR, slopes, std, rng)
     y = rng.standard_normal(D) @ slopes
@@ -105,7 +105,7 @@ def test_a_reading_that_was_not_taken_counts_for_nothing():
     np.testing.assert_allclose(found.posterior.mean, same.posterior.mean)
 
 
-def test_the_next_proposal_is_wider_than_the_posterior():
+def test_next_proposal_is_wider_than_posterior():
     last = Gaussian(np.zeros(2), np.diag([1.0, 4.0]))
     found = Gaussian(np.ones(2), np.diag([1e-6, 1.0])).proposal(last)
     np.testing.assert_allclose(found.mean, 1.0)

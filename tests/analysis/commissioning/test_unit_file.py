@@ -46,14 +46,14 @@ def test_identified_values_replace_those_of_the_datasheet():
     assert unit.limits == load_unit("adss").limits
 
 
-def test_the_tolerance_is_that_while_other_values_stay():
+def test_tolerance_is_conditional_on_other_values():
     unit = read(commissioned_unit_text(DATASHEET, found(), "A7", date(2026, 11, 2)))
     held = {symbol: share for symbol, share in unit.tolerances.items() if share}
     # An analyser knows no gain better than a thousandth.
     assert held == pytest.approx({"R_m": 0.004, "J_L": 0.001})
 
 
-def test_what_it_was_identified_by_is_in_the_file():
+def test_file_records_how_it_was_identified():
     unit = read(commissioned_unit_text(DATASHEET, found(True), "A7", date(2026, 11, 2)))
     said = unit.commissioning
     assert (said.date, said.sweeps[0].points) == ("2026-11-02", 122)
@@ -63,7 +63,7 @@ def test_what_it_was_identified_by_is_in_the_file():
     assert unit.backlash.b_t_deg == pytest.approx(0.08)
 
 
-def test_a_sweep_of_the_datasheets_unit_is_one_of_the_commissioned():
+def test_sweep_of_datasheet_unit_fits_commissioned_one():
     unit = read(commissioned_unit_text(DATASHEET, found(), "A7", date(2026, 11, 2)))
     sweep = read_response(DATA / "practice-09.csv")
     assert unit_doubts([sweep], unit) == []
@@ -96,7 +96,7 @@ def without(text, section):
     ["load = {{ J_L = {J_L}, T_f_L = {T_f_L} }}", "load.J_L = {J_L}\nload.T_f_L = {T_f_L}",
      '"load" = {{ "J_L" = {J_L}, T_f_L = {T_f_L} }}'],
 )  # fmt: skip
-def test_values_are_replaced_however_the_table_is_written(written):
+def test_values_are_replaced_in_any_table_form(written):
     known = load_unit("adss").parameters
     text = f"{written.format(**known)}\n{without(DATASHEET, 'load')}"
     assert read(text) == load_unit("adss")
@@ -104,7 +104,7 @@ def test_values_are_replaced_however_the_table_is_written(written):
     assert unit.parameters == pytest.approx(known | {"R_m": 4.4, "J_L": 2.6e-3})
 
 
-def test_a_text_that_would_be_no_unit_is_refused():
+def test_text_that_is_no_unit_is_refused():
     with pytest.raises(ConfigurationError, match="motor"):
         commissioned_unit_text(without(DATASHEET, "motor"), found(), "A7", date(2026, 11, 2))
 

@@ -27,7 +27,7 @@ def two():
         assert cores() == {2}
 
 
-def test_it_takes_one_core_inside_and_what_it_took_before_afterwards(two):
+def test_blas_uses_one_core_inside_only(two):
     with on_one_core():
         assert cores() == {1}
         with on_one_core():

@@ -101,12 +101,12 @@ def refuse(task):
     return task
 
 
-def test_without_workers_it_says_how_to_start_one(scheduler):
+def test_missing_workers_error_says_how_to_start(scheduler):
     with pytest.raises(LinkError, match="dask worker"):
         ClusterExecutor(scheduler, connect_s=60.0, workers_s=0.5)
 
 
-def test_an_error_comes_back_as_it_was_and_stops_the_rest(workers):
+def test_error_returns_unchanged_and_stops_rest(workers):
     address, _ = workers
     with patient(address) as cluster:
         with pytest.raises(AnalysisError, match="task 3 carries no answer"):
@@ -119,7 +119,7 @@ class StopError(Exception):
     """Somebody pressed Ctrl-C."""
 
 
-def test_runs_on_a_cluster_are_those_of_this_machine_to_the_last_bit(workers):
+def test_cluster_runs_are_bit_equal_to_local(workers):
     address, _ = workers
     plan = SweepPlan((120.0, 150.0), (1.5, 2.5), settle_cycles=2, integrate_cycles=3)
     families = [
@@ -149,7 +149,7 @@ def test_runs_on_a_cluster_are_those_of_this_machine_to_the_last_bit(workers):
     assert spent_here.worth_s > 5 * plan.duration_s
 
 
-def test_a_search_on_a_cluster_makes_the_runs_of_this_machine(workers):
+def test_search_on_cluster_makes_local_runs(workers):
     address, _ = workers
     unit, plan = load_unit("edss"), SweepPlan((60.0,), (2.5,), settle_cycles=1, integrate_cycles=2)
     groups = [
@@ -206,14 +206,14 @@ def test_an_address_without_a_scheduler_is_refused():
 @pytest.mark.parametrize(
     "address", ["ftp://nowhere:1", "localhost", "tcp://127.0.0.1", "", "[bad", "here:port"]
 )
-def test_what_is_no_address_is_refused_before_anything_is_connected(address, monkeypatch):
+def test_invalid_address_is_refused_before_connecting(address, monkeypatch):
     # A client that was begun would take twenty seconds to end, and print a traceback.
     monkeypatch.setattr(distributed, "Client", None)
     with pytest.raises(InputError, match="is no address of a Dask scheduler"):
         ClusterExecutor(address)
 
 
-def test_here_results_come_in_order_and_an_error_drops_the_rest(tmp_path):
+def test_local_results_keep_order_until_an_error(tmp_path):
     told = []
     local = LocalExecutor(2)
     tasks = [(n, str(tmp_path), 0.05 * (n == 2)) for n in (2, 3, 4)]

@@ -29,7 +29,7 @@ def two_cores(cores):
     cores(2)
 
 
-def test_two_pieces_of_work_are_done_at_once_and_come_back_in_order(two_cores):
+def test_two_tasks_run_at_once_in_order(two_cores):
     both = Barrier(2, timeout=20.0)
 
     def work(number):
@@ -50,7 +50,7 @@ def test_one_core_does_all_of_it_here(cores):
     assert side_by_side(lambda _: current_thread(), [1, 2]) == [main_thread()] * 2
 
 
-def test_an_error_ends_the_whole_and_what_has_not_begun_is_dropped(two_cores):
+def test_error_drops_tasks_not_yet_started(two_cores):
     begun = []
 
     def work(number):
@@ -72,7 +72,7 @@ def test_work_may_share_out_its_own(two_cores):
     assert side_by_side(work, range(5)) == [0, 6, 12, 18, 24]
 
 
-def test_many_cores_are_not_all_taken_where_the_interpreter_would_be_waited_for(cores):
+def test_interpreter_bound_tasks_use_few_cores(cores):
     cores(64)
     others = active_count()
 
@@ -84,7 +84,7 @@ def test_many_cores_are_not_all_taken_where_the_interpreter_would_be_waited_for(
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_what_is_judged_does_not_depend_on_the_cores(cores, seed):
+def test_judgement_does_not_depend_on_cores(cores, seed):
     """To the last bit: all that is drawn is drawn before the work is shared out."""
     cause = ("load-inertia",)
     seen = observation(read(cause, np.array([0.55, 0.4]), np.random.default_rng(seed)))

@@ -17,7 +17,7 @@ def clock():
     return Clock()
 
 
-def test_a_steady_job_is_told_right_from_whatever_share_it_begins(clock):
+def test_steady_job_estimate_ignores_initial_share(clock):
     clock.now = 50.0
     pace = Pace(clock)
     clock.now = 100.0

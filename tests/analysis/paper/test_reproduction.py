@@ -47,7 +47,7 @@ def test_printed_tables_are_whole_and_consistent():
         assert row.arf_hz < row.rf_hz
 
 
-def test_grid_reading_takes_the_minimum_and_the_maximum_above_it():
+def test_grid_reads_minimum_and_maximum_above():
     frequency = np.arange(1.0, 7.0)
     gain = np.array([[9.0, 1.0, -5.0, 0.0, 3.0, 2.0], [0.0, 1.0, 2.0, 1.0, 0.5, -9.0]])
     read = read_grid(frequency, gain)
@@ -57,7 +57,7 @@ def test_grid_reading_takes_the_minimum_and_the_maximum_above_it():
     assert read.rf_db.tolist() == [3.0, -9.0]
 
 
-def test_comparison_places_the_printed_number_among_the_runs():
+def test_comparison_ranks_printed_number_among_runs():
     runs = np.array([130.0, 131.0, 131.0, 132.0, 136.0])
     exact = np.array([133.0, 135.0])
     got = compare(131.0, None, runs, runs - 160.0, exact, exact - 160.0)
@@ -87,14 +87,14 @@ def test_section_5(unit, zeta_rf, arf_percent, rf_percent):
     assert part.half_power_width_hz == pytest.approx({"ADSS": 19.2, "EDSS": 10.8}[unit])
 
 
-def test_damping_does_not_explain_the_arf_of_edss():
+def test_damping_does_not_explain_edss_arf():
     part = section_5(load_paper(), "EDSS")
     assert part.misfit_arf_hz == 10.0
     assert part.left_arf_hz > 9.0
     assert abs(part.left_rf_hz) < 1.0
 
 
-def test_document_has_the_agreed_fields_and_survives_json(small):
+def test_document_has_agreed_fields_in_json(small):
     result, _ = small
     document = json.loads(json.dumps(result.to_json(), allow_nan=False))
     assert [(row["unit"], row["ratio_percent"]) for row in document["table2"]] == [
@@ -169,7 +169,7 @@ def test_paper_scheme_meets_table_2(count):
             assert abs(np.median(read.rf_hz) - row.rf_hz) <= 4.0, row
 
 
-def test_both_motions_of_edss_are_met_as_often_as_the_oracle_meets_them(monkeypatch):
+def test_edss_motions_occur_as_in_oracle(monkeypatch):
     # At 78 Hz two motions coexist, one of them at -6 dB; too coarse a step falls for it.
     unit = load_unit("edss")
     plays = stage_backlash(0.75, unit.backlash.b_t_deg, unit.stage2.N).half_plays_rad

@@ -103,7 +103,7 @@ def test_nothing_hidden_is_seldom_called_a_cause(
     assert words.count("explained") <= 2
 
 
-def test_a_cause_left_out_is_not_explained_by_the_plain_model(
+def test_plain_model_does_not_explain_withheld_cause(
     explorer: Explorer, explored: list[Explored]
 ) -> None:
     """Heavy damping is none of what was offered; the plain model must not pass for it."""
@@ -208,7 +208,7 @@ def test_every_pair_loses_energy() -> None:
     assert all(set(pair) & set(DISSIPATION) for pair in pairs)
 
 
-def test_a_unit_that_the_paper_lacks_is_refused() -> None:
+def test_unit_outside_the_paper_is_refused() -> None:
     with pytest.raises(InputError, match="adss or edss"):
         diagnose_paper(load_unit("adss").model_copy(update={"name": "ADSS2"}))
 

@@ -43,7 +43,7 @@ def test_features_of_a_known_curve() -> None:
     assert width == pytest.approx(2.0 * 4.0 * np.sqrt(1.0 / 0.699 - 1.0), rel=0.05)
 
 
-def test_a_gain_that_falls_off_does_not_hide_the_features() -> None:
+def test_falling_gain_does_not_hide_features() -> None:
     f = np.linspace(30.0, 110.0, 321)
     gain = -15.0 + bump(f, 50.0, -10.0, 3.0) + bump(f, 62.0, 6.0, 3.0) - 0.008 * (f - 30.0) ** 2
     arf, _, rf, _, _ = read_feature_sweep(f, gain)
@@ -63,7 +63,7 @@ def test_a_gain_that_falls_off_does_not_hide_the_features() -> None:
         -10.0 + 0.1 * np.sin(np.arange(40.0)),
     ],
 )
-def test_no_feature_is_read_where_there_is_none(gain: np.ndarray) -> None:
+def test_absent_feature_is_not_read(gain: np.ndarray) -> None:
     assert np.isnan(read_feature_sweep(np.linspace(30.0, 110.0, 40), gain)).all()
 
 
@@ -97,7 +97,7 @@ def test_a_surface_finds_slope_scatter_and_correlation() -> None:
     assert surface.correlation[0, 1] == pytest.approx(0.8, abs=0.15)
 
 
-def test_a_feature_that_no_run_shows_speaks_against_a_set() -> None:
+def test_feature_missing_in_all_runs_lowers_evidence() -> None:
     shown, hidden = made(("load-inertia",)), made(("load-inertia",))
     hidden.surface.features[:, 2:4] = np.nan
     a, b = (agree(x, READING, RatioPrior()) for x in (shown, hidden))
@@ -127,7 +127,8 @@ def test_size_and_error_of_a_known_cause() -> None:
     assert std[0] == pytest.approx(np.sqrt(1.0 / 12.0), abs=0.06)
 
 
-def test_a_parameter_without_effect_costs_nothing_and_a_box_costs_its_share() -> None:
+def test_evidence_ignores_useless_parameter_and_box() -> None:
+    """A smaller box changes the volume only."""
     one = made(("load-inertia",))
     small = np.array([[0.0, 1.0], [0.25, 0.75]])
     whole, part = (agree(replace(one, box=box), READING, RatioPrior()) for box in (one.box, small))
@@ -136,7 +137,7 @@ def test_a_parameter_without_effect_costs_nothing_and_a_box_costs_its_share() ->
     assert part.log_volume == pytest.approx(np.log(0.5))
 
 
-def test_a_number_that_was_not_measured_says_nothing() -> None:
+def test_unmeasured_number_has_no_influence() -> None:
     one = made(("load-inertia",))
     values = READING.values.copy()
     values[4] = np.nan
@@ -187,7 +188,7 @@ def test_adequacy_is_calibrated() -> None:
     assert agreement.probability_of_worse() == pytest.approx(share, abs=0.07)
 
 
-def test_pairs_are_guessed_by_adding_up_and_judged_by_their_own_runs() -> None:
+def test_pairs_are_guessed_additively_then_simulated() -> None:
     """Inertia takes ARF 10 Hz down, damping lifts it by 10 dB: only both give the reading."""
     baseline, *singles = (made(e) for e in ((), *((e,) for e in EFFECTS)))
     pairs = [

@@ -40,7 +40,7 @@ def test_features_lie_where_the_paper_found_them(planned):
     assert planned.rf_hz[1] < f[-1]
 
 
-def test_it_tells_the_ratio_better_than_nothing_does(planned):
+def test_planned_sweep_determines_the_ratio(planned):
     """A ratio of which nothing is known has a standard deviation of 0.29."""
     assert 0.01 < planned.expected_std < 0.15
 
@@ -58,7 +58,7 @@ def test_its_recipe_is_one(planned):
 
 
 @given(st.text(min_size=1, max_size=64))
-def test_any_name_of_a_unit_makes_a_recipe(planned, name):
+def test_any_unit_name_gives_a_recipe(planned, name):
     recipe = Recipe.model_validate(parse_toml(replace(planned, unit=name).recipe()))
     assert (recipe.name, recipe.plan().levels_vpk) == (name, planned.plan.levels_vpk)
 
@@ -71,14 +71,14 @@ def test_features_outside_the_limits_are_told():
 
 
 @pytest.mark.parametrize("name", ["feed-axis", "r3-1"])
-def test_what_is_too_short_is_told_with_the_shortest_sweep_of_every_drive(name):
+def test_too_short_time_states_shortest_sweep(name):
     """One stage is no fault, and couplings, which place the features, leave these in the limits."""
     with pytest.raises(InputError, match="the shortest useful sweep"):
         plan_sweep(load_unit(name), 1e-6)
 
 
 @pytest.mark.study
-def test_a_drive_with_one_stage_is_planned_for_its_total_backlash():
+def test_one_stage_drive_plans_for_total_backlash():
     """The screw of a feed axis; a minute or two of a processor."""
     unit = load_unit("feed-axis")
     found = plan_sweep(unit, 2.0)
@@ -92,7 +92,7 @@ def test_a_drive_with_one_stage_is_planned_for_its_total_backlash():
 
 
 @pytest.mark.parametrize("name", config_names("units"))
-def test_the_natural_scale_of_the_load_is_its_frequency(name):
+def test_load_frequency_scale_is_near_anti_resonance(name):
     """With couplings in series: of every drive the load swings within a factor of 1.5 of it."""
     unit = load_unit(name)
     scale = math.sqrt(shaft_at_load(unit) / unit.load.J_L) / (2.0 * math.pi)

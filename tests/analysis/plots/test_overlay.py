@@ -39,7 +39,7 @@ def test_one_response_has_a_colour_per_level():
     assert len({line.get_color() for line in long_lines(figure.axes[0])}) == 2
 
 
-def test_several_have_a_colour_each_and_a_marker_per_level():
+def test_responses_have_colours_and_levels_have_markers():
     figure = draw_overlay([Curve("a.csv", response()), Curve("b.csv", response((2.5,)))])
     assert legend(figure) == ["a.csv", "b.csv", "1.5 V peak", "2.5 V peak"]
     one, two, three = long_lines(figure.axes[0])
@@ -48,7 +48,7 @@ def test_several_have_a_colour_each_and_a_marker_per_level():
 
 
 @pytest.mark.parametrize("count", [2, 28])
-def test_no_two_responses_look_alike_and_the_legend_fits(count):
+def test_responses_differ_visibly_and_legend_fits(count):
     names = [f"{number:02}-{'long ' * 30}" for number in range(count)]
     figure = draw_overlay([Curve(name, response((1.0,))) for name in names])
     looks = {(line.get_color(), line.get_linestyle(), line._dash_pattern[1] is not None
@@ -61,12 +61,12 @@ def test_no_two_responses_look_alike_and_the_legend_fits(count):
     assert figure.axes[0].get_window_extent().height > 2 * 100
 
 
-def test_more_than_can_be_told_apart_are_refused():
+def test_too_many_responses_are_refused():
     with pytest.raises(InputError, match="29 responses"):
         draw_overlay([Curve("a", response((1.0,)))] * 29)
 
 
-def test_the_phase_has_no_jump_of_a_turn_and_levels_lie_on_one_branch():
+def test_phase_is_continuous_and_levels_share_branch():
     true = np.linspace(-100.0, -420.0, 9)
     figure = draw_overlay(
         [Curve("a", response(phase_deg=true)), Curve("b", response(phase_deg=true + 5.0))]
@@ -78,7 +78,7 @@ def test_the_phase_has_no_jump_of_a_turn_and_levels_lie_on_one_branch():
     np.testing.assert_allclose(drawn[2], true + 5.0, atol=1e-9)
 
 
-def test_noise_about_half_a_turn_does_not_shift_the_rest_of_a_level():
+def test_phase_noise_near_half_turn_shifts_nothing():
     steady = np.full(9, -170.0)
     noisy = np.array([-170.0, -171.0, -172.0, -340.0, -355.0, -530.0, -531.0, -530.0, -532.0])
     figure = draw_overlay(
@@ -112,7 +112,7 @@ def test_any_phase_is_drawn_to_whole_turns(steps, start, spoilt):
     assert np.abs(np.diff(drawn[good])).max() <= 225.0 + 1e-6
 
 
-def test_bands_are_the_errors_that_are_stated_and_nothing_else():
+def test_bands_are_only_stated_errors():
     (band,) = draw_overlay([Curve("a", response((1.0,), gain_std_db=0.5))]).axes[0].collections
     edges = band.get_paths()[0].vertices[:, 1]
     np.testing.assert_allclose([edges.min(), edges.max()], 20 * np.log10(0.5) + [-0.5, 0.5])
@@ -120,7 +120,7 @@ def test_bands_are_the_errors_that_are_stated_and_nothing_else():
     assert not [one for axes in bare.axes for one in axes.collections]
 
 
-def test_a_model_is_dashed_and_on_the_branch_of_the_measurement():
+def test_model_is_dashed_on_branch_of_measurement():
     measured = response((1.0,), phase_deg=np.linspace(-170.0, -200.0, 9))
     model = response((1.0,), phase_deg=np.linspace(-182.0, -190.0, 9))
     figure = draw_overlay([Curve("a", measured, (model,))])
@@ -130,7 +130,7 @@ def test_a_model_is_dashed_and_on_the_branch_of_the_measurement():
     assert np.abs(one.get_ydata() - two.get_ydata()).max() < 20.0
 
 
-def test_spoilt_readings_are_hollow_and_break_the_line():
+def test_spoilt_readings_are_hollow_and_break_line():
     flags = np.zeros(9, dtype=int)
     flags[4] = PointFlag.SPOILT
     figure = draw_overlay([Curve("a", response((1.0,), flags=flags))])
@@ -139,7 +139,7 @@ def test_spoilt_readings_are_hollow_and_break_the_line():
     assert hollow.get_markerfacecolor() == "none"
 
 
-def test_names_of_others_are_shown_as_they_are():
+def test_foreign_names_are_shown_literally():
     curves = [Curve("_$\\frac$\x1b[2J", response()), Curve("b", response(unit="$x$"))]
     figure = draw_overlay(curves)
     figure.canvas.draw()
@@ -147,7 +147,7 @@ def test_names_of_others_are_shown_as_they_are():
     assert legend(figure)[0].startswith("_")
 
 
-def test_levels_that_are_not_stated_and_phases_that_are_not_known_are_said():
+def test_unstated_levels_and_phases_are_labelled():
     figure = draw_overlay(
         [Curve("a", response((np.nan,), phase_known=False, provenance={"kind": "simulated"}))]
     )

@@ -61,7 +61,7 @@ def test_the_noted_truth_is_the_one_meant():
     ],
     ids=["noted", "5 %", "bare", "filtered", "filtered, noise unknown"],
 )
-def test_linear_truth_is_read_within_bounds_and_bars(truth, how):
+def test_linear_truth_is_within_bounds_and_errors(truth, how):
     off, std = readings(truth, TWO_PERCENT, **how)
     error = rms(off)
     assert error[0] < 0.0125
@@ -74,7 +74,7 @@ def test_linear_truth_is_read_within_bounds_and_bars(truth, how):
     assert np.all(np.abs(off.mean(axis=0)) < 4 * error / math.sqrt(DRAWS))
 
 
-def test_twice_the_noise_power_on_the_noted_truth_stays_within_bounds():
+def test_twice_the_noise_power_stays_within_bounds():
     off, std = readings(NOTED, 0.02)
     error = rms(off)
     assert error[0] < 0.01
@@ -159,7 +159,8 @@ def test_bars_grow_with_noise():
     assert widths[2] / widths[1] == pytest.approx(2.5, rel=0.1)
 
 
-def test_noise_free_response_with_a_distant_mode_is_exact():
+def test_noise_free_response_is_exact():
+    """With a distant mode."""
     truth = Truth(zeta_zero=0.03, start=10, stop=300)
     f = truth.f
     h = truth.response(f) * pair(f, 200, 0.02) / pair(f, 230, 0.02)
@@ -172,7 +173,8 @@ def test_noise_free_response_with_a_distant_mode_is_exact():
     assert abs(level.arf.frequency_hz - grid[k]) < 3 * level.arf.std_hz + 1e-3
 
 
-def test_a_band_that_falls_off_beyond_rf_does_not_hide_the_anti_resonance():
+def test_roll_off_does_not_hide_anti_resonance():
+    """A band that falls off beyond the resonance."""
     truth = Truth(zeta_zero=0.03, corner=135.0, start=5, stop=300)
     (level,) = extract(truth.measured(1, 0.02))
     assert np.abs(truth.response(np.array([300.0]))) < np.abs(truth.response(np.array([40.0])))
@@ -193,7 +195,7 @@ def test_zeros_in_the_right_half_plane():
     assert level.arf.damping_ratio == pytest.approx(0.03, rel=0.05)
 
 
-def test_errors_stated_too_small_widen_the_bars_and_say_so():
+def test_understated_errors_are_widened_and_flagged():
     truth, noise = NOTED, 0.02
     response = truth.measured(0, noise)
     stated = FrequencyResponse.from_arrays(

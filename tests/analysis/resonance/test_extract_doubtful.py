@@ -20,7 +20,7 @@ from daq.frf import DB_PER_NEPER, FrequencyResponse, PointFlag
     ],
     ids=["ARF below", "RF above", "falling only", "falling to ARF"],
 )
-def test_features_outside_the_band_are_null_with_a_reason(band, missing, why):
+def test_feature_outside_band_is_null_with_reason(band, missing, why):
     truth = Truth(zeta_zero=0.03, start=band[0], stop=band[1])
     for seed in range(10):
         (level,) = extract(truth.measured(seed, 0.02))
@@ -33,7 +33,7 @@ def test_features_outside_the_band_are_null_with_a_reason(band, missing, why):
                 assert any(flag.startswith(f"{name}: ") and why in flag for flag in level.flags)
 
 
-def test_what_is_left_in_the_band_is_still_read():
+def test_remaining_feature_in_band_is_read():
     truth = Truth(zeta_zero=0.03, start=42)
     off = []
     for seed in range(50):
@@ -58,7 +58,8 @@ def test_nothing_is_found_in_noise(points, stated):
     assert found <= 4
 
 
-def test_a_feature_buried_in_scatter_is_null_with_a_reason():
+def test_feature_buried_in_scatter_is_null():
+    """The reason is stated."""
     truth = Truth(zeta_zero=0.4, zeta_pole=0.4, step=2.0, integrator=False)
     (level,) = extract(truth.measured(4, 1.2))
     assert level.arf is None
@@ -66,7 +67,7 @@ def test_a_feature_buried_in_scatter_is_null_with_a_reason():
     assert any("scatter" in flag or "edge" in flag for flag in level.flags)
 
 
-def test_levels_come_ascending_and_each_on_its_own():
+def test_levels_are_ascending_and_independent():
     one, two = NOTED.measured(0, 0.01), Truth(zero=50, pole=80).measured(1, 0.01)
     f = np.concatenate([two.frequency_hz, one.frequency_hz[::-1]])
     levels = np.concatenate([np.full(len(two), 4.0), np.full(len(one), 1.5)])
@@ -110,7 +111,7 @@ def test_a_level_without_usable_rows_says_so():
     assert extract(FrequencyResponse.from_arrays([], [], [], unit="")) == ()
 
 
-def test_rows_that_name_no_level_are_one_level():
+def test_rows_without_level_are_one_level():
     response = NOTED.measured(0, 0.01)
     nameless = FrequencyResponse.from_arrays(response.frequency_hz, np.nan, response.gain, unit="")
     (level,) = extract(nameless)
@@ -133,7 +134,7 @@ def test_json_has_the_promised_fields():
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_a_minimum_that_noise_makes_hides_no_resonance(seed):
+def test_noise_minimum_hides_no_resonance(seed):
     """A resonance and then the noise floor, in which a pair of zeros often fits."""
     rng = np.random.default_rng(seed)
     f = np.geomspace(20.0, 400.0, 60)
@@ -150,7 +151,7 @@ def test_a_minimum_that_noise_makes_hides_no_resonance(seed):
 
 
 @pytest.mark.parametrize("zeta", [0.0005, 0.002])
-def test_a_sharp_anti_resonance_whose_depth_is_not_known_is_still_one(zeta):
+def test_sharp_anti_resonance_may_lack_its_depth(zeta):
     """On a coarse grid nothing tells how deep it is; where it is stays known."""
     for seed in range(5):
         truth = Truth(zeta_zero=zeta, step=3.0)

@@ -23,7 +23,7 @@ def test_frequency_reduction_is_the_published_one(zeta, published_percent, half_
     assert 100 * frequency_reduction(zeta) == pytest.approx(published_percent, abs=half_a_digit)
 
 
-def test_frequency_reduction_is_the_peak_of_a_second_order_response():
+def test_frequency_reduction_matches_second_order_peak():
     f = np.linspace(0.3, 1.1, 400_001)
     for zeta in (0.05, 0.2, 0.5):
         gain = 1 / np.abs(1 - f**2 + 2j * zeta * f)
@@ -56,14 +56,14 @@ def test_resonance_damping_refuses_what_is_none(arguments):
         resonance_damping(*arguments)
 
 
-def test_damping_from_half_power_points_is_equation_22():
+def test_half_power_damping_is_equation_22():
     assert HalfPower(128.0, 118.4, 137.6, 0.0, 0.0).damping_ratio == pytest.approx(0.075)
     assert np.isnan(HalfPower(128.0, np.nan, 137.6, np.nan, 0.0).damping_ratio)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("zeta", [0.01, 0.03])
-def test_half_power_points_of_a_lightly_damped_pair(sign, zeta):
+def test_half_power_points_of_lightly_damped_pair(sign, zeta):
     # Velocity-like response f/(1 - f^2 + 2 i zeta f): its half-power width is exactly 2 zeta.
     f = np.linspace(0.8, 1.25, 45_001)
     gain_db = -sign * 20 * np.log10(np.abs((1 - f**2) / f + 2j * zeta))

@@ -15,7 +15,7 @@ def test_json_of_missing_features_is_null():
     assert level["flags"] == ["arf: none", "rf: none"]
 
 
-def test_json_never_holds_what_is_not_a_number():
+def test_json_never_holds_not_a_number():
     odd = Feature(40.0, math.nan, -20.0, math.inf, None, None, "grid")
     (level,) = to_json([LevelFeatures(1.0, odd, None, math.nan, None, ())])["levels"]
     assert level["arf"]["std_hz"] is None
@@ -23,7 +23,7 @@ def test_json_never_holds_what_is_not_a_number():
     assert level["difference_hz"] is None
 
 
-def test_summary_is_an_aligned_table_with_the_flags_below():
+def test_summary_is_aligned_with_flags_below():
     arf = Feature(39.9662, 0.0071, -21.5, 0.05, 0.0301, 0.0003, "rational")
     rf = Feature(130.6, 2.34, -3.21, 0.4, None, None, "grid")
     lines = summary(

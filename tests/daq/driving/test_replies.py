@@ -120,7 +120,7 @@ def test_amplitudes_become_volts_peak(value, unit):
 
 
 @pytest.mark.parametrize("unit", ["V", "DBV", "", "HZ"])
-def test_an_amplitude_in_a_doubtful_unit_is_not_guessed(unit):
+def test_amplitude_in_doubtful_unit_is_refused(unit):
     with pytest.raises(ProtocolError, match="was due"):
         to_volts_peak(0.0, unit)
 
@@ -166,20 +166,20 @@ def test_a_damaged_block_is_refused(data, fault):
         take_block(feeder(data)[0])
 
 
-def test_a_block_of_the_largest_size_is_not_refused():
+def test_largest_block_is_accepted():
     size = BLOCK_LIMIT_BYTES
     assert len(take_block(feeder(b"#7%d" % size + bytes(size) + b"\n")[0])) == size
 
 
 @given(st.binary(max_size=60))
-def test_no_bytes_make_the_block_reader_fail_otherwise(data):
+def test_any_bytes_raise_only_block_errors(data):
     try:
         take_block(feeder(data)[0])
     except ProtocolError:
         return
 
 
-def test_a_line_is_one_message_of_at_most_119_bytes():
+def test_line_is_one_message_within_119_bytes():
     assert checked_line("A" * 119) == b"A" * 119
     for line in ("A" * 120, "", "a\nb", "a\r", "ü"):
         with pytest.raises(ProtocolError, match="nothing was sent"):

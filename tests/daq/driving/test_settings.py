@@ -14,20 +14,21 @@ LEVEL = Number("level", "VOLT", "VPK", 0.0, 5.0, near(0.1), ("VPK", "VRMS"), ask
 
 
 @pytest.mark.parametrize("value", [0.99, 100.01, -5.0, math.nan, math.inf, True, "7", None])
-def test_a_number_out_of_range_is_refused_and_never_clipped(value):
+def test_number_out_of_range_is_never_clipped(value):
+    """It is refused."""
     with pytest.raises(LimitError, match="nothing was sent"):
         START.command(value)
 
 
 @given(st.floats(1.0, 100.0))
-def test_the_number_sent_is_the_number_asked_for(value):
+def test_sent_number_is_the_requested_one(value):
     line = START.command(value)
     header, number, unit = line.split(" ")
     assert (header, unit) == ("FREQ:STAR", "HZ")
     assert float(number) == pytest.approx(value, rel=1e-11)
 
 
-def test_a_read_back_is_compared_with_what_the_instrument_may_make_of_it():
+def test_read_back_allows_rounding_of_instrument():
     assert START.accepts(10.3, "+1.00000000000E+001")
     assert not START.accepts(10.3, "+1.05000000000E+001")
     assert not START.accepts(10.3, "+9.70000000000E+000")
@@ -36,7 +37,7 @@ def test_a_read_back_is_compared_with_what_the_instrument_may_make_of_it():
     assert not stop.accepts(10.3, "10.0")
 
 
-def test_a_read_back_in_another_unit_is_converted_or_refused():
+def test_read_back_unit_is_converted_or_refused():
     assert LEVEL.accepts(2.0, "+1.41421356237E+000", "VRMS")
     assert not LEVEL.accepts(2.0, "+2.00000000000E+000", "VRMS")
     assert LEVEL.shown("+1.41421356237E+000", "VRMS") == "2 VPK"
@@ -55,7 +56,8 @@ def test_words_and_their_long_forms():
             spacing.command(word)
 
 
-def test_quoted_words_go_out_quoted_and_come_back_in_any_quotes_and_blanks():
+def test_quoted_words_read_back_in_any_quotes():
+    """Blanks may surround them."""
     feed = Choice("data", "CALC1:FEED", ("XFR:POW:RAT 2,1",), quoted=True)
     assert feed.command("XFR:POW:RAT 2,1") == "CALC1:FEED 'XFR:POW:RAT 2,1'"
     assert feed.accepts("XFR:POW:RAT 2,1", '"XFR:POW:RAT 2, 1"')

@@ -54,7 +54,8 @@ from sim.loopback import Loopback
     ],
     ids=str,
 )
-def test_whatever_the_manual_means_points_are_right_and_the_source_is_off(changes):
+def test_every_manual_reading_gives_correct_points(changes):
+    """Whatever the manual means, the points are right and the source ends off."""
     instrument, analyser, _ = prepared(replace(QUIET, **changes))
     for frequencies in (GRID[:1], GRID, GRID[::-1], GRID):
         assert_right(list(analyser.sweep(frequencies)), frequencies)
@@ -75,7 +76,7 @@ def test_without_variances_errors_come_from_repeats(changes):
     assert all(point.detail["repeats"] >= 4 for point in points)
 
 
-def test_a_unit_that_explains_nothing_is_refused_before_anything_drives():
+def test_unexplained_level_unit_is_refused_before_driving():
     instrument, analyser, _ = bench(replace(QUIET, level_units=("mV", "Vrms"), level_reply="Vrms"))
     with pytest.raises(ProtocolError, match="neither mV, V nor dBV peak"):
         analyser.prepare(100.0, 200.0, SETTINGS)
@@ -93,7 +94,7 @@ def test_a_zero_in_decibels_is_a_volt(reply, zero):
 
 @pytest.mark.parametrize("replies", [("10,0", "40,1"), ("10,0", "10,0"), ("7.07,0", "28.3,0"),
                                      ("20,1", "80,1"), ("0,0", "0,0")])  # fmt: skip
-def test_a_scale_that_does_not_fit_is_none(replies):
+def test_inconsistent_scale_is_refused(replies):
     with pytest.raises(ProtocolError):
         scale_of((0.01, replies[0]), (0.04, replies[1]))
 
@@ -115,7 +116,8 @@ def test_a_scale_that_does_not_fit_is_none(replies):
     ids=" ".join,
 )
 @pytest.mark.parametrize("obeys", [True, False])
-def test_whatever_a_program_left_on_is_off_and_can_be_measured_with(left, obeys):
+def test_state_left_by_program_is_made_safe(left, obeys):
+    """The instrument can then be measured with."""
     instrument, analyser, tap = bench(replace(QUIET, sweep_obeys_switch=obeys))
     for line in left:
         tap.write(line, Deadline.after(1.0))
@@ -141,7 +143,7 @@ def test_whatever_a_program_left_on_is_off_and_can_be_measured_with(left, obeys)
     ],
     ids=str,
 )
-def test_what_the_source_is_said_to_do_changes_nothing(left, state):
+def test_reading_source_state_changes_nothing(left, state):
     _, analyser, tap = bench()
     for line in left:
         tap.write(line, Deadline.after(1.0))
@@ -174,7 +176,7 @@ def test_no_wrong_number_comes_without_a_word(fault, fixed):
     assert instrument.driven_v == 0.0
 
 
-def test_a_pause_at_the_panel_ends_the_sweep():
+def test_pause_at_panel_ends_the_sweep():
     _, analyser, _ = prepared(faults=["panel-pause:point=14"])
     with pytest.raises(MeasurementError, match="paused at the front panel"):
         list(analyser.sweep(GRID))
@@ -190,7 +192,7 @@ def test_a_refused_command_is_named():
         analyser.prepare(100.0, 200.0, SETTINGS)
 
 
-def test_a_display_that_was_left_off_line_is_live_again():
+def test_display_left_off_line_is_restored():
     _, analyser, tap = bench()
     for line in ("DISP 2,0", "ACTD 1"):
         tap.write(line, Deadline.after(1.0))
@@ -199,13 +201,13 @@ def test_a_display_that_was_left_off_line_is_live_again():
     assert_right(list(analyser.sweep(GRID)), GRID)
 
 
-def test_an_overload_is_flagged_with_the_points_it_may_concern():
+def test_overload_flags_all_points_concerned():
     _, analyser, _ = prepared(settings=replace(SETTINGS, input_range_vpk=(1.0, None)))
     points = list(analyser.sweep(GRID))
     assert all(point.flags & PointFlag.OVERLOAD for point in points)
 
 
-def test_an_input_that_stays_below_half_of_its_range_is_flagged():
+def test_input_below_half_range_is_flagged():
     _, analyser, _ = prepared(settings=replace(SETTINGS, input_range_vpk=(2.0, 20.0)))
     points = list(analyser.sweep(GRID))
     assert all(point.flags & PointFlag.HALF_RANGE_MISSED for point in points)

@@ -20,13 +20,13 @@ def test_identifying_asks_nothing_before_replies_come_here():
     assert tap.acts == ["clear", "OUTX 0", "*ESR?", "read", "*IDN?", "read"]
 
 
-def test_identifying_on_rs232_finds_the_step_by_a_number():
+def test_rs232_identification_synchronises_by_a_number():
     _, analyser, tap = bench(wire=Line)
     assert analyser.identify().model == "SR785"
     assert tap.lines == ["OUTX 1", "INPE 17", "INPE?", "INPE 0", "*ESR?", "*IDN?"]
 
 
-def test_no_group_is_chosen_while_the_switch_may_be_on():
+def test_group_is_chosen_only_with_switch_off():
     _, analyser, tap = prepared()
     list(analyser.sweep(GRID))
     analyser.make_safe()
@@ -38,7 +38,7 @@ def test_no_group_is_chosen_while_the_switch_may_be_on():
             assert "SRCO 1" not in switched[-2:]
 
 
-def test_a_sweep_begins_with_the_level_and_ends_with_the_switch():
+def test_sweep_starts_with_level_ends_with_switch():
     _, analyser, tap = prepared()
     begun = len(tap.lines)
     list(analyser.sweep(GRID))
@@ -70,7 +70,7 @@ def test_the_safe_off_recipe_step_by_step():
     ]  # fmt: skip
 
 
-def test_every_command_is_waited_for_before_the_next():
+def test_each_command_completes_before_the_next():
     _, analyser, tap = prepared()
     begun = len(tap.acts)
     list(analyser.sweep(GRID))
@@ -82,7 +82,8 @@ def test_every_command_is_waited_for_before_the_next():
         assert following == ("read" if "?" in act else "poll"), act
 
 
-def test_a_trace_comes_in_binary_on_gpib_and_as_text_on_rs232():
+def test_trace_is_binary_or_text_by_wire():
+    """Binary on GPIB, text on RS-232."""
     _, analyser, tap = prepared()
     list(analyser.sweep(GRID))
     assert {"DSPB? 0", "DSPB? 1"} <= set(tap.lines)
@@ -100,7 +101,8 @@ def test_swapped_bytes_are_noticed():
         list(analyser.sweep(GRID))
 
 
-def test_frequencies_in_steps_are_one_sweep_and_others_one_each():
+def test_stepped_frequencies_make_one_sweep():
+    """Other frequencies make one each."""
     for frequencies, starts in (
         (GRID, 1),
         (GRID[3:9], 1),
@@ -114,7 +116,8 @@ def test_frequencies_in_steps_are_one_sweep_and_others_one_each():
         assert [round(point.frequency_hz) for point in points] == [round(hz) for hz in frequencies]
 
 
-def test_points_come_while_the_sweep_runs_once_the_instrument_is_known():
+def test_points_come_during_sweeps_after_first():
+    """The first sweep makes the instrument known."""
     instrument, analyser, tap = prepared()
     list(analyser.sweep(GRID[:1]))
     begun = len(tap.lines)
@@ -126,7 +129,7 @@ def test_points_come_while_the_sweep_runs_once_the_instrument_is_known():
     assert instrument.driven_v == 0.0
 
 
-def test_whoever_wants_an_end_is_heard_between_any_two_exchanges():
+def test_stop_is_checked_between_all_exchanges():
     """A look at a sweep is some forty of them, a second on a slow adapter."""
     _, analyser, tap = prepared()
     looked_at = [len(tap.lines)]
@@ -142,7 +145,7 @@ def test_whoever_wants_an_end_is_heard_between_any_two_exchanges():
     assert max(gaps) <= 5
 
 
-def test_errors_refer_to_the_cycles_that_were_integrated():
+def test_errors_refer_to_integrated_cycles():
     """At 1 kHz the shortest integration is 16 cycles, whatever was asked for."""
     noisy = replace(QUIET, noise_v=1e-3)
     errors = []
@@ -157,7 +160,7 @@ def test_errors_refer_to_the_cycles_that_were_integrated():
 
 
 @pytest.mark.parametrize("wire", [Tap, Line])
-def test_a_recorded_dialogue_measures_again_without_an_instrument(tmp_path, wire):
+def test_recorded_dialogue_replays_without_instrument(tmp_path, wire):
     def measured(over):
         analyser = SR785(over)
         analyser.identify()

@@ -358,7 +358,7 @@ def test_call_that_gateway_leaves_open_is_aborted():
 
 
 @pytest.mark.parametrize(("procedure", "error"), [(25, 8), (25, 6), (20, 8)], ids=str)
-def test_a_gateway_that_tells_of_no_service_request_is_polled(procedure, error):
+def test_gateway_without_service_requests_is_polled(procedure, error):
     device = Vxi11Instrument(instrument, status_byte=96)
     device.errors = {25: 0, 20: 0} | {procedure: error}
     with ByteServer(device.feed) as server:

@@ -17,14 +17,14 @@ from daq.untrusted.bounded_text import LEVELS_LIMIT, parse_json, parse_toml
     ],
     ids=["toml arrays", "toml tables", "json arrays", "json objects"],
 )
-def test_what_is_nested_too_deeply_is_refused_at_the_limit(parse, text):
+def test_too_deep_nesting_is_refused_at_limit(parse, text):
     parse(text(LEVELS_LIMIT))
     for depth in (LEVELS_LIMIT + 2, 300, 100_000):
         with pytest.raises(ValueError, match="nested"):
             parse(text(depth))
 
 
-def test_what_would_keep_the_parser_busy_is_refused():
+def test_slow_parsing_text_is_refused():
     assert parse_toml("a.b.c = 1") == {"a": {"b": {"c": 1}}}
     with pytest.raises(ValueError, match="parts"):
         parse_toml("a" + ".a" * 10_000 + " = 1")

@@ -90,7 +90,7 @@ def damaged(data, whole: bytes) -> bytes:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_no_bytes_make_a_reader_fail_otherwise_than_it_may(readers, name):
+def test_any_bytes_raise_only_reader_errors(readers, name):
     whole = seeds(name)
 
     @settings(
@@ -106,14 +106,14 @@ def test_no_bytes_make_a_reader_fail_otherwise_than_it_may(readers, name):
 
 
 @pytest.mark.parametrize("name", HOSTILE)
-def test_what_is_made_to_exhaust_a_parser_is_refused(readers, name):
+def test_parser_exhausting_text_is_refused(readers, name):
     for content in HOSTILE[name]:
         began = time.process_time()
         readers[name](content)
         assert time.process_time() - began < 5.0, content[:40]
 
 
-def test_a_block_that_claims_a_billion_bytes_is_refused_before_memory_is_taken(readers):
+def test_huge_block_is_refused_before_allocation(readers):
     tracemalloc.start()
     try:
         for header in (b"#91000000000", b"#9999999999", b"#71048577"):

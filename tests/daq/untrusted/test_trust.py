@@ -11,7 +11,7 @@ from daq.untrusted.trust import distrust, own_folder, read_own
 
 @pytest.mark.parametrize(("mode", "kept"), [(0o700, True), (0o755, True), (0o757, False),
                                             (0o777, False), (0o1777, False)])  # fmt: skip
-def test_a_folder_that_others_may_write_is_not_used(tmp_path, mode, kept):
+def test_folder_others_may_write_is_not_used(tmp_path, mode, kept):
     folder = tmp_path / "cache"
     folder.mkdir()
     (folder / "file").write_bytes(b"content")
@@ -21,7 +21,8 @@ def test_a_folder_that_others_may_write_is_not_used(tmp_path, mode, kept):
     assert (own_folder(folder) == folder) is kept
 
 
-def test_each_folder_above_counts_unless_only_owners_may_rename_in_it(tmp_path):
+def test_each_parent_counts_unless_renaming_is_restricted(tmp_path):
+    """Only owners may rename in a sticky folder."""
     folder = tmp_path / "shared" / "mine"
     folder.mkdir(parents=True, mode=0o700)
     folder.parent.chmod(0o777)
@@ -30,7 +31,8 @@ def test_each_folder_above_counts_unless_only_owners_may_rename_in_it(tmp_path):
     assert distrust(folder) is None
 
 
-def test_a_file_that_others_may_write_or_that_is_a_link_is_not_read(tmp_path):
+def test_writable_or_linked_file_is_not_read(tmp_path):
+    """Writable by others."""
     file, link = tmp_path / "file", tmp_path / "link"
     file.write_bytes(b"content")
     link.symlink_to(file)
@@ -46,7 +48,7 @@ def test_a_file_that_others_may_write_or_that_is_a_link_is_not_read(tmp_path):
 
 
 @pytest.mark.skipif(os.getuid() != 0, reason="only root can give files away")
-def test_what_belongs_to_another_user_is_not_used(tmp_path):
+def test_file_of_another_user_is_not_used(tmp_path):
     folder = tmp_path / "cache"
     folder.mkdir()
     (folder / "file").write_bytes(b"content")
@@ -56,7 +58,7 @@ def test_what_belongs_to_another_user_is_not_used(tmp_path):
     assert distrust(folder) == f"{folder} belongs to another user"
 
 
-def test_a_group_that_is_not_the_users_own_is_others(tmp_path):
+def test_foreign_group_counts_as_others(tmp_path):
     folder = tmp_path / "cache"
     folder.mkdir()
     try:
@@ -69,7 +71,7 @@ def test_a_group_that_is_not_the_users_own_is_others(tmp_path):
     assert distrust(folder) is None
 
 
-def test_what_stands_in_is_new_private_and_told_once(tmp_path, caplog):
+def test_replacement_folder_is_private_and_reported_once(tmp_path, caplog):
     folder = tmp_path / "cache"
     folder.mkdir()
     folder.chmod(0o777)
@@ -85,7 +87,7 @@ def test_what_stands_in_is_new_private_and_told_once(tmp_path, caplog):
     ]
 
 
-def test_a_folder_is_made_for_this_user_alone(tmp_path):
+def test_folder_is_created_for_this_user_only(tmp_path):
     before = os.umask(0o002)
     try:
         made = own_folder(tmp_path / "new")
@@ -95,6 +97,6 @@ def test_a_folder_is_made_for_this_user_alone(tmp_path):
     assert made.stat().st_mode & 0o777 == 0o700
 
 
-def test_a_folder_that_cannot_be_made_is_left_to_whoever_writes(tmp_path):
+def test_folder_creation_error_is_left_to_writer(tmp_path):
     (tmp_path / "file").write_text("")
     assert own_folder(tmp_path / "file" / "below") == Path(tmp_path / "file" / "below")

@@ -76,7 +76,7 @@ def test_a_factor_is_the_published_one(symbol, name):
     assert parse_quantity(symbol, f"4{name}")[0] == pytest.approx(per_four * value, rel=1e-15)
 
 
-def test_every_unit_is_compared_with_a_published_factor():
+def test_every_unit_matches_its_published_factor():
     same = {"k_t": ("T_f_m", "/A"), "k_ts": ("k_b", ""), "T_f_L": ("T_f_m", "")}
     for symbol in ("L_a", "R_m", "k_b", "k_t", "k_ts", "J_m", "B_m", "T_f_m", "k_s1", "b_t_deg",
                    "start_hz", "source_vpk"):  # fmt: skip
@@ -141,7 +141,7 @@ def test_what_is_no_quantity_is_refused(symbol, text, said):
 
 
 @given(st.sampled_from(["k_b", "J_m", "N_1", "b_t_deg", "source_vpk"]), st.text(max_size=20))
-def test_any_text_gives_a_finite_number_or_is_refused(symbol, text):
+def test_any_text_is_finite_number_or_refused(symbol, text):
     try:
         value, _ = parse_quantity(symbol, text)
     except ValueError:

@@ -30,7 +30,7 @@ def file_with(tmp_path, template="two-stage", **values):
     # The third template is parts that are added to one of these.
     [("units", config_names("units")), ("templates", ("one-stage", "two-stage"))],
 )
-def test_nothing_is_said_of_what_comes_with_lashbench(kind, names):
+def test_shipped_units_raise_no_remark(kind, names):
     for name in names:
         unit = load_unit(str(config_path(kind, name)))
         assert (find_impossible(unit), find_unusual(unit)) == ([], []), name
@@ -60,7 +60,7 @@ def test_nothing_is_said_of_what_comes_with_lashbench(kind, names):
         ({"filter_denominator": "[1.0, 1.0, 1e-7]"}, "filter_numerator 9.87e+05", "equal"),
     ],
 )  # fmt: skip
-def test_a_file_that_cannot_be_is_refused_with_what_is_plausible(values, key, remedy, tmp_path):
+def test_impossible_file_is_refused_with_plausible_range(values, key, remedy, tmp_path):
     path = file_with(tmp_path, **values)
     with pytest.raises(ConfigurationError) as caught:
         load_unit(path)
@@ -93,7 +93,7 @@ def test_a_file_that_cannot_be_is_refused_with_what_is_plausible(values, key, re
         ({"filter_denominator": "[1.0, 10.0, 986960.0]"}, "damping ratio is 0.005", "omega"),
     ],
 )  # fmt: skip
-def test_what_is_unusual_is_read_and_told_in_one_sentence(values, key, remedy, tmp_path):
+def test_unusual_value_is_reported_in_one_sentence(values, key, remedy, tmp_path):
     (said,) = find_unusual(load_unit(file_with(tmp_path, **values)))
     assert key in said
     assert remedy in said
@@ -127,7 +127,7 @@ def scaled(size, template="two-stage"):
     template=st.sampled_from(["one-stage", "two-stage"]),
     shares=st.lists(st.floats(0.6, 1.6), min_size=4, max_size=4),
 )
-def test_a_drive_of_another_size_is_not_refused(size, template, shares):
+def test_drive_of_another_size_is_accepted(size, template, shares):
     unit = scaled(size, template)
     symbols = ("J_L", "k_s1", "T_f_m", "R_m")
     values = {s: unit.parameters[s] * share for s, share in zip(symbols, shares, strict=True)}
@@ -151,7 +151,7 @@ SLIPS = [
 @settings(max_examples=60)
 @given(size=st.floats(0.5, 2.0), slip=st.sampled_from(SLIPS))
 @example(size=1.0, slip=("J_L", 1e7))
-def test_a_slip_of_units_is_refused_and_names_its_value(size, slip):
+def test_unit_slip_is_refused_naming_its_value(size, slip):
     unit, (symbol, factor) = scaled(size), slip
     wrong = unit.with_parameters(**{symbol: unit.parameters[symbol] * factor})
     (said,) = find_impossible(wrong)
@@ -166,7 +166,7 @@ def test_a_slip_of_units_is_refused_and_names_its_value(size, slip):
 @pytest.mark.parametrize(
     ("name", "arf_hz", "rf_hz"), [("adss", 149.0, 154.7), ("edss", 125.0, 158.9)]
 )
-def test_linear_frequencies_are_those_of_the_closed_drive(name, arf_hz, rf_hz):
+def test_linear_frequencies_are_of_closed_drive(name, arf_hz, rf_hz):
     import numpy as np
 
     from sim.drivetrain import paper_drivetrain

@@ -31,7 +31,7 @@ def finely(sections):
 
 
 @pytest.mark.parametrize("name", drives.DRIVES)
-def test_a_drive_without_play_has_its_linear_response(name):
+def test_drive_without_backlash_has_linear_response(name):
     sections = finely(drives.DRIVES[name])
     unit = drives.unit(sections, free=True)
     shown = simulate(unit, 0.5, plan(LINEAR_HZ, settle_cycles=120, integrate_cycles=60)).gain
@@ -40,7 +40,7 @@ def test_a_drive_without_play_has_its_linear_response(name):
 
 
 @pytest.mark.parametrize("name", drives.DRIVES)
-def test_a_drive_with_play_is_what_an_independent_plant_shows(name):
+def test_drive_with_backlash_matches_independent_plant(name):
     """Sampling, counts, clips, play and friction: nothing is linearised on either side."""
     sections, seeds = drives.DRIVES[name], range(4)
     unit, document = drives.unit(sections), drives.document(sections)
@@ -56,7 +56,7 @@ def test_a_drive_with_play_is_what_an_independent_plant_shows(name):
     assert np.all(np.abs(off) < 4.0 * scatter + 0.03), (off, scatter)
 
 
-def test_a_held_command_is_late_by_half_a_sample():
+def test_held_command_is_late_by_half_sample():
     """A zero-order hold at 2 kHz: sinc, and a delay of 0.25 ms."""
     hertz = np.array(LINEAR_HZ)
     held = paper_drivetrain(drives.unit({"sampling": drives.SAMPLED}), 0.5).system()
@@ -65,7 +65,7 @@ def test_a_held_command_is_late_by_half_a_sample():
     np.testing.assert_allclose(held.transfer(hertz) / plain.transfer(hertz), expected, rtol=1e-9)
 
 
-def test_a_stated_delay_turns_the_phase_in_proportion_to_frequency():
+def test_stated_delay_turns_phase_with_frequency():
     late = {"kind": "tachometer", "delay_s": 1e-3}
     unit, hertz = drives.unit({"sensor": late}, free=True), np.array(LINEAR_HZ)
     shown = simulate(unit, 0.5, plan(LINEAR_HZ)).gain
@@ -86,7 +86,7 @@ def test_few_counts_scatter_from_cycle_to_cycle(counts):
     assert noise[0] > 5.0 * noise[1]
 
 
-def test_lanes_of_a_sampled_drive_do_not_depend_on_their_neighbours():
+def test_sampled_lanes_do_not_depend_on_neighbours():
     unit = drives.unit(drives.DRIVES["encoder, speed"])
     servos = [Servo.of(unit, ratio, seed=i) for i, ratio in enumerate((0.2, 0.5, 0.8, 0.3, 0.6))]
     other = Servo.of(drives.unit(drives.DRIVES["command held"]), 0.4)
@@ -96,7 +96,7 @@ def test_lanes_of_a_sampled_drive_do_not_depend_on_their_neighbours():
         np.testing.assert_array_equal(alone, simulate_cycles([servo], one, single=True)[0])
 
 
-def test_the_clock_of_a_bench_goes_on_from_dwell_to_dwell():
+def test_clock_continues_from_dwell_to_dwell():
     """Two dwells are what one of both lengths is, as if nobody had looked in between."""
     unit = drives.unit(finely(drives.DRIVES["encoder, speed"]), free=True)
     whole, parts = SteppedServo(unit, 0.4), SteppedServo(unit, 0.4)
@@ -106,14 +106,14 @@ def test_the_clock_of_a_bench_goes_on_from_dwell_to_dwell():
     np.testing.assert_allclose(once[:, 1], twice[:, 1], rtol=1e-4)
 
 
-def test_a_current_limit_clips_what_the_motor_gets():
+def test_current_limit_clips_motor_current():
     sections = drives.DRIVES["current"]
     free = sections | {"amplifier": {"kind": "current", "bandwidth_hz": 1000.0}}
     shown = [abs(simulate(drives.unit(s), 0.4, plan((63.0,))).gain[0]) for s in (sections, free)]
     assert shown[0] < 0.9 * shown[1]
 
 
-def test_effects_of_amplifier_and_reading_act_beside_a_clock():
+def test_amplifier_and_reading_effects_ignore_clock():
     """A dead zone and a delay on a sampled bench are what they are without its clock."""
     for effect, values in (
         ("amplifier-dead-zone", {"V_d": 2.0}),
@@ -131,7 +131,7 @@ def test_effects_of_amplifier_and_reading_act_beside_a_clock():
         assert np.abs(shown[0] / simulate(unit, 0.5, plan((60.0, 200.0))).gain - 1.0).max() > 0.03
 
 
-def test_a_delay_of_the_reading_is_the_same_of_every_sensor():
+def test_reading_delay_is_equal_for_every_sensor():
     """As an effect it is Pade's approximation with a tachometer, and exact with an encoder."""
     late = [EffectSetting("reading-delay", {"T_d": 5e-4})]
     for sections in ({}, drives.DRIVES["encoder, speed"], drives.DRIVES["tachometer sampled"]):

@@ -43,7 +43,7 @@ def test_a_wrong_section_is_refused_by_name(sections, named):
     assert "Value error" not in str(error.value)
 
 
-def test_values_without_influence_beside_a_current_amplifier_are_refused():
+def test_useless_values_beside_current_amplifier_are_refused():
     with_both = drives.document({}) | {"amplifier": drives.CURRENT}
     with pytest.raises(ConfigurationError, match="leave out L_a, R_m, k_b"):
         unit_from_mapping(with_both, "both.toml")
@@ -61,7 +61,7 @@ def test_values_without_influence_beside_a_current_amplifier_are_refused():
         ({"load_coupling": {"k_cL": 1e-9, "J_cL": 1e-4}}, "load_coupling.k_cL"),
     ],
 )
-def test_a_value_that_cannot_be_is_named_with_what_is_plausible(sections, named):
+def test_impossible_value_is_refused_with_plausible_one(sections, named):
     (text, *_) = find_impossible(drives.unit(sections))
     assert named in text
     assert "plausible" in text
@@ -72,7 +72,7 @@ def test_a_value_that_cannot_be_is_named_with_what_is_plausible(sections, named)
     rate_hz=st.floats(allow_nan=True, allow_infinity=True),
     delay_s=st.floats(allow_nan=True, allow_infinity=True),
 )
-def test_any_numbers_of_clock_and_encoder_make_a_drive_or_an_error(counts, rate_hz, delay_s):
+def test_clock_and_encoder_are_valid_or_refused(counts, rate_hz, delay_s):
     sections = {
         "sampling": {"rate_hz": rate_hz},
         "sensor": drives.ENCODER | {"counts": counts, "delay_s": delay_s},
@@ -90,7 +90,7 @@ def test_any_numbers_of_clock_and_encoder_make_a_drive_or_an_error(counts, rate_
         drives.unit(sections)
 
 
-def test_what_a_drive_cannot_have_is_refused_and_named():
+def test_impossible_property_of_drive_is_refused():
     current = drives.unit(drives.DRIVES["current"])
     with pytest.raises(ConfigurationError, match="motor-resistance.*controls the current"):
         drivetrain_with(current, 0.5, [EffectSetting("motor-resistance", {"R_m": 3.0})])
@@ -100,7 +100,8 @@ def test_what_a_drive_cannot_have_is_refused_and_named():
 
 
 @pytest.mark.parametrize("name", drives.DRIVES)
-def test_every_other_effect_can_be_had_by_every_drive(name):
+def test_every_drive_accepts_every_other_effect(name):
+    """All but the effects of parts that it lacks."""
     unit = drives.unit(drives.DRIVES[name])
     foreign = not_of_unit(unit)
     for effect in BUILT_IN.values():
@@ -110,7 +111,7 @@ def test_every_other_effect_can_be_had_by_every_drive(name):
 
 
 @pytest.mark.parametrize("name", [*config_names("units"), "free"])
-def test_every_effect_has_a_range_with_two_ends(name):
+def test_every_effect_has_range_with_two_ends(name):
     """Also about a friction or a play that the datasheet has as 0."""
     unit = drives.unit({}, free=True) if name == "free" else load_unit(name)
     foreign = not_of_unit(unit)
@@ -132,7 +133,7 @@ def test_a_paper_unit_is_stored_as_before():
 
 
 @pytest.mark.parametrize("name", drives.DRIVES)
-def test_a_value_changed_by_its_symbol_keeps_the_rest(name):
+def test_value_changed_by_symbol_keeps_others(name):
     unit = drives.unit(drives.DRIVES[name])
     for symbol, value in unit.parameters.items():
         changed = unit.with_parameters(**{symbol: value})

@@ -34,7 +34,7 @@ def test_there_are_eight_units_of_six_kinds():
 
 
 @pytest.mark.parametrize("name", UNITS)
-def test_a_shipped_unit_is_plausible_and_names_its_source(name):
+def test_shipped_unit_is_plausible_and_names_source(name):
     unit = load_unit(name)
     assert not find_impossible(unit)
     assert not find_unusual(unit)

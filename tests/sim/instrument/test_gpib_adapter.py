@@ -118,7 +118,7 @@ def test_terminators(host, eos, ending):
     assert seen == [(b"*CLS" + ending, True), (b"*CLS" + ending, False)]
 
 
-def test_a_late_reply_is_given_up_in_silence_and_stays_behind(bench):
+def test_late_reply_times_out_silently_and_remains(bench):
     now = [0.0]
     controller = bench("slow-reply:seconds=2,phase=prepare", clock=lambda: now[0])
     host = Host(FakeAdapter(controller.instrument))
@@ -160,7 +160,7 @@ def test_ways_to_end_a_read(host):
     assert host.send(b"++read eoi\n") == b'-420,"Query unterminated"\n'
 
 
-def test_eoi_always_ends_a_read_of_an_ar488(arduino):
+def test_eoi_always_ends_ar488_read(arduino):
     assert arduino.send(b"*OPT?\n++read\nSYST:ERR?\n++read\n") == b'"1D2"\n+0,"No error"\n'
 
 
@@ -286,7 +286,7 @@ def test_device_mode_sends_nothing(host):
 
 
 @pytest.mark.parametrize(("eos", "answered"), [(3, False), (2, True), (1, False), (0, True)])
-def test_eoi_after_the_last_byte_ends_no_message(bench, eos, answered):
+def test_late_eoi_ends_no_message(bench, eos, answered):
     """Firmware that is too late with EOI: only a line feed ends a message."""
     host = Host(FakeAdapter(bench().instrument, AR488_LATE_EOI))
     host.send(READY.replace(b"++savecfg 0\n", b"").replace(b"++eos 3", b"++eos %d" % eos))
@@ -325,7 +325,7 @@ def test_what_only_an_ar488_answers(arduino, line, answer):
         assert prologix.send(line.split(b"\n")[0] + b"\n") == b"Unrecognized command\r\n"
 
 
-def test_a_poll_of_all_names_who_wants_service(arduino):
+def test_poll_of_all_finds_requesting_instrument(arduino):
     arduino.send(b"*SRE 32\n*ESE 32\nNONSENSE 1\n")
     assert arduino.send(b"++allspoll\n") == b"SRQ:11,96\r\n\r\n"
     assert arduino.send(b"++allspoll\n") == b"\r\n"

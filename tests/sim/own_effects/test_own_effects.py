@@ -55,14 +55,14 @@ def refused(*words, **environment):
 @pytest.mark.parametrize(
     "words", [["simulate", *SWEEP, "--out", "x.csv"], ["prepare"]], ids=lambda w: w[0]
 )
-def test_a_file_that_nobody_trusts_is_never_executed(unit, words):
+def test_untrusted_file_is_never_executed(unit, words):
     line = refused(*words, "--unit", unit)
     assert "tight_bearing.py would be executed as Python code" in line
     assert "--trust-effects" in line
     assert not (unit.parent / MARK).exists()
 
 
-def test_an_effect_of_the_file_is_simulated_where_it_is_trusted(unit, tmp_path):
+def test_trusted_effect_file_is_simulated(unit, tmp_path):
     plain, tight = tmp_path / "plain.csv", tmp_path / "tight.csv"
     words = ["simulate", "--unit", unit, *SWEEP, "--out"]
     assert lashbench(*words, plain, LASHBENCH_TRUST_EFFECTS="1").returncode == 0
@@ -83,7 +83,7 @@ def test_only_a_plain_yes_is_trust(unit, monkeypatch):
     assert not (unit.parent / MARK).exists()
 
 
-def test_a_file_that_others_can_write_is_not_executed(unit):
+def test_file_others_can_write_is_not_executed(unit):
     (unit.parent / "tight_bearing.py").chmod(0o666)
     line = refused("new-unit", "--check", unit, "--trust-effects")
     assert "can be written by others" in line
@@ -100,7 +100,7 @@ print(json.dumps([[posterior_name(u), list(Prior(u).effects)] for u in units]))
 """
 
 
-def test_the_posterior_of_a_unit_depends_on_what_its_effect_files_hold(unit, tmp_path):
+def test_posterior_name_depends_on_effect_file_text(unit, tmp_path):
     """On their text, not on their name or place; other units keep theirs."""
 
     def of(*names):
@@ -162,7 +162,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("line", WRONG)
-def test_what_is_no_whole_effect_is_refused_with_its_line(line):
+def test_incomplete_effect_is_refused_with_its_line(line):
     with pytest.raises(ConfigurationError, match=r"^/own/effect\.py") as refusal:
         defined_effects(EffectSource("/own/effect.py", f"{HEAD}\n{line}\n"))
     assert WRONG[line] in str(refusal.value)
@@ -171,7 +171,7 @@ def test_what_is_no_whole_effect_is_refused_with_its_line(line):
 
 @given(st.text(max_size=200))
 @settings(max_examples=60)
-def test_any_text_is_an_effect_or_one_line(text):
+def test_any_text_is_effect_or_one_line(text):
     with pytest.raises(ConfigurationError) as refusal:
         # Behind a name that does not exist, so that no text does anything.
         defined_effects(EffectSource("effect.py", f"no_such_name\n{text}"))
@@ -204,7 +204,7 @@ for name in sys.argv[1:]:
 """
 
 
-def test_an_effect_that_cannot_be_simulated_is_refused_before_anything_is(tmp_path):
+def test_unsimulatable_effect_is_refused_before_simulation(tmp_path):
     units = []
     for number, line in enumerate(ON_TRIAL):
         folder = tmp_path / str(number)
@@ -225,7 +225,7 @@ def test_an_effect_that_cannot_be_simulated_is_refused_before_anything_is(tmp_pa
         assert wanted in said[tmp_path / str(number) / "unit.toml"]
 
 
-def test_a_stored_unit_says_that_its_effects_were_not_kept(unit):
+def test_stored_unit_states_that_effects_are_missing(unit):
     from analysis.inference.prior import Prior
     from daq.untrusted.bounded_text import parse_toml
     from sim.unit import unit_from_mapping

@@ -34,7 +34,7 @@ def together(store, measurement):
     return [one.provenance["measurement_id"] for one in responses_together(store, measurement)]
 
 
-def test_a_measurement_brings_those_that_it_follows_the_latest_first(measured):
+def test_measurement_includes_its_predecessors_latest_first(measured):
     store, add = measured
     second = add(1)
     third, alone = add(second), add(None)
@@ -54,7 +54,7 @@ def test_what_cannot_be_followed_is_left_out(measured):
         together(store, 99)
 
 
-def test_measurements_that_follow_each_other_in_a_ring_are_taken_once(measured):
+def test_circular_predecessors_are_included_once(measured):
     store, add = measured
     last = store.measurements()[-1].id
     one, other = add(last + 2), add(last + 1)

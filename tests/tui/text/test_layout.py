@@ -10,7 +10,7 @@ from tui.text.layout import columns_of, table_lines, wrapped
 texts = st.text(st.characters(codec="utf-8"), max_size=60)
 
 
-def test_a_text_breaks_between_words_and_a_word_only_where_it_must():
+def test_text_breaks_between_words_if_possible():
     assert wrapped("one two three", 8, "  ") == ["one two", "  three"]
     assert wrapped("abcdefghij kl", 4) == ["abcd", "efgh", "ij", "kl"]
     assert wrapped("", 4) == [""]
@@ -18,7 +18,7 @@ def test_a_text_breaks_between_words_and_a_word_only_where_it_must():
 
 
 @given(text=texts, width=st.integers(8, 80), indent=st.sampled_from(["", "  "]))
-def test_no_line_is_longer_and_no_sign_is_lost(text, width, indent):
+def test_lines_keep_width_and_all_characters(text, width, indent):
     lines = wrapped(text, width, indent)
     assert all(columns_of(line) <= width for line in lines)
     said = "".join("".join(lines).split())
@@ -27,7 +27,7 @@ def test_no_line_is_longer_and_no_sign_is_lost(text, width, indent):
     assert not any(unicodedata.category(sign) == "Cc" for sign in said)
 
 
-def test_a_table_wraps_the_widest_cells_that_may():
+def test_table_wraps_widest_cells_allowed_to():
     rows = [("1", "a long name of a unit", "x" * 20), ("22", "b", "y")]
     assert table_lines(("id", "unit", "state"), rows, may_wrap=(1,), width=36) == [
         "id  unit        state",
@@ -40,6 +40,6 @@ def test_a_table_wraps_the_widest_cells_that_may():
 
 
 @given(rows=st.lists(st.tuples(texts, texts), max_size=4))
-def test_a_table_of_anything_keeps_to_its_width(rows):
+def test_table_of_any_text_keeps_its_width(rows):
     lines = table_lines(("unit", "serial"), rows, may_wrap=(0, 1), width=40)
     assert all(columns_of(line) <= 40 for line in lines)

@@ -27,13 +27,13 @@ def asked(answers):
     return ask_parts(said.append, lambda: f"{next(lines, 'no')}\n"), "".join(said)
 
 
-def test_a_drive_like_the_papers_is_asked_one_question():
+def test_drive_of_paper_kind_needs_one_question():
     names, said = asked(["no"])
     assert names == ()
     assert said.count("[yes / no]") == 1
 
 
-def test_each_part_is_asked_for_and_nonsense_again():
+def test_each_part_is_asked_until_valid():
     names, said = asked(["y", "no", "maybe", "yes", "Y", "n", "yes", "-"])
     assert names == ("sensor", "sampling", "load_coupling")
     assert "'maybe' is neither yes nor no" in said
@@ -55,7 +55,7 @@ def test_every_choice_of_parts_makes_a_unit(stages):
                 assert unit.sampling.holds_command == ("sampling" in names)
 
 
-def test_values_of_parts_are_asked_in_catalogue_units():
+def test_part_values_use_catalogue_units():
     text = with_parts(template("two-stage"), template("parts"), ("amplifier", "sensor"))
     said = []
     answers = {"bandwidth_hz": "1.2 kHz", "delay_s": "0.25 ms", "counts": "16384", "k_a": "0.5"}
@@ -73,7 +73,7 @@ def test_values_of_parts_are_asked_in_catalogue_units():
 
 
 @pytest.mark.parametrize("stages", ["1", "2"])
-def test_parts_are_in_a_new_file_as_comments_that_work(stages, tmp_path, capsys):
+def test_commented_parts_of_new_file_work(stages, tmp_path, capsys):
     path = tmp_path / "own.toml"
     assert cli.main(["new-unit", "--out", str(path), "--stages", stages]) == 0
     capsys.readouterr()

@@ -40,7 +40,7 @@ def test_examples_alone_give_the_template(stages):
     assert asked([], stages)[0] == template(stages)
 
 
-def test_catalogue_values_are_converted_and_kept_beside_the_meaning():
+def test_catalogue_values_are_converted_and_recorded():
     motor = ["0.85 mH", "4.1", "3.6 V/krpm", "4.87 oz-in/A", "86 gcm2", "-", "14 mNm"]
     chain = ["4.11", "9 V/krpm", "100 Hz", "0.7"]
     stage1 = ["72/12", "-", "0.3 kg.cm2", "0.02 Nm/arcmin", "-", "-"]
@@ -59,7 +59,7 @@ def test_catalogue_values_are_converted_and_kept_beside_the_meaning():
     assert len(text.splitlines()) == len(template("two-stage").splitlines())
 
 
-def test_an_answer_that_cannot_be_is_asked_for_again():
+def test_impossible_answer_is_asked_again():
     bad = ["", "much", "3,6", "-1", "0", "nan", "5 kg", "1e300"]
     text, said = asked([*bad, "0.85 mH"])
     assert unit_of(text).motor.L_a == 8.5e-4
@@ -68,7 +68,7 @@ def test_an_answer_that_cannot_be_is_asked_for_again():
     assert "'kg' is no unit of L_a; use one of: H, mH, uH" in said
 
 
-def test_answers_are_compared_with_those_before_and_one_can_go_back():
+def test_answers_are_cross_checked_and_revisable():
     text, said = asked(["-", "-", "0.046", "46", "<", "0.035", "35 mNm/A"])
     assert "if k_t is in mN.m/A, give 0.046" in said
     assert (unit_of(text).motor.k_b, unit_of(text).motor.k_t) == (0.035, 0.035)
@@ -81,7 +81,7 @@ def test_an_input_that_ends_writes_nothing():
 
 @settings(max_examples=30)
 @given(st.lists(st.text(st.characters(exclude_characters="\n"), max_size=12), max_size=12))
-def test_whatever_is_typed_the_file_is_a_unit(answers):
+def test_any_input_gives_a_valid_unit_file(answers):
     assert unit_of(asked(answers)[0]).stages == 2
 
 
@@ -135,7 +135,7 @@ def check(capsys):
     return call
 
 
-def test_a_file_is_described_from_motor_to_load(check):
+def test_file_is_described_from_motor_to_load(check):
     code, out, err = check(config_path("units", "adss"))
     assert (code, err) == (0, "")
     lines = [" ".join(line.split()) for line in out.splitlines()]

@@ -42,7 +42,7 @@ def unit_file(tmp_path, monkeypatch):
     return write
 
 
-def test_every_verb_that_takes_a_unit_is_among_them():
+def test_every_verb_with_unit_is_covered():
     taking = set()
     for verb, (target, _) in VERBS.items():
         module, name = target.split(":")
@@ -69,7 +69,7 @@ def test_what_cannot_be_is_refused(verb, unit_file, tmp_path, capsys):
     assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
 
 
-def test_a_value_set_on_the_command_line_is_told_of_too(tmp_path, monkeypatch, capsys):
+def test_value_set_by_option_is_checked_too(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     words = ["simulate", "--unit", "adss", "--set", "J_m=86", *WORDS["simulate"]]
     assert cli.main(words) == 2
