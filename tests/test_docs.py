@@ -26,11 +26,11 @@ ELSEWHERE = {"docs/instrument.md"}
 """Pages whose Python is run by a test of its own, with arguments."""
 
 
-def test_every_link_of_the_documentation_leads_somewhere():
+def test_every_documentation_link_resolves():
     assert broken_links(ROOT) == []
 
 
-def test_the_link_checker_finds_what_is_broken(tmp_path):
+def test_link_checker_finds_broken_links(tmp_path):
     (tmp_path / "docs").mkdir()
     (tmp_path / "picture.png").write_bytes(b"")
     (tmp_path / "README.md").write_text(
@@ -128,7 +128,7 @@ def test_interface_page_matches_the_code():
     assert api_page.page() == api_page.PAGE.read_text(), "run python tests/api_page.py"
 
 
-def test_everything_public_says_what_it_is():
+def test_every_public_name_has_docstring():
     for line in api_page.page().splitlines():
         assert not line.rstrip().endswith("`:"), line
 
@@ -148,7 +148,7 @@ def test_example_is_short_and_uses_public_names(example):
 
 
 @pytest.mark.parametrize("page", pages(), ids=name_of)
-def test_files_that_a_page_names_are_there(page):
+def test_files_named_on_page_exist(page):
     for path in re.findall(r"`((?:daq|sim|analysis|tui|tests)/[\w./*]+)`", page.read_text()):
         assert list(ROOT.glob(path.rstrip("/"))), path
 
@@ -203,7 +203,7 @@ def test_the_citation_is_of_this_version():
     assert "Apache License" in (ROOT / "LICENSE").read_text(encoding="utf-8")
 
 
-def test_the_physics_tells_of_every_effect():
+def test_physics_page_describes_every_effect():
     page = (ROOT / "docs" / "physics.md").read_text(encoding="utf-8")
     table = page[page.index("| effect |") : page.index("## Symbols")]
     assert re.findall(r"^\| ([a-z0-9-]+) \|", table, re.MULTILINE)[2:] == list(BUILT_IN)

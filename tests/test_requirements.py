@@ -12,12 +12,12 @@ from packaging.requirements import Requirement
 LOCKED, OWN = locked(), required()
 
 
-def test_what_is_installed_is_what_was_tested():
+def test_installed_versions_are_locked_ones():
     assert differences(LOCKED, OWN) == []
 
 
 @pytest.mark.parametrize("name", ["numpy", "llvmlite", "execnet"])
-def test_another_version_is_told(name):
+def test_other_version_is_reported(name):
     """Of what is required itself, by what is required, and for the tests alone."""
     other, count = re.subn(rf"(?m)^{name}==.*$", f"{name}==0.1", LOCKED)
     assert count == 1

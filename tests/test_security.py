@@ -58,7 +58,7 @@ def test_package_cannot_execute_what_it_reads():
      "np.load(f)", "os.system(x)", "subprocess.run(x, shell=True)",
      "np.load(f, allow_pickle=True)"],
 )  # fmt: skip
-def test_what_could_is_found(source):
+def test_dangerous_source_is_found(source):
     assert dangers(source)
     assert not dangers("exec('')"), "it runs nothing"
 
@@ -76,7 +76,7 @@ def test_simulated_analyser_is_unreachable_from_outside():
 
 
 @pytest.mark.parametrize("name", ["../../etc/x", "/etc/x", "a/b", "..", "", "\0", "C:\\x", "ADSS"])
-def test_a_name_leads_into_no_other_folder(name, tmp_path, monkeypatch):
+def test_name_cannot_leave_its_folder(name, tmp_path, monkeypatch):
     class Figure:
         def savefig(self, stream, **_):
             stream.write(b"a figure")
@@ -124,10 +124,10 @@ def test_no_file_is_written_in_place():
     ["figure.savefig(path)", "path.write_text(x)", "path.open('wb')", "h5py.File(path, 'w')",
      "partial.write_bytes(x)", "log.open('a')"],
 )  # fmt: skip
-def test_what_writes_so_is_found(source):
+def test_unsafe_writing_is_found(source):
     assert half_written(source)
 
 
-def test_plain_names_stay_as_they_are():
+def test_plain_names_are_unchanged():
     assert file_stem("ADSS") == "adss"
     assert file_stem("My gimbal 2") == "my-gimbal-2"

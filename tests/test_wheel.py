@@ -116,7 +116,7 @@ def test_shipped_files_are_found_outside_checkout(installed, tmp_path):
     assert samples == "[True]"
 
 
-def test_its_command_runs_away_from_the_checkout(installed, tmp_path):
+def test_command_runs_outside_the_checkout(installed, tmp_path):
     program = "import sys, tui.cli as c; print(c.__file__); sys.exit(c.main(['--help']))"
     run = run_installed(installed, tmp_path, program)
     assert run.returncode == 0, run.stderr

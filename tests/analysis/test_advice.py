@@ -159,7 +159,7 @@ def test_limit_is_decided_by_whole_interval(span, verdict):
     k=st.sampled_from([0.5, 1.0, 2.0, 3.0, 10.0]),
     doubt=st.sampled_from(["", "the phase is likely in radians"]),
 )
-def test_advice_and_judgement_decide_one_limit_alike(spans, limit, k, doubt):
+def test_advice_and_judgement_agree_on_limit(spans, limit, k, doubt):
     content = with_limits(b1_deg=limit).model_dump(by_alias=True)
     content["acceptance"] = {"coverage_factor": k, "b2_deg": {"upper": limit / 10}}
     unit, estimate = unit_from_mapping(content, "test"), estimated(*spans)

@@ -113,7 +113,7 @@ def test_fitting_estimate_is_marked_not_judged():
 
 
 @pytest.mark.parametrize("estimate", [None, {}, {"failed": "no usable point"}])
-def test_nothing_estimated_is_told_as_such(estimate):
+def test_missing_estimate_is_stated(estimate):
     answer = accept_model(estimate)
     assert (answer.state, answer.numbers) == ("none", {})
 

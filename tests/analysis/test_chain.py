@@ -93,7 +93,7 @@ def test_one_stage_is_limit_of_uneven_shares(limit, near):
 
 
 @pytest.mark.parametrize("ratio", [0.0, 1.0])
-def test_without_play_its_split_does_not_matter(ratio, upward):
+def test_split_is_irrelevant_without_backlash(ratio, upward):
     np.testing.assert_allclose(
         swept(ratio=ratio, levels=(1.0,)).gain, upward.gain[upward.source_vpk == 1.0], rtol=1e-9
     )
@@ -120,7 +120,7 @@ def test_downward_sweep_is_read_alike():
         assert other.std_hz == pytest.approx(one.std_hz, rel=1e-6)
 
 
-def test_fewer_readings_are_never_surer():
+def test_fewer_readings_widen_the_interval():
     """A quarter of the readings: twice the error bar is due, and no seed may bring it below one."""
     f = np.linspace(20, 110, 361)
     ratios = []

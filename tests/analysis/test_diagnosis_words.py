@@ -57,7 +57,7 @@ def test_site_probability_sums_all_judged_models(explained):
     )
 
 
-def test_what_nobody_believes_is_not_told(explained):
+def test_negligible_probability_is_omitted(explained):
     found = believed(explained, "explained", load=0.997, gain=0.003)
     assert line(found, "chain or mechanics") == "mechanics 1.00"
 
@@ -113,7 +113,7 @@ def test_unread_phase_gives_no_phase_residual(explained):
     assert told.endswith(" dB")
 
 
-def test_what_the_named_set_leaves_is_told(explained):
+def test_residuals_of_named_set_are_stated(explained):
     assert line(explained, "against the extended model") == explained.left_shape
     assert explained.to_json()["shape_after"] == explained.left_shape
 
@@ -143,7 +143,7 @@ def test_plain_model_may_fail_without_departure(unexplained):
     assert line(found, "against the plain model") == f"no band departs, yet it {objection}"
 
 
-def test_what_says_the_same_is_counted_once(monkeypatch, explained):
+def test_equivalent_sets_count_once(monkeypatch, explained):
     """Probabilities of a document add up to one."""
     verdict = explained.verdict
     monkeypatch.setattr(
@@ -262,7 +262,7 @@ def test_one_point_is_refused_before_simulation(monkeypatch):
 
 
 @pytest.mark.parametrize(("frequencies", "warned"), [(8, True), (19, True), (20, False)])
-def test_that_few_frequencies_show_little_is_said(explained, frequencies, warned):
+def test_few_frequencies_give_a_remark(explained, frequencies, warned):
     observation = explained.observation
     hz = np.resize(np.linspace(100.0, 180.0, frequencies), len(observation))
     seen = replace(observation, frequency_hz=hz)

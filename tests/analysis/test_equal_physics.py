@@ -54,7 +54,7 @@ def test_renamed_unit_finds_its_stored_runs(name, tmp_path):
     assert run_name(mine, family, sweep) == run_name(unit, family, sweep)
 
 
-def test_every_parameter_tells_units_apart():
+def test_every_parameter_distinguishes_units():
     unit, sweep, family = load_unit("adss"), usual_sweep("adss"), usual_families("adss")[0]
     others = [unit.with_parameters(**{s: 1.01 * v}) for s, v in unit.parameters.items()]
     for names in (

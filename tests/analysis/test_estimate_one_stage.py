@@ -36,6 +36,6 @@ def test_backlash_is_found_despite_wrong_file(measured):
     assert "no limit set" in stage.line
 
 
-def test_what_needs_two_stages_says_so():
+def test_one_stage_refuses_stage_features():
     with pytest.raises(InputError, match="one gear stage"):
         estimate_features(62.0, 101.0, ONE)

@@ -67,7 +67,7 @@ def test_small_pair_does_not_replace_strong_one():
     assert level.pairs[0].rf.frequency_hz == pytest.approx(29, rel=0.02)
 
 
-def test_a_level_with_one_pair_lists_it():
+def test_single_pair_is_listed():
     level = read("zeta 0.03 / 0.05, noise 2 %")
     assert [(pair.arf, pair.rf) for pair in level.pairs] == [(level.arf, level.rf)]
     assert level.flags == ()
@@ -99,7 +99,7 @@ def test_coarse_log_grid_keeps_deep_valley():
         "constant noise above the valley's depth",
     ],
 )
-def test_bars_hold_beside_what_disturbs(name):
+def test_intervals_cover_despite_disturbance(name):
     hz, zeta = held(name)
     # 50 intervals of 95 %: fewer than 43 hold with a chance of 0.2 %.
     assert hz >= 0.86

@@ -23,7 +23,7 @@ def doctored(file):
 
 
 @pytest.mark.parametrize(("mode", "factor"), [(0o755, 2.0), (0o777, 1.0), (0o1777, 1.0)])
-def test_runs_of_others_are_not_believed(tmp_path, mode, factor):
+def test_runs_of_others_are_not_read(tmp_path, mode, factor):
     cache = tmp_path / "cache"
     honest = run_families(ADSS, FAMILIES, SEEN, cache=cache)
     (file,) = cache.iterdir()

@@ -109,7 +109,7 @@ def test_parabola_of_a_parabola_is_exact():
     assert peak.gain_db == pytest.approx(-20, abs=1e-9)
 
 
-def test_parabola_states_the_scatter_it_has():
+def test_parabola_error_equals_observed_scatter():
     rng = np.random.default_rng(11)
     f = np.linspace(30, 50, 41)
     clean = -20 + 0.3 * (f - 40.2) ** 2
@@ -123,7 +123,7 @@ def test_parabola_states_the_scatter_it_has():
     assert 0.7 < np.sqrt(np.mean((off / std) ** 2)) < 1.2
 
 
-def test_a_cliff_is_placed_between_its_readings():
+def test_jump_is_placed_between_its_readings():
     f = np.linspace(60, 80, 21)
     gain = np.where(f <= 70, (f - 60) * 0.5, -8.0)
     peak = read_peak(curve(f, gain, 0.02), 10, 1, 1, 19)

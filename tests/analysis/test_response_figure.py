@@ -33,7 +33,7 @@ def test_each_level_is_named_with_its_features():
     np.testing.assert_allclose([low, high], [100.78, 101.30])
 
 
-def test_simulated_data_say_so():
+def test_simulated_data_are_labelled():
     assert draw_response(response()).axes[0].get_title() == "ADSS"
     simulated = response(provenance={"kind": "simulated"})
     assert draw_response(simulated).axes[0].get_title() == "ADSS, SIMULATED"
@@ -49,6 +49,6 @@ def test_spoilt_reading_breaks_line_and_is_hollow():
     assert drawn[(102.0,)].get_markerfacecolor() == "none"
 
 
-def test_it_is_written_as_a_picture(tmp_path):
+def test_figure_is_written_as_picture(tmp_path):
     save_response_figure(response(), (), tmp_path / "bode.png")
     assert (tmp_path / "bode.png").read_bytes().startswith(b"\x89PNG")

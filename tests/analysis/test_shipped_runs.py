@@ -77,7 +77,7 @@ def test_shipped_runs_are_those_estimates_need():
 
 
 @pytest.mark.parametrize("damage", ["gone", "cut", "text"])
-def test_without_them_an_estimate_simulates(damage, name, tmp_path, monkeypatch):
+def test_damaged_archive_makes_estimate_simulate(damage, name, tmp_path, monkeypatch):
     file = tmp_path / "runs.zip"
     if damage == "cut":
         file.write_bytes(RUNS.read_bytes()[:100_000])

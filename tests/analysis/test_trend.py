@@ -50,7 +50,7 @@ def test_without_two_moments_there_is_no_slope():
     ("times", "values", "stds"),
     [([1.0], [1.0, 2.0], [1.0]), ([1.0], [1.0], [0.0]), ([1.0], [np.nan], [1.0])],
 )
-def test_what_cannot_be_fitted_is_refused(times, values, stds):
+def test_unfittable_values_are_refused(times, values, stds):
     with pytest.raises(InputError, match="trend"):
         fit_trend(times, values, stds)
 

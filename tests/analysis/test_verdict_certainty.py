@@ -39,5 +39,5 @@ def test_certainty_falls_with_fewer_noisier_points(seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_from_hardly_anything_nothing_is_blamed(seed):
+def test_sparse_noisy_response_names_no_cause(seed):
     assert judge(seed, step=8, scatter=10.0).word != "explained"

@@ -23,7 +23,7 @@ def place(url):
     return url.removeprefix("prologix-tcp:").partition("?")[0]
 
 
-def test_fft_dev_as_it_is_packaged(box):
+def test_fft_dev_package_works(box):
     """Its driver of the 35670A over a Prologix on the network, unchanged."""
     client = pytest.importorskip("fft_dev.fft35670a.fft35670a_dev_prologix")
     with served(box, "prologix_tcp") as url:
@@ -111,7 +111,7 @@ def test_pymeasure_works_over_visa_and_prologix(box):
             analyser.adapter.close()
 
 
-def test_pyvisa_behind_its_own_prologix_support(box):
+def test_pyvisa_prologix_support_works(box):
     """The interface first, kept open; then the instrument by its GPIB address."""
     with served(box, "prologix_tcp") as url:
         host, port = place(url).split(":")

@@ -31,7 +31,7 @@ SWEPT_SINE = (
 )  # fmt: skip
 
 
-def test_a_transfer_function_as_ligo_measures_it(box):
+def test_ligo_script_measures_transfer_function(box):
     """Its script's order of commands: no blank before arguments, bit 4 of the display word."""
     with served(box, "prologix_tcp", "sr785") as url:
         ask = LanGpib(place(url), 10)
@@ -61,7 +61,7 @@ def test_a_transfer_function_as_ligo_measures_it(box):
     assert box.driven_v == 0.0
 
 
-def test_a_spectrum_as_ligo_measures_it(box):
+def test_ligo_script_measures_spectrum(box):
     with served(box, "prologix_tcp", "sr785") as url:
         ask = LanGpib(place(url), 10)
         for line in ("OUTX0", "DFMT1", "I1CP0", "I2CP0", "I1GD0", "I2GD0", "A1RG0", "A2RG0",
@@ -116,7 +116,7 @@ def test_a_labrad_server_reads_whole_traces(box):
         bus.close()
 
 
-def test_pymeasure_asks_the_sr785(box):
+def test_pymeasure_driver_reads_sr785(box):
     """Its VISA adapter and common commands, unchanged; it has no driver of an SR785."""
     adapters = pytest.importorskip("pymeasure.adapters")
     instruments = pytest.importorskip("pymeasure.instruments")

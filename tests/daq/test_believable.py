@@ -44,7 +44,7 @@ def test_implausible_value_is_refused_by_line(tmp_path, name, value, said):
 
 @pytest.mark.parametrize("bound", ["least", "most"])
 @pytest.mark.parametrize("name", [*ROW, "gain_std_db"])
-def test_what_lies_at_a_limit_is_read(tmp_path, name, bound):
+def test_value_at_limit_is_read(tmp_path, name, bound):
     path = tmp_path / "far.csv"
     # At a level of its own, so that frequencies need not rise.
     path.write_text(text(**{"source_vpk": 2.0, name: getattr(BOUNDS[name], bound)}))

@@ -42,7 +42,7 @@ def imported(path):
             yield from (f"{node.module}.{name.name}" for name in node.names)
 
 
-def test_nobody_but_the_tables_names_an_instrument():
+def test_only_driver_tables_import_instruments():
     for floor in ("daq", "sim", "analysis", "tui"):
         for path in (ROOT / floor).rglob("*.py"):
             place = path.relative_to(ROOT).with_suffix("").as_posix().replace("/", ".")
@@ -73,7 +73,7 @@ def test_every_driver_has_its_simulated_instrument():
         ("", None),
     ],
 )
-def test_an_instrument_is_known_by_its_identity(identity, scheme):
+def test_instrument_is_recognised_by_identity(identity, scheme):
     found = driver_for(identity)
     assert (None if found is None else found.scheme) == scheme
 
@@ -130,7 +130,7 @@ def test_sweep_is_checked_against_addressed_instrument():
     ["TCPIP::nowhere.invalid::1::SOCKET", "prologix-tcp:nowhere.invalid:1?addr=11",
      "TCPIP::nowhere.invalid::inst0::INSTR", "prologix:/nowhere/tty?addr=11"],
 )  # fmt: skip
-def test_loading_opens_nothing(url):
+def test_loading_drivers_opens_nothing(url):
     load_all_of(url)
     with pytest.raises(LinkError):
         open_analyser(url)

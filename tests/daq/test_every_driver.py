@@ -112,7 +112,7 @@ def test_errors_are_as_wide_as_readings_scatter(driver):
 
 
 @every_driver
-def test_nothing_drives_before_it_was_allowed(driver):
+def test_driving_needs_previous_permission(driver):
     """Whoever is asked first may still say no, at any of the questions."""
 
     class NotNow(Exception):
@@ -277,7 +277,7 @@ def test_session_measures_all_points_source_ends_off(driver, store):
 
 @every_driver
 @pytest.mark.parametrize("after", [0, 1, 12, 20])
-def test_an_ended_session_is_gone_on_with(driver, store, after):
+def test_ended_session_is_resumed(driver, store, after):
     instrument, analyser = bench(driver)
     control = SessionControl()
     session = Session(analyser, store, request(driver), control)

@@ -54,7 +54,7 @@ def test_exceeded_limits_are_named_with_origin(changes, faults):
     assert "\n" not in str(refusal.value)
 
 
-def test_the_highest_level_counts_wherever_it_stands():
+def test_highest_level_is_checked_anywhere():
     with pytest.raises(LimitError, match="source level 4"):
         check_plan(plan(levels_vpk=(4.0, 1.0)), [UNIT])
 
@@ -67,7 +67,7 @@ def test_overhead_counts_towards_the_duration():
         check_plan(plan(settle_cycles=100_000), [BENCH], duration_s=1.0)
 
 
-def test_a_looser_recipe_loosens_nothing():
+def test_looser_recipe_does_not_relax_limits():
     loose = Limits("recipe r", source_vpk=math.inf, stop_hz=1e6)
     with pytest.raises(LimitError, match="unit u"):
         check_plan(plan(levels_vpk=(4.0,)), [BENCH, UNIT, loose])
@@ -84,7 +84,7 @@ def test_the_tightest_of_each():
 # Files
 
 
-def test_the_benches_that_come_along_are_whole():
+def test_shipped_benches_are_complete():
     for name in config_names("benches"):
         bounds = load_bench(name).bounds()
         assert bounds.set_by.startswith("bench ")

@@ -40,7 +40,7 @@ def made(converter, blocks):
 
 @settings(max_examples=40, deadline=None)
 @given(st.lists(st.integers(1, 700), min_size=20, max_size=60), st.floats(10.0, 5000.0))
-def test_the_sine_never_jumps_whatever_the_blocks(blocks, hz):
+def test_sine_is_continuous_across_blocks(blocks, hz):
     converter = StreamConverter("test", RATE, 10.0, (1.0, 1.0))
     converter.step(100.0, 10)
     made(converter, [64])
@@ -85,7 +85,7 @@ def test_recording_starts_with_step_and_requested_length():
 
 @settings(max_examples=30, deadline=None)
 @given(st.floats(5.0, 9000.0), st.floats(0.0, 400.0), st.floats(-3.1, 3.1), st.floats(0.01, 5.0))
-def test_amplitudes_are_found_beside_offset_and_harmonics(hz, first, phase, level):
+def test_amplitude_ignores_offset_and_harmonics(hz, first, phase, level):
     frames = np.arange(int(first + 6 * RATE / hz) + 2)
     turns = 2 * math.pi * hz / RATE * frames
     volts = 0.3 + level * np.sin(turns + phase)
@@ -96,7 +96,7 @@ def test_amplitudes_are_found_beside_offset_and_harmonics(hz, first, phase, leve
 
 
 @given(st.floats(0.0, 0.19), st.floats(50.0, 500.0))
-def test_the_delay_is_told_from_two_frequencies(delay, hz):
+def test_delay_follows_from_two_frequencies(delay, hz):
     pair = (hz, hz + 5.0)
     seen = tuple(np.exp(-2j * math.pi * f * delay) for f in pair)
     assert delay_of(seen, pair) == pytest.approx(delay, abs=1e-9) or delay < 1e-9

@@ -177,7 +177,7 @@ def test_catalogue_entries_are_whole():
     share=st.floats(0.0, 1.0),
     spaces=st.sampled_from(["", " "]),
 )
-def test_what_is_written_is_what_is_read(effect, share, spaces):
+def test_written_effect_is_read_back(effect, share, spaces):
     values = {}
     for parameter in BUILT_IN[effect].parameters:
         low, high = parameter.range(ADSS)
@@ -207,13 +207,13 @@ def test_what_is_written_is_what_is_read(effect, share, spaces):
 @example("load-inertia:J_L=1:2")
 @example("load-stribeck-friction:T_s_L=1")
 @example("LOAD-INERTIA:J_L=1")
-def test_nothing_else_is_read(text):
+def test_invalid_effect_text_is_refused(text):
     with pytest.raises(ConfigurationError) as caught:
         parse_effect(text)
     assert "\n" not in str(caught.value) or "\n" in text
 
 
-def test_a_wrong_setting_says_what_is_allowed():
+def test_wrong_setting_lists_allowed_ones():
     with pytest.raises(ConfigurationError, match=r"'warp' is not in the catalogue.*load-inertia"):
         parse_effect("warp:x=1")
     with pytest.raises(ConfigurationError, match="takes T_s_L, omega_s; got T_s_L"):

@@ -11,7 +11,7 @@ from sim.analyser35670a import TalkState
 from sim.faults import CATALOGUE, FaultBoard, parse_fault
 
 
-def test_every_name_is_read_with_its_presets():
+def test_every_fault_is_read_with_presets():
     for name, kind in CATALOGUE.items():
         fault = parse_fault(name)
         assert (fault.name, fault.point, fault.phase) == (name, kind.point, kind.phase)
@@ -97,7 +97,7 @@ def test_lost_power_takes_all_settings(bench):
     assert controller.instrument.measurement.points_begun == 3
 
 
-def test_garbage_comes_before_a_reply(bench):
+def test_garbage_precedes_a_reply(bench):
     controller = running(bench, "garbage-bytes:phase=read-out,size=4")
     controller.write("*OPT?")
     reply = controller.read() or b""

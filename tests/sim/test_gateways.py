@@ -97,7 +97,7 @@ def test_every_driver_measures_alike_through_gateways(driver, wire):
 
 
 @pytest.mark.parametrize("name", ["vxi11", "hislip"])
-def test_pyvisa_asks_polls_and_clears(name):
+def test_pyvisa_queries_polls_and_clears(name):
     pyvisa = pytest.importorskip("pyvisa")
     manager = pyvisa.ResourceManager("@py")
     with served(box(), name) as url:
@@ -183,7 +183,7 @@ def test_vxi11_abort_ends_only_a_read(wires):
         assert caller.read(link) == (0, 4, b'"1D2"\n')
 
 
-def test_a_vxi11_lock_ends_with_its_owner(wires):
+def test_vxi11_lock_ends_with_its_link(wires):
     with served(box(), "vxi11") as url:
         one, two = Caller(wires(place(url))), Caller(wires(place(url)))
         first, _ = one.linked()

@@ -23,7 +23,7 @@ def instrument(*faults: str) -> Analyser35670A:
     return Analyser35670A(LinearPlant(known_answer), faults=board)
 
 
-def test_the_loopback_reports_what_other_wires_report():
+def test_loopback_reports_like_other_wires():
     soon = Deadline.after(0.2)
     wire = Loopback(instrument())
     wire.write("*IDN?", soon)
@@ -58,7 +58,7 @@ def test_faults_on_the_loopback(fault, error):
         read()
 
 
-def test_what_may_follow_sim():
+def test_sim_address_accepts_its_options():
     wanted = read_loopback_settings(
         "?ratio=0.5&seed=3&noise=0&speed=realtime&options=1D2,UFF"
         "&fault=silence:point=4&effect=load-inertia:J_L=0.003"
@@ -79,7 +79,7 @@ def test_bad_settings_of_sim_are_refused(rest):
         read_loopback_settings(rest)
 
 
-def test_sim_opens_with_the_gimbal_behind_it():
+def test_sim_address_opens_simulated_gimbal():
     wire = open_transport("sim:?seed=1", {"sim": open_loopback(load_unit("adss"), 0.25)})
     analyser = HP35670A(wire)
     analyser.prepare(120.0, 160.0, PointSettings(2.5, 10, 10))

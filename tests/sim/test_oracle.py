@@ -150,7 +150,7 @@ def test_energy_input_is_stored_plus_lost(ratio):
     assert np.abs(stored - gained).max() < 1e-3 * supplied
 
 
-def test_dry_friction_holds_what_cannot_overcome_it():
+def test_dry_friction_holds_weaker_torque():
     weak = 0.5 * ADSS["T_f_m"] * ADSS["R_m"] / (ADSS["k_t"] * ADSS["k_a"])
     coefficients, y = rk4.simulate_cycles(ADSS, *half_plays(0.25), weak, 60.0, 10)
     assert np.abs(coefficients[:, 1]).max() < 1e-3

@@ -66,7 +66,7 @@ def test_every_start_rests_inside_the_backlash():
     assert np.abs(gains).max() < 5e-3
 
 
-def test_progress_is_told_after_each_frequency():
+def test_progress_is_reported_after_each_frequency():
     unit = load_unit("adss")
     told = []
     paper_gains(
@@ -76,7 +76,7 @@ def test_progress_is_told_after_each_frequency():
     assert len(told) == 3
 
 
-def test_ten_microseconds_damp_what_two_leave():
+def test_ten_microseconds_damp_two_do_not():
     # EDSS 50 %, 83 Hz: -5.4 dB and steady at 10 us, -14 dB and chattering at 2 us.
     unit = load_unit("edss")
     coarse, fine = (

@@ -107,7 +107,7 @@ def crowd():
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_company_changes_nothing_to_the_last_bit(workers):
+def test_common_run_is_bit_equal(workers):
     plan = plan_with(frequencies_hz=(118.0, 131.0), levels_vpk=(2.5, 1.2), integrate_cycles=3)
     servos = list(crowd())
     together = simulate_cycles(servos, plan, workers=workers)
@@ -117,7 +117,7 @@ def test_company_changes_nothing_to_the_last_bit(workers):
 
 
 @pytest.mark.parametrize("from_rest", [False, True])
-def test_no_servos_give_nothing(from_rest):
+def test_no_servos_give_no_response(from_rest):
     assert simulate_cycles([], plan_with(from_rest=from_rest)) == []
 
 
@@ -248,7 +248,7 @@ def test_unbounded_motion_is_an_error():
         simulate_cycles([Servo(engine.system())], plan_with(settle_cycles=50))
 
 
-def test_dwell_records_what_both_inputs_saw():
+def test_dwell_records_both_inputs():
     servo = SteppedServo(ADSS, 0.25, DAMPED)
     record = servo.dwell(120.0, 2.0, 0.25, settle_cycles=60, integrate_cycles=3)
     assert np.array_equal(record.source_cycles, np.full(3, 2.0 + 0j))
@@ -258,7 +258,7 @@ def test_dwell_records_what_both_inputs_saw():
     assert first < record.output_peak_v < 1.1 * largest
 
 
-def test_provenance_tells_how_to_do_it_again():
+def test_provenance_suffices_to_repeat_simulation():
     effect = parse_effect("load-viscous-damping:B_L=0.05")
     response = simulate(ADSS, 0.25, PLAN, effects=[effect], seed=3)
     told = response.provenance
@@ -293,7 +293,7 @@ def test_only_servos_that_need_shorten_the_step():
 
 
 @pytest.mark.parametrize("from_rest", [False, True])
-def test_every_point_is_told_once(from_rest):
+def test_every_point_is_reported_once(from_rest):
     plan = SweepPlan((200.0, 210.0, 220.0, 230.0), (1.5, 2.5), settle_cycles=1,
                      integrate_cycles=2, from_rest=from_rest)  # fmt: skip
     told = []

@@ -93,7 +93,7 @@ def test_raw_tcp_speaks_lines():
         assert line(wire) == b'-113,"Undefined header"\n'
 
 
-def test_it_listens_on_the_local_host_only():
+def test_server_listens_on_local_host_only():
     with served() as server:
         for name in ("tcp", "prologix_tcp"):
             assert server.addresses[name].startswith("127.0.0.1:")
@@ -110,7 +110,7 @@ def test_port_in_use_is_a_link_error():
             Server(instrument(), tcp=port)
 
 
-def test_the_instrument_outlives_its_clients():
+def test_instrument_survives_its_clients():
     with served() as server:
         with raw(server) as wire:
             wire.sendall(b"FREQ:STEP 77\n*IDN?\n")
@@ -162,7 +162,7 @@ def test_sleeping_script_finds_the_sweep_done():
         assert condition == b"+0\n"
 
 
-def test_realtime_takes_its_time():
+def test_realtime_has_real_duration():
     with served(realtime=True) as server, raw(server) as wire:
         begin = time.monotonic()
         wire.sendall(b"*RST\n*OPC?\n")
@@ -179,7 +179,7 @@ def test_realtime_takes_its_time():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_noise_on_the_wires_breaks_nothing(seed):
+def test_noise_on_wires_crashes_nothing(seed):
     rng = np.random.default_rng(seed)
     alphabet = np.frombuffer(b"+\x1b\r\n;:#'\"? *0129ABORINITFREQSYST\x00\xff", dtype=np.uint8)
     with served() as server:

@@ -128,7 +128,7 @@ def test_unknown_tolerance_name_lists_allowed_ones(name):
     st.floats(max_value=-1e-9) | st.floats(min_value=0.50001) | st.just(float("nan"))
     | st.booleans() | st.text(max_size=3) | st.none()
 )  # fmt: skip
-def test_what_is_no_share_is_refused(value):
+def test_invalid_tolerance_is_refused(value):
     with pytest.raises(ConfigurationError, match=r"mine\.toml: tolerance"):
         unit_with({"R_m": value})
 

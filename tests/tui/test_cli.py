@@ -196,7 +196,7 @@ def test_usage_error_is_one_line_exit_2(line, capsys):
         ("tidy", 'Unknown command "tidy"; see lashbench --help'),
     ],
 )
-def test_what_a_line_lacks_is_said_plainly(line, said, capsys):
+def test_incomplete_command_line_names_missing_part(line, said, capsys):
     assert cli.main(line.split()) == 2
     assert capsys.readouterr().err == f"error: {said}\n"
 
@@ -235,7 +235,7 @@ def test_closed_stderr_does_not_stop_the_work():
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no disk that is always full")
-def test_a_full_disk_is_said_in_words():
+def test_full_disk_is_reported_in_words():
     with Path("/dev/full").open("w") as full:
         run = subprocess.run(talking(NARRATION), stdout=full, stderr=subprocess.PIPE, check=False)
     assert run.returncode == 1

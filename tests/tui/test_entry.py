@@ -42,7 +42,7 @@ sys.exit(main())
     ("closed", "code", "said"),
     [("2>&-", 0, ""), ("<&-", 0, ""), (">&-", 1, "error: there is no stdout to write")],
 )
-def test_streams_that_the_caller_closed(closed, code, said):
+def test_closed_streams_are_handled(closed, code, said):
     words = "measure --dry-run --json --unit adss --instrument sim: --level 2"
     words += " --start 100 --stop 110 --points 3"
     program = "from tui.entry import main; raise SystemExit(main())"
@@ -67,7 +67,7 @@ def beside(folder, *names):
 
 @pytest.mark.parametrize("command", [CONSOLE, MODULE])
 @pytest.mark.parametrize("added", [None, ".", ":/nowhere", "{cwd}"])
-def test_nothing_in_the_working_directory_is_run(tmp_path, command, added):
+def test_working_directory_module_is_not_run(tmp_path, command, added):
     beside(tmp_path, *NAMES)
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     if added is not None:

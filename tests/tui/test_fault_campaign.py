@@ -66,11 +66,11 @@ def outcomes():
 
 
 @pytest.mark.slow
-def test_no_promise_is_broken_whatever_goes_wrong(outcomes):
+def test_campaign_finds_no_broken_promise(outcomes):
     assert list(chain.from_iterable(outcome.wrongs for outcome in outcomes)) == []
 
 
-def test_what_was_meant_to_go_wrong_did(outcomes):
+def test_every_planned_fault_occurred(outcomes):
     for outcome in outcomes:
         struck = outcome.fault_struck if outcome.case.fault else outcome.disturbed
         assert struck, outcome.case

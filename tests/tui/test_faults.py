@@ -41,7 +41,7 @@ def outcomes(tmp_path_factory):
         patch.undo()
 
 
-def test_the_page_says_what_happens(outcomes):
+def test_page_lists_the_outcomes(outcomes):
     assert rows(outcomes) == written_rows()
 
 
@@ -63,7 +63,7 @@ def test_every_outcome_is_a_documented_one(outcomes):
 
 
 @pytest.mark.parametrize("name", ["faults.md", "reliability.md"])
-def test_the_tests_that_the_page_names_exist(name):
+def test_tests_named_on_page_exist(name):
     page = (ROOT / "docs" / name).read_text()
     sources = "".join(path.read_text() for path in (ROOT / "tests").rglob("test_*.py"))
     named = set(re.findall(r"`(test_\w+)`", page))

@@ -22,7 +22,7 @@ def shared(tmp_path):
     return folder
 
 
-def test_a_shared_cache_is_told_once(tmp_path, shared):
+def test_shared_cache_is_reported_once(tmp_path, shared):
     done = subprocess.run(
         [LASHBENCH, "simulate", *SWEEP, "--ratio", "0.3", "--out", str(tmp_path / "x.csv")],
         env=os.environ | {"XDG_CACHE_HOME": str(tmp_path)},
@@ -34,7 +34,7 @@ def test_a_shared_cache_is_told_once(tmp_path, shared):
     assert [path for path in shared.rglob("*") if path.is_file()] == []
 
 
-def test_nothing_is_prepared_in_a_shared_cache(tmp_path, shared, monkeypatch, capsys):
+def test_shared_cache_refuses_preparation(tmp_path, shared, monkeypatch, capsys):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert cli.main(["prepare", *SWEEP]) == 2
     (line,) = capsys.readouterr().err.strip().splitlines()

@@ -17,7 +17,7 @@ def _own_state(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
 
 
-def test_nothing_is_written_unless_asked_for(capsys):
+def test_log_is_written_only_on_request(capsys):
     assert main(["extract", "nowhere.csv"]) == 2
     assert not log_path().exists()
     assert capsys.readouterr().err.count("\n") == 1
@@ -47,7 +47,7 @@ def test_debug_logs_trace_and_error_logs_little(capsys):
 
 
 @pytest.mark.parametrize("words", [["--log-level", "loud"], ["--log-level"], ["--log-level="]])
-def test_a_level_that_is_none_is_refused(words, capsys):
+def test_invalid_log_level_is_refused(words, capsys):
     assert main(["extract", "x.csv", *words]) == 2
     err = capsys.readouterr().err
     assert "debug, info, warning, error" in err

@@ -31,7 +31,7 @@ def levels(tmp_path_factory):
 
 @pytest.mark.parametrize("level", [0, 1])
 @pytest.mark.parametrize("driver", [driver.scheme for driver in DRIVERS if driver.scheme])
-def test_resonances_are_the_same_whatever_measured_them(levels, driver, level):
+def test_resonances_agree_between_instruments(levels, driver, level):
     """Four comparisons of normal errors: by chance one in 400 is more than 3.5 of them apart."""
     first, other = levels[""][level], levels[driver][level]
     for one, two in ((first.arf, other.arf), (first.rf, other.rf)):

@@ -79,7 +79,7 @@ def check_estimate(result):
 
 
 @pytest.mark.slow
-def test_estimate_gives_the_fields_that_scripts_use(capsys):
+def test_estimate_has_agreed_fields(capsys):
     """For the paper's ADSS, it tells what the microscope saw."""
     words = ["estimate", "--unit", "adss", "--arf-hz", "128", "--rf-hz", "137"]
     found = document(words, capsys)
@@ -162,7 +162,7 @@ def test_estimate_warns_of_another_units_response(calls, capsys, tmp_path):
 
 
 @pytest.mark.slow
-def test_reproduce_gives_the_fields_that_scripts_use(capsys, tmp_path):
+def test_reproduce_has_agreed_fields(capsys, tmp_path):
     from analysis.paper import reproduce
 
     # One row of Table 2 with few runs: the verb is under test, not the numbers.

@@ -128,7 +128,7 @@ def test_dead_watchdog_is_replaced_and_reported(db):
 
 
 @pytest.mark.slow
-def test_a_watchdog_that_stands_still_is_replaced(db):
+def test_stopped_watchdog_is_replaced(db):
     instrument = linear_analyser(known_gain)
     with served(instrument) as url, measuring(url, db) as process:
         wait_for(lambda: drives(instrument))
@@ -336,7 +336,7 @@ def test_blocked_transcript_ends_and_measurement_continues(tmp_path):
 
 @needs_holding
 @pytest.mark.slow
-def test_a_disk_that_confirms_nothing_ends_it(tmp_path):
+def test_unconfirmed_flush_ends_measurement(tmp_path):
     """Commits go on, into memory; a power cut would take them all."""
     folder = tmp_path / "share"
     folder.mkdir()

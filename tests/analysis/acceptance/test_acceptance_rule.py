@@ -42,14 +42,14 @@ def test_verdict_is_that_of_whole_interval(value, half, lower, width):
 
 
 @given(NUMBERS, st.floats(0, 1e3), st.floats(0, 1e3), NUMBERS, NUMBERS)
-def test_a_wider_interval_is_never_surer(value, half, more, lower, upper):
+def test_wider_interval_gives_no_firmer_verdict(value, half, more, lower, upper):
     surer = decide(value - half, value + half, lower, upper)
     wider = decide(value - half - more, value + half + more, lower, upper)
     assert wider in (surer, "UNDECIDED")
 
 
 @given(st.lists(st.sampled_from(["PASS", "FAIL", "UNDECIDED"])))
-def test_all_limits_together_say_the_worst(verdicts):
+def test_combined_verdict_is_the_worst(verdicts):
     both = combine(verdicts)
     assert (both == "FAIL") == ("FAIL" in verdicts)
     assert (both == "PASS") == (bool(verdicts) and set(verdicts) == {"PASS"})
@@ -64,7 +64,7 @@ def test_the_guard_band_is_k_standard_uncertainties(value, k, verdict):
     assert b1_verdict(estimate(b1_deg=value), k, upper=0.4) == verdict
 
 
-def test_a_stated_interval_that_is_wider_counts():
+def test_wider_stated_interval_counts():
     assert b1_verdict(estimate(b1_deg=0.3), upper=0.4) == "PASS"
     assert b1_verdict(estimate(b1_deg=0.3, interval=(0.25, 0.45)), upper=0.4) == "UNDECIDED"
 
@@ -88,7 +88,7 @@ def test_unknown_value_is_undecided_with_reason(document, words):
     assert (item.verdict, words in item.reason) == ("UNDECIDED", True)
 
 
-def test_a_doubted_response_neither_passes_nor_fails():
+def test_doubtful_response_neither_passes_nor_fails():
     for value in (0.1, 0.9):
         (item,) = judge(
             limits(b1_deg={"upper": 0.4}), estimate=estimate(b1_deg=value), doubt="radians"
@@ -109,7 +109,7 @@ def diagnosed(*models, verdict="explained"):
             "contribution_ratio": ratios}  # fmt: skip
 
 
-def test_every_model_that_is_left_must_agree():
+def test_all_remaining_models_must_agree():
     inside, outside = (("load-inertia",), 0.2), (("shaft-stiffness",), 0.6)
     for models, verdict in [((inside,), "PASS"), ((outside,), "FAIL"),
                             ((inside, outside), "UNDECIDED")]:  # fmt: skip

@@ -58,7 +58,7 @@ def test_uncertainty_of_other_levels_is_no_miss(seed, monkeypatch):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_what_no_place_predicts_is_a_miss(seed):
+def test_unpredictable_level_is_a_miss(seed):
     values = read((), np.array([0.5]), np.random.default_rng(seed))
     values[0, :HALF] += 0.3
     observed = observation(values)

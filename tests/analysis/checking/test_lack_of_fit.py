@@ -115,7 +115,7 @@ def test_structure_in_replicates_is_no_structure():
 
 
 @pytest.mark.parametrize("off", [0.0, 1.0, 2.0, 3.0])
-def test_datasheet_values_count_as_they_are_improbable(off):
+def test_datasheet_deviations_count_by_improbability(off):
     one, *own = noise(np.random.default_rng(2), 49)
     alone = judge_structure(one, own, SEEN, NONE)
     leant = replace(one, deviations=np.append(off * SIGMAS, 7.0))
@@ -142,7 +142,7 @@ def test_unobserved_points_and_single_points_are_omitted():
     )
 
 
-def test_too_few_own_runs_tell_nothing():
+def test_too_few_replicates_give_no_result():
     one, *own = noise(np.random.default_rng(4), 8)
     leaning = fit(one.residual + 1.0)
     assert judge_structure(leaning, own, SEEN, SIGMAS) == 0.0

@@ -93,6 +93,6 @@ def test_effect_without_resonance_is_never_outside_band():
     assert not is_out_of_sight(one)
 
 
-def test_what_no_datasheet_knows_has_no_tolerance():
+def test_value_without_datasheet_has_no_tolerance():
     one = off_by(("amplifier-lag", "cable-stiffness"), 0.0, 0.0)
     assert not any(one.hypothesis.within_tolerance(one.best.place))

@@ -33,7 +33,7 @@ def replicated(variance, seed):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_replicates_show_stated_errors_that_scatter(seed):
+def test_scattering_stated_errors_show_in_replicates(seed):
     """Each standard error of 30 cycles is off by 13 % (1 / root of 58)."""
     scatter = np.log(replicated(0.0, seed))
     assert scatter.std(axis=1).mean() == pytest.approx(0.131, rel=0.1)

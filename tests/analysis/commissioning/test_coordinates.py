@@ -10,7 +10,7 @@ from sim.unit import load_unit
 ADSS = load_unit("adss").with_tolerance({"default": 0.05})
 
 
-def test_the_datasheet_lies_at_zero():
+def test_datasheet_has_coordinate_zero():
     coordinates = Coordinates.of(ADSS)
     values = coordinates.values(coordinates.nominal())
     assert values.pop(RATIO) == pytest.approx(0.5)

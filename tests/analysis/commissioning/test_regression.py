@@ -48,7 +48,7 @@ def test_posterior_is_that_of_linear_model(seed, width):
 
 
 @pytest.mark.parametrize("turns", [-1, 0, 3])
-def test_whole_turns_of_a_phase_change_nothing(turns):
+def test_whole_turns_of_phase_change_nothing(turns):
     """A phase near 180 degrees comes as +179 of one drive and -179 of the next."""
     rng, slopes, std = world(5)
     plain = drawn_from(PRIOR, 0.1 * slopes, 0.1 * std, rng)
@@ -84,7 +84,7 @@ def test_intervals_hold_the_truth():
     assert held >= 162
 
 
-def test_what_no_coordinate_explains_is_a_misfit():
+def test_unexplained_pattern_is_a_misfit():
     rng, slopes, std = world(1)
     drawn = drawn_from(PRIOR, slopes, std, rng)
     plain = rng.standard_normal(D) @ slopes + std * rng.standard_normal(ROWS)
@@ -112,7 +112,7 @@ def test_next_proposal_is_wider_than_posterior():
     np.testing.assert_allclose(found.std, [0.35, 1.5])
 
 
-def test_more_rows_tell_more():
+def test_more_rows_narrow_the_posterior():
     rng, slopes, std = world(3)
     drawn = drawn_from(PRIOR, slopes, std, rng)
     errors = [

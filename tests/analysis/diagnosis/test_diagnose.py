@@ -42,7 +42,7 @@ def response_hiding(texts, seed, plan=SHORT, ratio=None):
 
 
 @pytest.mark.study
-def test_nothing_is_blamed_where_nothing_is_hidden(cache):
+def test_plain_unit_gets_no_cause(cache):
     seed = int(np.random.SeedSequence().entropy % 2**31)
     print(f"seed {seed}")
     found = diagnose_response(response_hiding([], seed), ADSS, cache=cache)

@@ -143,7 +143,7 @@ def test_printed_unit_is_quoted_for_shell(unit, given):
     assert words[words.index("--unit") + 2] == "--instrument"
 
 
-def test_simulation_separates_models_that_differ():
+def test_simulation_separates_different_models():
     groups = [list(runs_along_ridge(c, 4, np.random.default_rng(0))) for c in (FIRST, SECOND)]
     plan = SweepPlan(
         tuple(np.linspace(110.0, 150.0, 4)), (2.0,), settle_cycles=3, integrate_cycles=4

@@ -19,7 +19,7 @@ def numbers(values):
     return np.array([np.nan if value is None else value for value in values], float)
 
 
-def test_predictions_leave_what_the_residuals_say(explained):
+def test_predictions_leave_the_stated_residuals(explained):
     document = json.loads(json.dumps(explained.to_json(), allow_nan=False))
     told = document["prediction"]
     rows = len(explained.observation)

@@ -51,7 +51,7 @@ def stds(posterior):
     return np.sqrt(np.diag(posterior.covariance))
 
 
-def test_a_sharp_answer_costs_nothing_more():
+def test_sharp_answer_needs_no_refinement():
     looking = Looking(scatter=0.1)
     assert stds(looking.after()).max() < 0.035
     assert looking.world.rounds == []

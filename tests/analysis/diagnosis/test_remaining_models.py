@@ -53,7 +53,7 @@ def test_explained_document_states_backlash_of_its_ratio(explained):
     assert model["b1_deg"] == document["b1_deg"]
 
 
-def test_a_consistent_document_tells_the_plain_model(consistent):
+def test_consistent_document_has_plain_model(consistent):
     document = consistent.to_json()
     assert document["verdict"] == "consistent"
     assert document["models"][0]["causes"] == []
@@ -95,7 +95,7 @@ def test_likely_model_remains_in_tie_without_rival(explained):
         assert [model.causes for model in models] == kept
 
 
-def test_where_nothing_explains_no_backlash_is_told(explained):
+def test_unexplained_document_has_no_backlash(explained):
     assert left(explained, word="unexplained") == ()
     document = backlash_document((), "unexplained", (0.7, 0.03), (0.7, 0.03))
     assert (document["b1_deg"], document["models"]) == (None, [])

@@ -49,7 +49,7 @@ def test_load_reflects_no_more_than_incident(sizes):
     assert np.all(np.abs(reflections(every, place, FREQUENCIES)) <= 1.0 + 1e-12)
 
 
-def test_what_is_reflected_of_known_loads():
+def test_reflection_of_known_loads():
     plain = Hypothesis(ADSS)
     assert np.allclose(reflections(plain, np.zeros((1, 1)), FREQUENCIES), -1.0)
     heavy = Hypothesis(ADSS, ("load-inertia",))

@@ -27,7 +27,7 @@ def test_departures_lie_in_their_range(seed):
     assert np.min(found.reach / SIGMAS) < 0.9
 
 
-def test_where_nothing_is_seen_the_datasheet_stands():
+def test_noise_leaves_datasheet_range_unchanged():
     rng = np.random.default_rng(1)
     seen = observation(read((), PLACE, rng, None, 30.0))
     found = datasheet_range(candidate(seen, (), 1, scatter=30.0))

@@ -49,7 +49,7 @@ def test_unrequested_rows_do_not_enter_fit():
     assert one.log_likelihood == pytest.approx(other.log_likelihood)
 
 
-def test_what_was_not_observed_does_not_count():
+def test_unobserved_readings_do_not_count():
     values = read(EFFECT, PLACE, np.random.default_rng(1))
     values[1] = np.nan
     found = candidate(observation(values), EFFECT).best

@@ -127,7 +127,7 @@ def test_weights_use_first_sufficient_reach():
 
 
 @pytest.mark.parametrize("most", [1, 5, 12, 40])
-def test_the_nearest_are_those_that_sorting_finds(most):
+def test_nearest_runs_match_sorting(most):
     rng = np.random.default_rng(most)
     for _ in range(20):
         far = rng.integers(0, 15, 40).astype(float)

@@ -42,7 +42,7 @@ def test_length_scales_do_not_depend_on_units():
     np.testing.assert_allclose(one, other, rtol=1e-3)
 
 
-def test_few_runs_give_widths_all_the_same():
+def test_few_runs_still_give_length_scales():
     places, difference = world([1.0, 0.0, 1.0], np.random.default_rng(2), runs=2)
     width = learn_width(places[None], difference, WIDTH, np.full((1, 1, 3), 0.5))
     assert np.all((width >= WIDTH) & (width <= 4.0 * WIDTH))

@@ -46,7 +46,7 @@ def prediction(seen, std=0.05, shift=0.0, runs=FAR):
     )
 
 
-def test_it_is_students_t_point_by_point():
+def test_likelihood_is_student_t_per_point():
     seen = observation()
     got = match_prediction(seen, prediction(seen, std=0.05, shift=0.12))
     exact = student(TAIL_FREEDOM)
@@ -57,7 +57,7 @@ def test_it_is_students_t_point_by_point():
     assert got.log_likelihood == pytest.approx(expected, abs=1e-6)
 
 
-def test_a_wide_prediction_does_not_explain_everything():
+def test_wide_prediction_lowers_the_likelihood():
     seen = observation()
     tight = match_prediction(seen, prediction(seen, std=0.02))
     wide = match_prediction(seen, prediction(seen, std=2.0))
@@ -72,7 +72,7 @@ def test_a_deviation_is_fitted_within_its_prior():
     assert abs(match_prediction(seen, held).deviations[0]) < 1e-5
 
 
-def test_what_was_not_measured_does_not_count():
+def test_unmeasured_readings_do_not_count():
     without_phase = observation(phase_known=False)
     got = match_prediction(without_phase, prediction(without_phase, std=0.05))
     assert got.log_likelihood == pytest.approx(-2 * ROWS * np.log(0.05) + COMMON)

@@ -93,7 +93,7 @@ def test_noise_and_fewer_points_widen_the_interval(branch):
         assert least < np.median(ratio) < 3.0
 
 
-def test_two_free_numbers_are_told_apart():
+def test_two_free_parameters_are_separated():
     rng = np.random.default_rng(3)
     places = rng.uniform(0.0, 1.0, (200, 2))
 

@@ -72,7 +72,7 @@ def test_families_read_in_batches_are_equal(machines, cores, lots):
     assert not same(found[:1], found[1:2])
 
 
-def test_another_machine_gets_them_one_by_one():
+def test_remote_executor_gets_families_singly():
     known, executor = families(2), Elsewhere()
     assert same(read_families(known, executor), [read_family(one) for one in known])
     assert executor.given == known

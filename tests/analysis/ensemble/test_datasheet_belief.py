@@ -10,14 +10,14 @@ def lines(**shares):
     return believed_lines(believed_document(ADSS.with_tolerance(shares)))
 
 
-def test_few_shares_are_told_by_name():
+def test_few_tolerances_are_listed_by_name():
     assert lines(default=0.05, R_m=0.01) == [
         "datasheet believed to 1 %: R_m (by --tolerance)",
         "datasheet believed to 5 %: all other values (by --tolerance)",
     ]
 
 
-def test_many_shares_are_told_as_a_range():
+def test_many_tolerances_are_given_as_range():
     """As those of a commissioned drive are: each value has its own."""
     many = {"R_m": 0.01, "k_t": 0.02, "k_a": 0.03, "k_s1": 0.04, "J_L": 0.05, "J_m": 0.06}
     told = lines(**many)

@@ -50,7 +50,7 @@ def test_datasheet_values_lie_inside_range_only():
     }  # fmt: skip
 
 
-def test_a_set_says_where_its_causes_sit():
+def test_model_states_sites_of_its_causes():
     plant = ("cable-stiffness", "shaft-damping")
     assert Hypothesis(UNITS["adss"], plant).sites == ("plant",)
     assert Hypothesis(UNITS["adss"], (*plant, "tachometer-gain")).sites == ("chain", "plant")

@@ -56,7 +56,7 @@ def test_groups_deviate_about_known_datasheet_values():
     assert np.count_nonzero(found[LOAD].fold) == 6
 
 
-def test_the_same_seed_gives_the_same_runs():
+def test_seed_reproduces_the_runs():
     groups = [Group(Hypothesis(ADSS), RATIOS, np.empty(0))]
     np.testing.assert_array_equal(runs(groups)[()].mean, runs(groups)[()].mean)
 

@@ -46,7 +46,7 @@ def test_error_follows_gradient_far_from_kink():
 @settings(max_examples=20, deadline=None)
 @example(arf=-2.0, rf=-1.0, arf_std=0.0, rf_std=0.5)
 @given(arf=st.floats(-3.0, 3.0), rf=st.floats(-3.0, 3.0), arf_std=STD, rf_std=STD)
-def test_error_is_the_spread_seen_in_draws(seed, arf, rf, arf_std, rf_std):
+def test_error_equals_spread_of_draws(seed, arf, rf, arf_std, rf_std):
     draws = np.random.default_rng(seed).normal(size=(2, 400_000))
     misfits = np.stack([np.zeros(400_000), arf + arf_std * draws[0], rf + rf_std * draws[1]])
     seen = 2.0 * np.std(np.ptp(misfits, axis=0))

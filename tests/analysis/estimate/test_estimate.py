@@ -187,7 +187,7 @@ def test_seed_gives_same_answer_with_cached_machines(tmp_path):
         pytest.param("practice-10", 0.5484, marks=pytest.mark.study),
     ],
 )
-def test_practice_sets_with_nothing_hidden(name, truth):
+def test_practice_sets_without_hidden_cause(name, truth):
     response = read_response(PRACTICE / f"{name}.csv")
     found: Estimate = estimate_response(response, load_unit(response.unit))
     low, high = found.contribution_ratio.interval95
@@ -236,6 +236,6 @@ def test_the_papers_edss_frequencies_are_warned_about():
 @pytest.mark.parametrize(
     ("arf", "rf"), [(137.0, 128.0), (0.0, 100.0), (-5.0, 10.0), (float("nan"), 100.0)]
 )
-def test_frequencies_that_cannot_be_are_refused(arf, rf):
+def test_impossible_frequencies_are_refused(arf, rf):
     with pytest.raises(InputError, match="ARF"):
         estimate_features(arf, rf, load_unit("adss"))

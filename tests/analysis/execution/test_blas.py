@@ -35,7 +35,7 @@ def test_blas_uses_one_core_inside_only(two):
         assert cores() == {1}
 
 
-def test_an_error_gives_the_cores_back(two):
+def test_error_restores_the_cores(two):
     with pytest.raises(ZeroDivisionError), on_one_core():
         raise ZeroDivisionError
 
@@ -62,7 +62,7 @@ class Asked(Exception):
         ),
     ],
 )
-def test_every_analysis_keeps_to_it(two, monkeypatch, module, begin, call):
+def test_every_analysis_uses_one_blas_core(two, monkeypatch, module, begin, call):
     seen = []
 
     def asked(*_, **__):

@@ -230,7 +230,7 @@ def test_local_results_keep_order_until_an_error(tmp_path):
 
 
 # The last: it leaves one worker.
-def test_a_lost_worker_costs_its_task_only(workers, tmp_path):
+def test_lost_worker_costs_only_its_task(workers, tmp_path):
     address, both = workers
     tasks = [(number, str(tmp_path), 0.15) for number in range(24)]
     told = []

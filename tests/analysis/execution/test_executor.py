@@ -45,7 +45,7 @@ def test_one_piece_of_work_is_done_here(two_cores):
     assert side_by_side(lambda _: pytest.fail("asked"), []) == []
 
 
-def test_one_core_does_all_of_it_here(cores):
+def test_one_core_works_in_this_thread(cores):
     cores(1)
     assert side_by_side(lambda _: current_thread(), [1, 2]) == [main_thread()] * 2
 
@@ -65,7 +65,7 @@ def test_error_drops_tasks_not_yet_started(two_cores):
     assert len(begun) < 500
 
 
-def test_work_may_share_out_its_own(two_cores):
+def test_tasks_may_be_nested(two_cores):
     def work(number):
         return sum(side_by_side(lambda other: number * other, range(4)))
 

@@ -29,7 +29,7 @@ def test_steady_job_estimate_ignores_initial_share(clock):
     assert pace.remaining_s(1.0) is None
 
 
-def test_little_time_or_little_done_tells_nothing(clock):
+def test_little_progress_gives_no_estimate(clock):
     pace = Pace(clock)
     pace.remaining_s(0.0)
     clock.now = 1.0

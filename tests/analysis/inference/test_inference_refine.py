@@ -66,7 +66,7 @@ def test_withheld_cause_is_not_simulated(world):
     assert not any(LOAD in one.hypothesis.effects for one in found.candidates)
 
 
-def test_the_same_seed_gives_the_same_candidates(world):
+def test_seed_reproduces_the_candidates(world):
     seen = observed((LOAD,), [0.8])
     first, again = (
         refine(Untrained((LAG, LOAD)), seen, seed=3, executor=world).candidates for _ in range(2)

@@ -50,7 +50,7 @@ def runs(simulated, tmp_path):
     return Path(copytree(simulated, tmp_path / "runs"))
 
 
-def test_numpy_computes_what_jax_trains(scales):
+def test_numpy_network_equals_jax_network(scales):
     """One network, two array libraries: logits agree to single precision."""
     import jax.numpy as jnp
 
@@ -69,7 +69,7 @@ def test_numpy_computes_what_jax_trains(scales):
 
 
 @pytest.mark.study
-def test_training_learns_what_a_batch_shows(scales, simulated):
+def test_training_fits_its_batch(scales, simulated):
     """On one batch of runs the loss falls far below that of the prior."""
     from analysis.inference.runs import load_batch
     from analysis.inference.training import Schedule, Trainer
@@ -85,7 +85,7 @@ def test_training_learns_what_a_batch_shows(scales, simulated):
 
 
 @pytest.mark.study
-def test_training_that_was_interrupted_goes_on(runs, tmp_path):
+def test_interrupted_training_resumes(runs, tmp_path):
     """Runs that are there are not simulated again, one that is missing is; steps are kept."""
     from analysis.inference.campaign import Recipe, train_unit
 
@@ -116,7 +116,7 @@ def test_training_that_was_interrupted_goes_on(runs, tmp_path):
 
 
 @pytest.mark.study
-def test_training_that_makes_it_worse_changes_nothing(runs, tmp_path):
+def test_worsening_training_keeps_old_weights(runs, tmp_path):
     """A learning rate that destroys the weights: those that were there are kept, and it is said."""
     from analysis.inference.campaign import Recipe, train_unit
 
@@ -145,7 +145,7 @@ def test_ranks_of_truth_match_its_density(simulated):
     np.testing.assert_allclose(found.size, there, atol=1e-4)
 
 
-def test_intervals_that_are_too_narrow_are_seen():
+def test_too_narrow_intervals_are_detected():
     ranks = np.random.default_rng(1).uniform(size=20_000)
     assert coverage(ranks) == pytest.approx(0.95, abs=0.006)
     assert coverage(np.round(ranks)) == 0.0

@@ -69,7 +69,7 @@ def test_datasheet_machine_departs_by_its_scatter(runs, machines):
     assert 0.3 < np.median(typical) < 1.2
 
 
-def test_gain_that_is_off_departs(runs, machines):
+def test_wrong_gain_shows_as_departure(runs, machines):
     """A response 30 % too large departs further than one as it was simulated."""
     mean, variance = machines
     nominal = expected(*runs)
@@ -79,7 +79,7 @@ def test_gain_that_is_off_departs(runs, machines):
     assert np.all(scaled > as_it_is)
 
 
-def test_missing_reading_says_nothing(runs, machines):
+def test_missing_reading_has_no_influence(runs, machines):
     one, nominal = swept(*machines), expected(*runs)
     gain = one.gain.copy()
     gain[:, 0, :5] = np.nan

@@ -38,7 +38,7 @@ def test_a_true_response_is_taken(name):
 
 
 @pytest.mark.parametrize("name", ["encoder, speed", "current"])
-def test_a_mistake_is_still_seen(name):
+def test_mistake_is_found_on_any_drive(name):
     response = swept(UNITS[name])
     turned = replace(response, gain=np.conj(response.gain))
     assert check_input(turned, UNITS[name]).mistake == "conjugate"

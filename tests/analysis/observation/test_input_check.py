@@ -56,7 +56,7 @@ def test_every_mistake_of_the_table_is_tried():
 
 
 @pytest.mark.parametrize("path", SETS[::2], ids=lambda path: path.stem)
-def test_a_true_response_passes_whatever_it_hides(path):
+def test_true_response_passes_despite_hidden_cause(path):
     response = read_response(path)
     found = check_input(response, load_unit(response.unit))
     assert (found.mistake, found.foreign, found.words) == (None, False, "")
@@ -105,7 +105,7 @@ def test_constant_is_no_response_of_unit():
             check_inputs([constant], load_unit("adss"))
 
 
-def test_what_holds_too_little_is_not_judged():
+def test_too_few_rows_are_not_judged():
     assert check_input(noise(rows=7), load_unit("adss")).words == ""
 
 

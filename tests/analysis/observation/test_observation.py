@@ -108,7 +108,7 @@ def test_a_sweep_without_end_is_refused(slip):
         ({"gain": 500.0}, "the response is 1.25e[+]03 V"),
     ],
 )
-def test_voltages_that_no_bench_has_are_refused(slip, said):
+def test_implausible_voltages_are_refused(slip, said):
     with pytest.raises(InputError, match=said):
         observe(response(**slip))
 
@@ -174,7 +174,7 @@ def test_some_rows_keep_every_sweep_apart():
     assert [(b.start, b.stop) for b in seen.blocks] == [(0, 2), (2, 4), (4, 6)]
 
 
-def test_what_is_unknown_stays_unknown():
+def test_unknown_values_stay_unknown():
     seen = observe(response(phase_known=False, gain=0.1, gain_std_db=np.nan))
     assert np.all(np.isnan(seen.values[1]))
     assert np.all(np.isnan(seen.values[2]))
@@ -193,7 +193,7 @@ def test_unknown_source_level_is_refused_in_words():
         observe(response(levels=(np.nan,)))
 
 
-def test_noise_is_that_of_the_quietest_points():
+def test_noise_is_taken_from_quietest_points():
     rng = np.random.default_rng(1)
     f = np.linspace(100.0, 200.0, 200)
     gain = np.full(200, 0.1)

@@ -83,7 +83,7 @@ def test_declared_constant_errors_are_no_scatter(swept, words):
     assert "the same at every point" in error_doubts([constant])[0]
 
 
-def test_words_are_read_as_they_are_written(swept):
+def test_error_words_are_read_as_written(swept):
     said = {"gain_std_is": " Cycle-to-cycle scatter, standard error of the mean over 30 cycles"}
     assert stated_error(foreign(swept, swept.gain_std_db, **said)).components == 1
     both = foreign(swept, np.sqrt(2.0) * swept.gain_std_db, gain_std_is=error_words(30, 2))

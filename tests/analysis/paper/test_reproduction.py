@@ -158,7 +158,7 @@ def test_senseless_requests_are_refused(wrong):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [1, pytest.param(None, marks=pytest.mark.study)])
-def test_paper_scheme_meets_table_2(count):
+def test_paper_scheme_reproduces_table_2(count):
     """In a row drawn at random, and in every row in a study."""
     table = load_paper().simulated
     for row in (table[i] for i in np.random.default_rng().permutation(len(table))[:count]):

@@ -71,7 +71,7 @@ def read_hidden(explorer: Explorer, effect: str | None, value: float, count: int
     ("effect", "value"),
     [("load-inertia", 0.0235), ("tachometer-gain", 0.15), ("total-backlash", 0.65)],
 )
-def test_a_hidden_cause_explains_its_own_features(
+def test_hidden_cause_explains_its_features(
     effect: str, value: float, explorer: Explorer, explored: list[Explored]
 ) -> None:
     """Named first in at least 4 of 6 machines, its true size within the error bars told."""
@@ -88,9 +88,7 @@ def test_a_hidden_cause_explains_its_own_features(
     assert near >= 4
 
 
-def test_nothing_hidden_is_seldom_called_a_cause(
-    explorer: Explorer, explored: list[Explored]
-) -> None:
+def test_plain_unit_rarely_gets_a_cause(explorer: Explorer, explored: list[Explored]) -> None:
     """The plain model's own runs: consistent in at least 36 of 60, confidently else in at most 2.
 
     Of 3000 such readings 2560 were consistent and one was explained by a cause it did not have.
@@ -113,9 +111,7 @@ def test_plain_model_does_not_explain_withheld_cause(
         assert not belief.baseline.adequate
 
 
-def test_what_knowledge_excludes_is_not_believed(
-    explorer: Explorer, explored: list[Explored]
-) -> None:
+def test_excluded_cause_is_not_believed(explorer: Explorer, explored: list[Explored]) -> None:
     (reading,) = read_hidden(explorer, "total-backlash", 0.65, 1)
     knowing = Knowledge(KNOWN.prior, ("total-backlash",))
     belief = believe(explored, reading, knowing)
@@ -123,7 +119,7 @@ def test_what_knowledge_excludes_is_not_believed(
     assert sum(one.probability for one in belief.judged) == pytest.approx(1.0)
 
 
-def test_the_same_seed_gives_the_same_answer() -> None:
+def test_seed_reproduces_the_answer() -> None:
     documents = []
     for _ in range(2):
         found = diagnose_features(
@@ -214,7 +210,7 @@ def test_unit_outside_the_paper_is_refused() -> None:
 
 
 @pytest.mark.parametrize(("arf", "rf"), [(75.0, 40.0), (np.nan, 40.0), (-1.0, 5.0), (40.0, np.inf)])
-def test_frequencies_that_are_none_are_refused(arf: float, rf: float) -> None:
+def test_impossible_features_are_refused(arf: float, rf: float) -> None:
     reading = Reading(np.array([arf, -20.0, rf, -5.0, np.nan]), STD)
     with pytest.raises(InputError, match="ARF below RF"):
         diagnose_features(reading, load_unit("edss"), effort=QUICK)

@@ -151,7 +151,7 @@ def test_unmeasured_number_has_no_influence() -> None:
     assert 0.0 <= a.probability_of_worse() <= 1.0
 
 
-def test_held_out_uses_only_the_other_numbers() -> None:
+def test_held_out_prediction_uses_other_numbers_only() -> None:
     """ARF alone tells the size, so without it ARF is known no better than its range."""
     one = made(("load-inertia",))
     agreement = agree(one, READING, RatioPrior())
@@ -222,7 +222,7 @@ def test_every_further_cause_must_pay() -> None:
     assert sum(one.probability for one in belief.judged) == pytest.approx(1.0)
 
 
-def test_what_nothing_gives_is_unexplained() -> None:
+def test_unreachable_features_are_unexplained() -> None:
     strange = Reading(np.array([60.0, -30.0, 80.0, -25.0, 8.0]), np.full(5, 0.5))
     sets = [made(()), made(("load-inertia",)), made(("load-viscous-damping",))]
     belief = believe(sets, strange, Knowledge(RatioPrior()))

@@ -22,7 +22,7 @@ def planned():
     return plan_sweep(load_unit("adss"), 0.5)
 
 
-def test_it_lies_within_limits_and_time(planned):
+def test_plan_is_within_limits_and_time(planned):
     unit, plan = load_unit("adss"), planned.plan
     assert plan.duration_s <= 30.0
     assert planned.minutes == pytest.approx(plan.duration_s / 60.0)
@@ -31,7 +31,7 @@ def test_it_lies_within_limits_and_time(planned):
     assert plan.frequencies_hz[-1] <= unit.limits.stop_hz
 
 
-def test_features_lie_where_the_paper_found_them(planned):
+def test_features_agree_with_paper(planned):
     """Between 125 and 155 Hz, whatever the ratio; the band of the sweep holds both."""
     assert 115.0 < planned.arf_hz[1] < 150.0
     assert planned.arf_hz[1] < planned.rf_hz[1] < 170.0
@@ -45,12 +45,12 @@ def test_planned_sweep_determines_the_ratio(planned):
     assert 0.01 < planned.expected_std < 0.15
 
 
-def test_several_levels_tell_it_better_than_one(planned):
+def test_several_levels_determine_ratio_better(planned):
     assert len(planned.plan.levels_vpk) > 1
     assert planned.expected_std < 0.9 * planned.usual_std
 
 
-def test_its_recipe_is_one(planned):
+def test_printed_recipe_is_valid(planned):
     recipe = Recipe.model_validate(parse_toml(planned.recipe()))
     assert recipe.plan().levels_vpk == planned.plan.levels_vpk
     # A rounded end could lie outside of the unit's limits.
@@ -63,7 +63,7 @@ def test_any_unit_name_gives_a_recipe(planned, name):
     assert (recipe.name, recipe.plan().levels_vpk) == (name, planned.plan.levels_vpk)
 
 
-def test_features_outside_the_limits_are_told():
+def test_features_outside_limits_are_reported():
     unit = load_unit("adss")
     narrow = unit.limits.model_copy(update={"stop_hz": 40.0})
     with pytest.raises(InputError, match="its features lie near"):

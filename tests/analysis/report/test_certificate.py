@@ -57,7 +57,7 @@ def test_unit_out_of_limits_is_stated_first(report):
     assert "No limits are set" not in page.text
 
 
-def test_a_calibration_that_was_overdue_is_told(report):
+def test_overdue_calibration_is_marked(report):
     late = Certificate(calibrated=date(2024, 1, 1), calibration_due=date(2025, 12, 31))
     _, page = report(certificate=late)
     assert "it was OVERDUE when this was measured" in page.text
@@ -99,7 +99,7 @@ def test_only_a_logo_is_embedded(report, tmp_path):
      ("l.svg", b"\x89PNG", "is no SVG picture"), ("l.png", None, "cannot be read"),
      ("l.png", PNG + b"0" * (1 << 20), "up to 1 MiB")],
 )  # fmt: skip
-def test_what_is_no_logo_is_refused(tmp_path, name, content, words):
+def test_invalid_logo_is_refused(tmp_path, name, content, words):
     path = tmp_path / name
     if content is not None:
         path.write_bytes(content)
@@ -135,7 +135,7 @@ def test_spoilt_reading_is_marked_without_phase(report):
     assert sum("spoilt" in text for text in titles) == 1
 
 
-def test_a_browser_prints_it_with_page_numbers(report, tmp_path):
+def test_browser_prints_page_numbers(report, tmp_path):
     path, _ = report(certificate=FULL, judgement=judged(0.4))
     seen = look(path, tmp_path)
     assert seen.complaints == []

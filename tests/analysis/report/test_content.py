@@ -18,7 +18,7 @@ def with_limits(b1_deg, b2_deg):
     return unit_from_mapping(document, "test")
 
 
-def test_it_says_what_was_measured_and_how(report):
+def test_report_states_measurement_and_method(report):
     _, page = report()
     for words in (
         "Backlash report: ADSS SN 7", "Operator A. B.", "Notes warm", "HP 35670A, serial 1",
@@ -152,7 +152,7 @@ def test_joint_sweeps_are_listed_with_their_departures(report, explained):
         ),
     ],
 )
-def test_every_verdict_has_its_words(report, monkeypatch, hidden, judged, verdict, said):
+def test_every_verdict_has_its_text(report, monkeypatch, hidden, judged, verdict, said):
     found = makings.diagnosis(monkeypatch, hidden, judged)
     assert found.to_json()["verdict"] == verdict
     _, page = report(diagnosis=found)
@@ -192,7 +192,7 @@ def test_tie_is_shown_with_its_resolving_sweep(report):
     assert "lashbench measure --x" in page.text
 
 
-def test_what_is_missing_says_why(report):
+def test_missing_part_states_the_reason(report):
     remarks = {"estimate": "No estimate: too noisy.", "diagnosis": "Left out."}
     _, page = report(estimate=None, remarks=remarks)
     assert "No estimate: too noisy." in page.text

@@ -83,7 +83,7 @@ def test_every_picture_has_label_and_valid_xml(report):
         assert len(root.findall(".//{http://www.w3.org/2000/svg}path")) > 10
 
 
-def test_what_an_operator_writes_stays_text(report):
+def test_operator_text_is_not_markup(report):
     nasty = makings.NASTY
     response = makings.response(
         unit=nasty, operator=nasty, notes=nasty, serial=nasty, address=nasty,
@@ -113,7 +113,7 @@ def test_markup_is_escaped_and_nan_is_refused():
         data_block({"a": float("nan")}, "d")
 
 
-def test_what_is_not_seen_is_written_out(report):
+def test_invisible_characters_are_shown_as_escapes(report):
     _, page = report(makings.response(serial="SN\u202e4\x1b[2J", notes="zero\u200bwidth"))
     assert "SN\\u202e4\\x1b[2J" in page.text
     assert "zero\\u200bwidth" in page.text

@@ -49,7 +49,7 @@ def test_of_two_visits_the_last_counts():
     assert judge_features(mixed) == judge_features(points)
 
 
-def test_a_refining_sweep_settles_on_them():
+def test_adaptive_sweep_settles_on_features():
     generator = np.random.default_rng(3)
     plan = SweepPlan(spaced_frequencies(100.0, 180.0, 15), (1.0,))
     sweep = AdaptiveSweep(plan, Refinement(0.05, 120), judge_features)

@@ -44,7 +44,7 @@ def test_remaining_feature_in_band_is_read():
 
 @pytest.mark.parametrize("points", [31, 61, 181])
 @pytest.mark.parametrize("stated", [True, False])
-def test_nothing_is_found_in_noise(points, stated):
+def test_noise_has_no_features(points, stated):
     found = 0
     for seed in range(40):
         rng = np.random.default_rng(seed)
@@ -92,7 +92,7 @@ def test_spoilt_rows_do_not_count():
     assert level.arf.frequency_hz == pytest.approx(clean.arf.frequency_hz, abs=0.01)
 
 
-def test_repeats_say_what_the_noise_is():
+def test_repeated_readings_determine_the_noise():
     truth, noise = NOTED, 0.02
     f = np.repeat(truth.f, 4)
     rng = np.random.default_rng(8)
@@ -103,7 +103,7 @@ def test_repeats_say_what_the_noise_is():
     assert level.arf.frequency_hz == pytest.approx(truth.extrema()[0], abs=4 * level.arf.std_hz)
 
 
-def test_a_level_without_usable_rows_says_so():
+def test_level_without_usable_rows_is_flagged():
     response = FrequencyResponse.from_arrays([1.0, 2.0], 1.0, [np.nan, 0.0], unit="")
     (level,) = extract(response)
     assert level.arf is None

@@ -31,12 +31,12 @@ def test_frequency_reduction_matches_second_order_peak():
 
 
 @pytest.mark.parametrize("zeta", [-0.01, 0.708, 1.0, np.nan, np.inf])
-def test_frequency_reduction_refuses_what_has_no_resonance(zeta):
+def test_frequency_reduction_refuses_overdamped_system(zeta):
     with pytest.raises(AnalysisError, match=r"0 to 0\.707"):
         frequency_reduction(zeta)
 
 
-def test_frequency_reduction_at_its_bounds():
+def test_frequency_reduction_at_its_limits():
     assert frequency_reduction(0.0) == 0.0
     assert frequency_reduction(np.sqrt(0.5)) == pytest.approx(1.0, abs=1e-7)
 
@@ -51,7 +51,7 @@ def test_resonance_damping_scales_with_frequency():
 @pytest.mark.parametrize(
     "arguments", [(0.1, 0.0, 5.0), (0.1, 5.0, -1.0), (-0.1, 5.0, 6.0), (np.nan, 5.0, 6.0)]
 )
-def test_resonance_damping_refuses_what_is_none(arguments):
+def test_resonance_damping_refuses_invalid_arguments(arguments):
     with pytest.raises(AnalysisError):
         resonance_damping(*arguments)
 
@@ -82,7 +82,7 @@ def test_half_power_points_missing_on_one_side():
     assert np.isnan(found.damping_ratio)
 
 
-def test_half_power_error_is_what_repeats_show():
+def test_half_power_error_equals_observed_scatter():
     rng = np.random.default_rng(3)
     f = np.linspace(0.8, 1.2, 21)
     clean = -20 * np.log10(np.abs((1 - f**2) / f + 0.1j))

@@ -41,7 +41,7 @@ def test_unrelated_causes_add_without_cancelling():
     assert left((BRAKE, SHAFT), (0.15, 20.0)) > 1.0
 
 
-def test_of_three_the_least_is_what_counts():
+def test_smallest_of_three_ratios_counts():
     """A small brake beside two that undo each other leaves more than itself."""
     three = left((*GAINS[:1], BRAKE, *GAINS[1:]), (2.82, 0.002, 1.46))
     assert three > left(GAINS, (2.82, 1.46))
@@ -86,7 +86,7 @@ def test_resonance_outside_band_is_no_explanation(word, f_p_hz, sure):
 
 
 @pytest.mark.parametrize(("share", "word"), [(0.64, "unexplained"), (0.66, "explained")])
-def test_what_undoes_itself_is_no_explanation(monkeypatch, share, word):
+def test_cancelling_causes_are_no_explanation(monkeypatch, share, word):
     monkeypatch.setattr(second_thoughts, "cancellation_ratio", lambda *_: share)
     verdict = told(GAINS)
     found = held(verdict)

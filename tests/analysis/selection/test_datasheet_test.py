@@ -77,7 +77,7 @@ def test_value_unknown_to_datasheet_differs_from_it():
     assert compare_with_datasheet(verdict, found) is verdict
 
 
-def test_a_verdict_that_names_nothing_stays():
+def test_verdict_without_cause_is_unchanged():
     verdict, found = told((SHAFT,), [0.0], word="unexplained")
     assert compare_with_datasheet(verdict, found) is verdict
 

@@ -11,7 +11,7 @@ from analysis.selection.verdict import BY_CHANCE, judge_candidates
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_cause_that_is_there_is_named(seed):
+def test_present_cause_is_named(seed):
     verdict = judge(seen(TRUE, seed), seed=10 * seed)
     assert (verdict.word, verdict.best.effects) == ("explained", TRUE)
     assert verdict.best.probability > 0.95
@@ -40,7 +40,7 @@ def test_parts_of_leader_are_always_judged():
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_nothing_is_named_where_nothing_is_hidden(seed):
+def test_plain_response_names_no_cause(seed):
     verdict = judge(seen((), seed, size=0.0), seed=10 * seed)
     assert verdict.word == "consistent"
     assert verdict.best is verdict.baseline

@@ -32,7 +32,7 @@ from daq.transports.base import BLOCK_LIMIT_BYTES, Deadline, checked_line, take_
         (" 7. ", 7.0),
     ],
 )
-def test_numbers_as_the_instrument_prints_them(text, value):
+def test_printed_numbers_are_parsed(text, value):
     assert parse_number(text) == value
 
 
@@ -40,13 +40,13 @@ def test_numbers_as_the_instrument_prints_them(text, value):
     "text",
     ["", "+", "1,2", "1 2", "nan", "inf", "0x10", "1e", "1_000", "E5", "+1.0E+999", "١", "2\x1d"],
 )
-def test_what_is_no_number(text):
+def test_text_other_than_number_is_refused(text):
     with pytest.raises(ProtocolError, match="number was due"):
         parse_number(text)
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False))
-def test_every_number_printed_comes_back(value):
+def test_every_printed_number_is_read_back(value):
     mantissa, exponent = f"{value:+.16E}".split("E")
     printed = f"{mantissa}E{int(exponent):+04d}"
     assert parse_number(printed) == pytest.approx(value, rel=1e-15, abs=0.0)
@@ -58,7 +58,7 @@ def test_integers_carry_a_sign(text, value):
 
 
 @pytest.mark.parametrize("text", ["", "+2.56E+002", "1.0", "+", "1 2", "²", "+2\x1d"])
-def test_what_is_no_integer(text):
+def test_text_other_than_integer_is_refused(text):
     with pytest.raises(ProtocolError, match="integer was due"):
         parse_integer(text)
 
@@ -72,7 +72,7 @@ def test_strings_lose_their_quotes(text, value):
 
 
 @pytest.mark.parametrize("text", ['"open', '"', '"a"b"', "'a\""])
-def test_a_quote_left_open_is_damage(text):
+def test_unclosed_quote_is_damage(text):
     with pytest.raises(ProtocolError):
         parse_string(text)
 
@@ -86,7 +86,7 @@ def test_error_queue_entries():
 
 
 @pytest.mark.parametrize("text", ["", "0", "+0,No error", '0,"No error', '"No error"', '+0,"a"x'])
-def test_what_is_no_error_queue_entry(text):
+def test_invalid_error_queue_entry_is_refused(text):
     with pytest.raises(ProtocolError, match="error-queue entry was due"):
         parse_error(text)
 

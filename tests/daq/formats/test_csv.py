@@ -121,7 +121,7 @@ def responses(draw):
 
 @given(original=responses())
 @settings(max_examples=150, deadline=None)
-def test_nothing_is_lost_between_writing_and_reading(original, tmp_path_factory):
+def test_writing_and_reading_lose_nothing(original, tmp_path_factory):
     path = tmp_path_factory.mktemp("csv") / "response.csv"
     write_response(original, path)
     assert_same(read_response(path), original)
@@ -191,7 +191,7 @@ def test_levels_may_alternate_from_row_to_row(tmp_path):
     np.testing.assert_allclose(read.gain, 10 ** (-3 / 20))
 
 
-def test_a_spreadsheet_may_have_saved_the_file(tmp_path):
+def test_file_saved_by_spreadsheet_is_read(tmp_path):
     path = tmp_path / "bom.csv"
     path.write_bytes(b"\xef\xbb\xbf" + GOOD.replace("\n", "\r\n").encode() + b"\r\n\r\n")
     assert len(read_response(path)) == 3
@@ -220,7 +220,7 @@ def test_file_without_kind_counts_as_measured(tmp_path):
         (HEADER + "100,1,-3,,\n101,1,-3,,\n102,1,-3,,\n", "names the unit"),
     ],
 )
-def test_a_file_without_its_frame_is_refused(tmp_path, content, said):
+def test_file_without_frame_is_refused(tmp_path, content, said):
     assert said in refused(tmp_path, content)
 
 
@@ -286,7 +286,7 @@ def test_falling_frequencies_need_a_downward_sweep(tmp_path, sweep):
 
 @given(content=st.binary(max_size=300) | st.text(max_size=300).map(str.encode))
 @settings(max_examples=200, deadline=None)
-def test_no_bytes_whatever_make_the_reader_stumble(content, tmp_path_factory):
+def test_any_bytes_raise_only_file_errors(content, tmp_path_factory):
     path = tmp_path_factory.mktemp("csv") / "any.csv"
     path.write_bytes(content)
     with pytest.raises(FileFormatError):
@@ -313,7 +313,7 @@ def test_row_is_refused_or_read_as_written(row, tmp_path_factory):
         assert np.isfinite(read.gain[4])
 
 
-def test_a_directory_or_nothing_is_no_file(tmp_path):
+def test_directory_and_missing_file_are_refused(tmp_path):
     (tmp_path / "folder.csv").mkdir()
     with pytest.raises(FileFormatError, match="is a directory"):
         read_response(tmp_path / "folder.csv")

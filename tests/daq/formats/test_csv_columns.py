@@ -8,7 +8,7 @@ from daq.errors import FileFormatError
 from daq.formats import read_response, write_response
 
 
-def test_every_column_comes_back(tmp_path):
+def test_every_column_is_read_back(tmp_path):
     response = measured()
     write_response(response, tmp_path / "x.csv")
     read = read_response(tmp_path / "x.csv")
@@ -21,7 +21,7 @@ def test_every_column_comes_back(tmp_path):
     assert dict(read.provenance) == dict(response.provenance)
 
 
-def test_what_is_known_of_some_rows_only(tmp_path):
+def test_partly_known_column_is_kept(tmp_path):
     response = measured(phase_std_deg=np.nan, harmonic3=np.nan, dc_v=np.nan)
     response.dc_v[3] = 0.1 + 0.2
     write_response(response, tmp_path / "x.csv")

@@ -75,7 +75,7 @@ def test_matlab_version_73_is_read_alike(tmp_path):
         ({"f": HERTZ, "a": DB, "b": DB}, Reading(as_guessed=True), "no column is named"),
     ],
 )
-def test_variables_that_are_no_response_are_refused(tmp_path, held, reading, fault):
+def test_variables_without_response_are_refused(tmp_path, held, reading, fault):
     path = tmp_path / "m.mat"
     savemat(path, held)
     with pytest.raises(InputError, match=fault):

@@ -90,7 +90,7 @@ def test_crash_of_reader_is_one_line():
     assert done.stderr.count("\n") == 1
 
 
-def test_a_crash_costs_nothing_beside_threads(tmp_path):
+def test_reader_crash_is_isolated_between_threads(tmp_path):
     def told(path):
         with pytest.raises(FileFormatError) as error:
             read_response(path)
@@ -136,7 +136,7 @@ def test_child_process_reads_what_was_written(tmp_path, suffix):
         assert np.array_equal(getattr(again, name), getattr(whole, name), equal_nan=True)
 
 
-def test_nothing_in_the_working_directory_is_run(tmp_path):
+def test_working_directory_code_is_not_run(tmp_path):
     write_response(measured(), tmp_path / "x.h5")
     for name in ("daq", "h5py", "numpy"):
         (tmp_path / name).mkdir()

@@ -40,14 +40,14 @@ def test_any_response_survives_bit_for_bit(tmp_path, suffix, response):
 
 
 @every_format
-def test_a_file_of_many_rows_comes_back(tmp_path, suffix):
+def test_file_of_many_rows_is_read_back(tmp_path, suffix):
     response = measured(levels=(0.5, 1.0, 2.5), points=801)
     write_response(response, tmp_path / f"many{suffix}")
     same(read_response(tmp_path / f"many{suffix}"), response)
 
 
 @every_format
-def test_conversions_in_a_chain_lose_nothing(tmp_path, suffix):
+def test_chained_conversions_lose_nothing(tmp_path, suffix):
     response = measured()
     path = tmp_path / "first.h5"
     write_response(response, path)
@@ -195,7 +195,7 @@ def test_garbage_is_refused(tmp_path, suffix, content):
 
 
 @every_format
-def test_what_is_no_file_is_refused(tmp_path, suffix):
+def test_invalid_file_is_refused(tmp_path, suffix):
     with pytest.raises(FileFormatError, match="cannot be read"):
         read_response(tmp_path / f"none{suffix}")
     folder = tmp_path / f"folder{suffix}"
@@ -243,7 +243,7 @@ def complaint(path: Path) -> str | None:
     return None
 
 
-def test_hdf5_follows_what_viewers_expect(tmp_path):
+def test_hdf5_has_attributes_for_viewers(tmp_path):
     import h5py
 
     response = measured()

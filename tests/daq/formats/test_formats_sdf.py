@@ -105,7 +105,7 @@ def test_an_overload_flags_every_point(tmp_path):
         ({"channels": (Channel(unit=0.0), Channel())}, "cannot be|can not"),
     ],
 )
-def test_anything_else_is_refused(tmp_path, changes, fault):
+def test_other_sdf_files_are_refused(tmp_path, changes, fault):
     path = saved(tmp_path, replace(File(), **changes))
     with pytest.raises(FileFormatError, match=fault):
         read_response(path)

@@ -38,7 +38,7 @@ def foreign(path, *, levels=(0.0,), **changes) -> None:
         pyuff.UFF(str(path)).write_sets(known | changes, "add")
 
 
-def test_another_program_reads_what_we_write(tmp_path):
+def test_other_library_reads_written_file(tmp_path):
     path = tmp_path / "x.uff"
     response = measured(levels=(1.5, 2.5))
     write_response(response, path)
@@ -140,7 +140,7 @@ def test_real_functions_have_no_phase(tmp_path):
         ((0.0,), {"x": np.array([1.0, 3.0, 2.0, 4.0])}, "point 3: frequency 2 Hz is out of order"),
     ],
 )
-def test_what_is_not_one_response_is_refused(tmp_path, levels, changes, fault):
+def test_data_of_several_responses_are_refused(tmp_path, levels, changes, fault):
     path = tmp_path / "other.uff"
     foreign(path, levels=levels, **changes)
     with pytest.raises(FileFormatError, match=fault):

@@ -64,7 +64,7 @@ def test_a_response_without_rows(response):
     assert response.take([]).to_frame().shape == (0, len(COLUMNS))
 
 
-def test_without_pandas_it_says_what_to_install(response, monkeypatch):
+def test_missing_pandas_names_package_to_install(response, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(InputError, match=r"lashbench\[frames\]"):
         response.to_frame()

@@ -69,7 +69,7 @@ def measured(analyser: HP35670A, frequencies=(60.0, 100.0, 150.0)) -> list:
         ("prologix_pty", "ar488"),
     ],
 )
-def test_the_response_comes_over_every_wire(wire, dialect):
+def test_response_is_equal_over_every_wire(wire, dialect):
     with serving(dialect=dialect) as (instrument, addresses):
         analyser = HP35670A(open_transport(url_of(wire, addresses)))
         points = measured(analyser)

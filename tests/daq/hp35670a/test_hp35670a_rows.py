@@ -29,7 +29,7 @@ def test_both_ends_of_band_have_row(one, other, whole):
     assert shown[row] == shown[-1]
 
 
-def test_the_band_that_lost_its_last_point():
+def test_rounded_axis_keeps_its_last_point():
     places = np.arange(401) / 401
     assert nearest_row(110.0 + 65.0 * places, 175.0) == 400
 

@@ -163,7 +163,7 @@ def test_bad_point_settings_are_refused_unsent(changes, fault):
 
 
 @pytest.mark.parametrize("band", [(0.0, 100.0), (10.0, 60000.0), (math.nan, 100.0)])
-def test_bands_are_refused_before_anything_is_sent(band):
+def test_bad_bands_are_refused_unsent(band):
     with pytest.raises(LimitError, match="nothing was sent"):
         planned_settings(*band, PointSettings(2.5, 5, 30))
 

@@ -154,7 +154,7 @@ def test_wrong_read_back_stops_the_setup(old, new, then, fault):
     script.finish()
 
 
-def test_a_key_pressed_has_everything_read_again():
+def test_key_press_causes_complete_read_back():
     pressed = POINT.replace("> STAT:DEV?\n< +32", "> STAT:DEV?\n< +48").removesuffix(UNMOVED)
     analyser, script = prepared(DRIVE + pressed + READ_BACK + UNMOVED + END)
     assert len(list(analyser.sweep([100.3]))) == 1

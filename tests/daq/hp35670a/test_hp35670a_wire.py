@@ -62,7 +62,7 @@ def test_the_wrong_instrument_is_refused(text):
         parse_identity(text, '""')
 
 
-def test_a_missing_option_is_said_at_once():
+def test_missing_option_is_reported_at_once():
     analyser, script = driver(IDENTIFY.replace("1D2,1D3,UFF", "1D3"))
     with pytest.raises(InstrumentError, match="has options 1D3; swept sine needs 1D2"):
         analyser.identify()

@@ -35,13 +35,13 @@ def test_error_queue_is_read_until_empty():
     script.finish()
 
 
-def test_what_is_harmless_here_is_no_error():
+def test_harmless_queue_entry_is_no_error():
     script = Script('> SYST:ERR?\n< -221,"level 0"\n' + QUIET)
     Dialogue(script).check("entry", harmless=lambda entry: entry.number == -221)
     script.finish()
 
 
-def test_a_queue_without_end_is_given_up():
+def test_endless_error_queue_is_abandoned():
     script = Script('> SYST:ERR?\n< -113,"A"\n' * 12)
     with pytest.raises(InstrumentError, match="does not end"):
         Dialogue(script).drain()
@@ -97,7 +97,7 @@ def test_a_lost_link_is_not_talked_to():
     script.finish()
 
 
-def test_a_recovery_that_fails_is_said():
+def test_failed_recovery_is_reported():
     script = Trouble("> X?\n< TIMEOUT\n! clear\n> SYST:ERR?\n< TIMEOUT")
     with pytest.raises(BenchTimeout, match="no recovery: 'X\\?' got no answer"):
         Dialogue(script).ask("X?")
@@ -136,7 +136,7 @@ def test_synchronising_number_differs_from_the_last():
     script.finish()
 
 
-def test_a_pause_looks_in_on_whoever_waits():
+def test_pause_calls_the_wait_callback():
     script = Script("")
     dialogue = Dialogue(script)
     looks = []

@@ -173,7 +173,7 @@ def test_the_cost_is_known_before_the_start():
         lambda: AdaptiveSweep(plan(17), Refinement(0.1, 16), judge),
     ],
 )
-def test_what_cannot_be_meant_is_refused(refinement):
+def test_invalid_refinement_is_refused(refinement):
     with pytest.raises(InputError):
         refinement()
 

@@ -71,7 +71,7 @@ def test_foreign_lock_file_is_unchanged(tmp_path, kind):
     assert kept_of(place) == before
 
 
-def test_a_link_to_nothing_makes_no_file(tmp_path):
+def test_dangling_link_creates_no_file(tmp_path):
     (tmp_path / "bench.db-lock").symlink_to(tmp_path / "new")
     with pytest.raises(InputError, match="is a link"):
         BenchLock(tmp_path / "bench.db")

@@ -86,7 +86,7 @@ def test_watchdog_of_killed_session_holds_instrument(tmp_path):
     BenchLock(tmp_path / "two.db", patience_s=5.0, instrument=url).release()
 
 
-def test_notes_lie_where_nobody_else_may_write(tmp_path):
+def test_claim_files_lie_in_private_folder(tmp_path):
     BenchLock(tmp_path / "one.db", instrument=URL.format(4)).release()
     folder = os.stat(f"/tmp/lashbench-{os.getuid()}")
     assert folder.st_uid == os.getuid()

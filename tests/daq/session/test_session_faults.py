@@ -59,7 +59,7 @@ def test_a_fault_at_any_moment(store, fault, moment, kept):
     assert list(response.gain) == [known_gain(f) for f in response.frequency_hz]
 
 
-def test_a_wait_that_runs_out(store):
+def test_expired_wait_ends_session(store):
     analyser = FakeAnalyser()
     analyser.faults[("point", 4)] = lambda: analyser.wait(60.0, bound_s=0.1)
     finished, error = broken(store, analyser)
@@ -114,7 +114,7 @@ def test_spoilt_point_keeps_flag_and_sweep_continues(store):
     assert [int(p.point.flags) for p in store.points(1)] == [0, 0, 1, 0, 16, 0, 0, 0, 0]
 
 
-def test_fewer_points_than_asked_for(store):
+def test_missing_points_are_an_error(store):
     class Short(FakeAnalyser):
         def sweep(self, frequencies_hz):
             return super().sweep(frequencies_hz[:4])
@@ -124,7 +124,7 @@ def test_fewer_points_than_asked_for(store):
     assert finished.points == 4
 
 
-def test_more_points_than_asked_for(store):
+def test_surplus_points_are_an_error(store):
     class Long(FakeAnalyser):
         def sweep(self, frequencies_hz):
             more = [200.0] if len(frequencies_hz) > 1 else []

@@ -51,7 +51,7 @@ def test_pause_counts_as_no_measuring_time(store):
 @pytest.mark.parametrize(
     ("cut", "state"), [("stop", "interrupted"), ("interrupt", "interrupted"), ("abort", "aborted")]
 )
-def test_a_pause_gives_way_to_any_end(store, cut, state):
+def test_any_end_request_ends_a_pause(store, cut, state):
     control = SessionControl()
 
     def hold():

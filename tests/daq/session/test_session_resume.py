@@ -22,7 +22,7 @@ def test_resuming_complete_measurement_only_checks_source(store):
     assert [line.name for line in of(CheckLine, events)][-1] == "source"
 
 
-def test_resuming_what_is_not_there(store):
+def test_missing_measurement_cannot_be_resumed(store):
     with pytest.raises(InputError, match="measurement 5 is not in"):
         list(Session(FakeAnalyser(), store, again(5)).run())
 
@@ -60,7 +60,7 @@ def test_remeasured_band_supersedes_and_keeps_old_points(store):
     assert sum(p.superseded_by is not None for p in every) == 4
 
 
-def test_a_band_without_points_changes_nothing(store):
+def test_empty_band_changes_nothing(store):
     measured(store)
     analyser = FakeAnalyser()
     measured(store, again(1, remeasure_hz=(300.0, 400.0)), analyser)
@@ -88,7 +88,7 @@ def test_shorter_run_in_can_be_requested(store, points):
     assert analyser.driven[1:] == [(1.0, f) for f in [*lead, 150.0, 160.0, 170.0, 180.0]]
 
 
-def test_other_settings_than_before_are_told(store):
+def test_changed_settings_are_reported(store):
     control = SessionControl()
     Watch(Session(FakeAnalyser(), store, new(), control), 5, control.stop).run()
     events = measured(store, again(1), FakeAnalyser(readback={"SWE:STIM": "6 CYCLE"}))

@@ -21,7 +21,7 @@ from daq.session_events import CheckLine
         (lambda f: complex("inf"), "no number"),
     ],
 )
-def test_an_implausible_trial_point_ends_it(store, gain, said):
+def test_implausible_trial_point_ends_session(store, gain, said):
     analyser = FakeAnalyser(gain=gain)
     finished, error = broken(store, analyser)
     assert said in str(error)
@@ -30,7 +30,7 @@ def test_an_implausible_trial_point_ends_it(store, gain, said):
     assert finished.points == 0
 
 
-def test_an_overloaded_trial_point_ends_it(store):
+def test_overloaded_trial_point_ends_session(store):
     _, error = broken(store, FakeAnalyser(flags={1: PointFlag.OVERLOAD}))
     assert "an input is overloaded" in str(error)
 

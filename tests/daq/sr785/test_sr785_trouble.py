@@ -157,7 +157,7 @@ def test_reading_source_state_changes_nothing(left, state):
                                    "key-pressed:point=14", "panel-pause:point=14",
                                    "range-moved:point=14", "outx-elsewhere:point=14"])  # fmt: skip
 @pytest.mark.parametrize("fixed", [None, 2.0])
-def test_no_wrong_number_comes_without_a_word(fault, fixed):
+def test_wrong_numbers_are_always_flagged(fault, fixed):
     wanted = replace(SETTINGS, input_range_vpk=(fixed, fixed))
     instrument, analyser, _ = bench(faults=[fault], timing=SHORT)
     points = []
@@ -213,7 +213,7 @@ def test_input_below_half_range_is_flagged():
     assert all(point.flags & PointFlag.HALF_RANGE_MISSED for point in points)
 
 
-def test_phase_is_that_of_output_over_input():
+def test_phase_is_output_relative_to_input():
     _, analyser, _ = prepared(gain=lambda hz: 0.5 * np.exp(-0.7j))
     for point in analyser.sweep(GRID[:1] + GRID):
         assert math.isclose(math.atan2(point.gain.imag, point.gain.real), -0.7, abs_tol=1e-5)

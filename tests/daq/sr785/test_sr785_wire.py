@@ -14,7 +14,7 @@ from daq.sr785 import SR785
 from daq.transports.transcript import Recorder, Replay
 
 
-def test_identifying_asks_nothing_before_replies_come_here():
+def test_identification_directs_replies_first():
     _, analyser, tap = bench()
     analyser.identify()
     assert tap.acts == ["clear", "OUTX 0", "*ESR?", "read", "*IDN?", "read"]

@@ -129,7 +129,7 @@ def test_response_of_a_measurement(store):
     assert len(response.provenance["points"]["taken"]) == 6
 
 
-def test_response_without_points_says_so(store):
+def test_response_without_points_is_refused(store):
     measurement = store.begin(header())
     with pytest.raises(InputError, match="no point yet"):
         store.response(measurement)
@@ -259,7 +259,7 @@ def test_refused_flush_is_reported_at_next_record(file_store, monkeypatch):
         file_store.add_point(measurement, 1.5, 100.1, point(100.1))
 
 
-def test_a_failed_write_leaves_nothing_half_done(store):
+def test_failed_write_leaves_no_partial_record(store):
     measurement = store.begin(header())
     old = store.add_point(measurement, 1.5, 100.1, point(100.1))
     bad = point(100.1, detail={"x": object()})

@@ -98,7 +98,7 @@ def test_read_only_older_file_is_read_unmigrated(old):
     assert old.read_bytes() == before
 
 
-def test_an_upgrade_that_fails_changes_nothing(old):
+def test_failed_migration_changes_nothing(old):
     # The last step of the upgrade makes a table of this name.
     run_sql(old, "CREATE TABLE corrections (id INTEGER)")
     before = layout(old)
@@ -178,7 +178,7 @@ def test_contents_only_in_log_are_read(whole, tmp_path):
             assert reader.events(1)[-1].text == "only in the log"
 
 
-def test_whoever_writes_may_leave_while_another_opens(whole, tmp_path, monkeypatch):
+def test_writer_may_close_while_another_opens(whole, tmp_path, monkeypatch):
     path = tmp_path / "bench.db"
     path.write_bytes(whole)
     writer = Store(path)

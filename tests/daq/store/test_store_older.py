@@ -68,7 +68,7 @@ def test_possibly_outdated_estimate_is_not_in_force(old):
         assert store.latest_estimates()[2].document["contribution_ratio"]["value"] == 0.45
 
 
-def test_older_software_refuses_it_then(old):
+def test_older_software_refuses_migrated_file(old):
     Store(old).close()
     raw = sqlite3.connect(old)
     (version,) = raw.execute("PRAGMA user_version").fetchone()

@@ -93,7 +93,7 @@ def test_on_a_bare_socket_every_act_ends(talk):
 
 
 @pytest.mark.parametrize("talk", TALK)
-def test_what_only_talks_is_no_adapter(talk):
+def test_endless_talker_is_no_adapter(talk):
     with talking(TALK[talk]) as port:
         (error,) = ends(
             lambda: open_transport(f"prologix-tcp:127.0.0.1:{port}?addr=11", opening_s=1.0)

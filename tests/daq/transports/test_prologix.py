@@ -39,7 +39,7 @@ def test_escaping_survives_the_adapter(message):
     assert adapter.messages == ([message] if message else [])
 
 
-def test_what_must_be_escaped_is():
+def test_special_bytes_are_escaped():
     assert escape(b"a\rb\nc\x1bd+e") == b"a\x1b\rb\x1b\nc\x1b\x1bd\x1b+e"
 
 
@@ -59,7 +59,7 @@ def test_unsendable_message_is_refused_and_not_sent(line):
     assert adapter.messages == []
 
 
-def test_the_longest_line_goes_through():
+def test_longest_line_is_sent():
     adapter = TinyAdapter(lambda _: None)
     opened(adapter).write("X" * 119, soon())
     assert adapter.messages == [b"X" * 119]
@@ -88,7 +88,7 @@ def test_any_block_arrives_whole_however_split(payload, piece):
         ("", None),
     ],
 )
-def test_dialects_are_told_by_their_version(version, dialect):
+def test_dialect_follows_from_version(version, dialect):
     assert dialect_of(version) is dialect
 
 

@@ -46,7 +46,7 @@ def recorded(tmp_path):
     return path, answers
 
 
-def test_a_dialogue_comes_back_as_it_was(recorded):
+def test_recorded_dialogue_replays_identically(recorded):
     path, answers = recorded
     replay = Replay(path)
     assert play(replay) == answers
@@ -147,7 +147,7 @@ def test_a_damaged_transcript_is_refused_whole(recorded, number, line, fault):
 
 
 @pytest.mark.parametrize("content", [b"", b"\xff\xfe", b"frequency_hz,gain\n"])
-def test_what_is_no_transcript(tmp_path, content):
+def test_invalid_transcript_is_refused(tmp_path, content):
     path = tmp_path / "other"
     path.write_bytes(content)
     with pytest.raises(FileFormatError):

@@ -97,7 +97,7 @@ def test_every_form_is_read(url, address):
         ("replay:", "no file"),
     ],
 )
-def test_anything_else_is_refused_with_the_forms(url, fault):
+def test_other_address_is_refused_with_forms(url, fault):
     with pytest.raises(ConfigurationError) as refusal:
         parse_address(url)
     assert fault in str(refusal.value)

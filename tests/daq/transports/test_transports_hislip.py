@@ -56,7 +56,7 @@ def test_text_blocks_and_counted_bytes_come_whole(transport):
         assert transport.read_bytes(len(BLOCK), soon()) == BLOCK
 
 
-def test_damaged_replies_are_told(transport):
+def test_damaged_replies_are_reported(transport):
     with pytest.raises(ProtocolError, match="not text"):
         ask(transport, "BINARY?", soon())
     with pytest.raises(ProtocolError, match="20 bytes came"):
@@ -103,7 +103,7 @@ def test_clear_drops_reply_arriving_before_acknowledgement(server, transport):
     assert transport.serial_poll(soon()) == 96
 
 
-def test_a_lock_of_another_client_is_told(server, transport):
+def test_lock_of_another_client_is_reported(server, transport):
     server.locked = True
     with pytest.raises(BenchTimeout, match="another client has locked the instrument"):
         ask(transport, "A?", soon(0.1))

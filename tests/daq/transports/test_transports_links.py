@@ -64,7 +64,7 @@ def test_a_second_program_is_refused_at_opening():
         first.close()
 
 
-def test_a_port_that_does_not_exist():
+def test_missing_port_is_reported():
     with pytest.raises(LinkError, match="is it plugged in"):
         SerialLink("/dev/ttyNONE7")
 
@@ -97,7 +97,7 @@ def test_port_vanishing_while_idle_is_noticed(tmp_path):
         link.close()
 
 
-def test_nothing_to_read_ends_at_the_deadline():
+def test_reading_nothing_ends_at_deadline():
     with Pty(lambda data: b"") as pty:
         link = SerialLink(pty.device)
         started = time.monotonic()

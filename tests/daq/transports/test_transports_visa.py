@@ -84,7 +84,7 @@ def test_raw_socket_has_no_poll_or_clear(raw):
     assert ask(raw, "A?", Deadline.after(1.0)) == "+1"
 
 
-def test_a_time_out_names_what_waited(raw):
+def test_timeout_error_names_the_act(raw):
     started = time.monotonic()
     with pytest.raises(BenchTimeout, match=r"'N\?' got no answer within 0.1 s"):
         ask(raw, "N?", Deadline.after(0.1))

@@ -21,11 +21,11 @@ from daq.untrusted.visible_text import visible, visible_line
         ("\U000e0041", "\\U000e0041"), ("\U000e0101", "\\U000e0101"),
     ],
 )  # fmt: skip
-def test_what_is_not_seen_is_written_out(sign, shown):
+def test_invisible_characters_become_escapes(sign, shown):
     assert visible(f"SN {sign}4") == visible_line(f"SN {sign}4") == f"SN {shown}4"
 
 
-def test_what_is_seen_stays():
+def test_visible_characters_are_unchanged():
     text = "SN [/x] 4 ± Ω ü 日本 é [b] <i> \\u"
     assert visible(text) == visible_line(text) == text
     assert visible("a\n\tb") == "a\n\tb"
@@ -33,7 +33,7 @@ def test_what_is_seen_stays():
 
 
 @given(st.text(st.characters(exclude_categories=())))
-def test_any_text_is_seen_whole(text):
+def test_any_text_becomes_visible(text):
     for shown, kept in ((visible(text), "\n\t"), (visible_line(text), "")):
         unseen = {c for c in shown if unicodedata.category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp")}
         assert unseen <= set(kept)

@@ -72,7 +72,7 @@ def test_410_late_reply_is_interrupted_in_advance(swept):
     assert swept.instrument.talk().state is TalkState.NOTHING
 
 
-def test_420_nothing_to_say(controller):
+def test_420_talking_without_reply(controller):
     talk = controller.instrument.talk()
     assert (talk.state, talk.data, talk.end) == (TalkState.NOTHING, b"", False)
     assert status_after(controller, -420) == [-420]
@@ -178,7 +178,7 @@ def test_empty_messages_are_no_messages(controller):
     assert controller.errors() == []
 
 
-def test_nothing_can_fill_the_memory(controller):
+def test_endless_message_uses_bounded_memory(controller):
     controller.write(b"FREQ:STAR '" + b"x" * 1_000_000)
     # From here on, as it is slow: what has grown counts with all that it holds.
     tracemalloc.start()

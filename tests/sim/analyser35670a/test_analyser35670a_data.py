@@ -236,7 +236,7 @@ def test_blocks_may_hold_any_byte(bench):
     assert controller.reals("TRAC? D1").astype(">f8").tobytes() == payload
 
 
-def test_registers_take_only_what_fits(quiet):
+def test_registers_refuse_unsuitable_data(quiet):
     quiet.write("TRAC D1,TRAC1", "TRAC D2,D1")
     quiet.run()
     assert quiet.refusal("TRAC D1,1,2,3") == [-161]
@@ -274,7 +274,7 @@ def test_markers(quiet):
     assert quiet.integer("CALC:MARK:POS:POIN?") == 400
 
 
-def test_a_spectrum_shows_the_sine_that_drives(bench):
+def test_spectrum_shows_the_driving_sine(bench):
     controller = bench()
     controller.write("FORM REAL,64", "SOUR:FREQ 10240 HZ", "SOUR:VOLT 2 VPK", "OUTP ON",
                      "CALC1:FEED 'XFR:POW 1'", "CALC2:FEED 'XFR:POW:RAT 2,1'", "CALC2:FORM REAL",

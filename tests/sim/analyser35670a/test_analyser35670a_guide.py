@@ -36,7 +36,7 @@ def measured(controller):
         ("CALC1:UNIT:MECH", ("G", "M/S2", "MILS")),
     ],
 )
-def test_units_are_sent_and_given_between_quotes(fft, header, words):
+def test_units_are_quoted_both_ways(fft, header, words):
     for word in words:
         for sent in (f"'{word}'", f'"{word}"', f"'{word.lower()}'"):
             fft.write(f"{header} {sent}")
@@ -93,7 +93,7 @@ def busy(controller):
 
 
 @pytest.mark.parametrize("continuous", ["ON", "OFF"])
-def test_averages_that_freeze_end(fft, continuous):
+def test_frozen_averages_end(fft, continuous):
     fft.write("AVER ON;:AVER:TYPE RMS;TCON FRE;COUN 7", "*CLS", "*ESE 1")
     fft.write("ABOR;:INIT:IMM;*OPC" if continuous == "OFF" else "ABOR;:INIT:CONT ON;*OPC")
     assert busy(fft) == BUSY
@@ -104,7 +104,7 @@ def test_averages_that_freeze_end(fft, continuous):
     assert (fft.reals("CALC1:DATA?") == first).all()
 
 
-def test_averages_that_repeat_do_not_end(fft):
+def test_repeating_averages_do_not_end(fft):
     fft.write("AVER ON;:AVER:TYPE RMS;TCON REP;COUN 2", "ABOR;:INIT:CONT ON")
     fft.run()
     assert busy(fft) == BUSY
@@ -140,7 +140,7 @@ def test_averages_raised_afterwards_are_added(fft):
     assert fft.errors() == [-200]
 
 
-def test_coherence_is_that_of_the_averages(fft):
+def test_coherence_follows_from_averages(fft):
     fft.write("CALC1:FEED 'XFR:POW:COH 1,2'", "AVER ON;:AVER:COUN 50")
     coherence = measured(fft).reals("CALC1:DATA?")
     # Two noises that know nothing of each other: one in fifty.
@@ -156,7 +156,7 @@ def test_coherence_is_that_of_the_averages(fft):
     ("asked", "lines", "read"),
     [(100, 100, 129), (400, 400, 513), (800, 800, 1025), (801, 1600, 2049)],
 )
-def test_the_axis_goes_on_beyond_the_lines(fft, asked, lines, read):
+def test_axis_extends_beyond_displayed_lines(fft, asked, lines, read):
     fft.write(f"FREQ:RES {asked}")
     measured(fft)
     assert float(fft.ask("FREQ:RES?")) == lines
@@ -197,7 +197,7 @@ def test_maths_is_sent_between_parentheses(fft, sent, kept):
 
 
 @pytest.mark.parametrize("sent", ["'K1*FRES'", "K1", "(K1*FRES", "(K9)", "(PSD[PSPEC1])"])
-def test_what_is_no_maths_is_refused(fft, sent):
+def test_invalid_maths_is_refused(fft, sent):
     fft.write(f"CALC:MATH:EXPR1 {sent}")
     assert fft.errors() == [-120]
     assert fft.ask("CALC:MATH:EXPR1?") == '""'

@@ -29,7 +29,7 @@ def test_the_error_query_in_every_spelling(controller, header):
     ["SYST:ERR:NEXT?", "SYST:ERR:ALL?", "SYST:ERR:COUN?", "SYSTE:ERR?", "SYST:ERRO?",
      "FREQU:STAR 1", "*IDNN?", "SYS:ERR?"],
 )  # fmt: skip
-def test_no_form_between_and_nothing_newer(controller, header):
+def test_abbreviations_and_newer_commands_are_refused(controller, header):
     assert controller.refusal(header) == [-113]
     assert controller.instrument.talk().state is TalkState.NOTHING
 
@@ -126,7 +126,7 @@ def test_omitted_optional_nodes_leave_the_path(controller):
         ("TRAC D1,1,2", -200),
     ],
 )
-def test_what_is_refused_and_with_which_number(controller, message, number):
+def test_refusals_have_their_error_number(controller, message, number):
     assert controller.refusal(message) == [number]
 
 
@@ -200,7 +200,7 @@ def test_error_queue_keeps_oldest_and_reports_overflow(controller):
     assert controller.ask("SYST:ERR?") == NO_ERROR
 
 
-def test_what_empties_the_error_queue(controller):
+def test_clearing_commands_empty_error_queue(controller):
     for message, left in (("*RST", [-113]), ("*CLS", []), ("SYST:PRES", [])):
         controller.write("JUNK", message)
         controller.run()
@@ -244,7 +244,7 @@ def test_every_listed_command_works_in_both_forms(bench, mode):
             assert controller.errors()[0] == setting.refusal[0], header
 
 
-def test_what_a_setting_answers_it_also_accepts(bench):
+def test_setting_accepts_its_own_reply(bench):
     controller = bench(options="1D2,1D3,1D4,1C2")
     controller.write("INST:SEL SINE", "SWE:MODE MAN")
     for header, setting in headers():
@@ -272,7 +272,7 @@ ARGUMENTS = [
 
 @settings(max_examples=150, deadline=2000)
 @given(st.data())
-def test_no_message_crashes_or_hangs_it(data):
+def test_message_neither_crashes_nor_hangs_simulator(data):
     instrument = Analyser35670A(LinearPlant(lambda hz: 0.1), Choices())
     pieces = data.draw(
         st.lists(

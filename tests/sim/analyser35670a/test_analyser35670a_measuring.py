@@ -27,7 +27,7 @@ def test_wai_holds_parser_until_sweep_end(swept):
     assert swept.instrument.measurement.points_begun == 5
 
 
-def test_init_does_nothing_while_continuous_is_on(swept):
+def test_init_is_ignored_in_continuous_mode(swept):
     swept.write("INIT:CONT ON")
     begun = swept.instrument.measurement.started
     swept.write("INIT")

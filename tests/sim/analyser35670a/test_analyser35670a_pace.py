@@ -21,7 +21,7 @@ def test_the_agenda_keeps_order_and_time():
     assert done[1:] == [("b", 2.0), ("c", 2.0)]
 
 
-def test_nobody_jumps_to_what_nobody_waits_for():
+def test_agenda_runs_up_to_last_work():
     agenda, done = Agenda(), []
     agenda.after(100.0, lambda: done.append("late"), work=False)
     assert not agenda.run_next()
@@ -31,7 +31,7 @@ def test_nobody_jumps_to_what_nobody_waits_for():
     assert done == ["late", "work"]
 
 
-def test_a_process_holds_resumes_and_stops():
+def test_process_pauses_resumes_and_stops():
     agenda, seen = Agenda(), []
 
     def steps():
@@ -111,7 +111,7 @@ def test_fast_stops_a_sweep_without_client(swept):
     assert swept.instrument.measurement.points_begun > begun
 
 
-def test_fast_goes_from_point_to_point(swept):
+def test_fast_advances_point_by_point(swept):
     pace = Fast(swept.instrument)
     swept.write("ABOR;:INIT")
     begun = [swept.instrument.measurement.points_begun]

@@ -59,7 +59,7 @@ def test_each_mode_remembers_its_own_settings(controller):
         ("VOLT:RANG:AUTO:DIR UP", -200), ("OUTP OFF", -221), ("OUTP?", -221),
     ],
 )  # fmt: skip
-def test_what_swept_sine_lacks(swept, message, number):
+def test_swept_sine_refuses_fft_commands(swept, message, number):
     assert swept.refusal(message) == [number]
 
 
@@ -74,7 +74,7 @@ def test_the_texts_name_the_reason(swept):
         assert text in (swept.ask("SYST:ERR?") or "")
 
 
-def test_what_only_swept_sine_has(controller):
+def test_fft_refuses_swept_sine_commands(controller):
     for message, number in (
         ("CALC:FEED 'XFR:POW:VAR 1'", -200), ("SWE:MODE MAN", -221), ("FREQ:MAN 100", -221),
         ("SWE:STIM 5 CYCLE", -221), ("FREQ:RES:AUTO ON", -221), ("SOUR:VOLT:SLEW 1", -221),
@@ -89,7 +89,7 @@ def test_output_in_swept_sine_is_a_choice(bench):
     assert controller.errors() == []
 
 
-def test_feeds_that_need_more_channels(bench):
+def test_feeds_require_their_channels(bench):
     controller = bench(options="1D2,AY6")
     assert controller.refusal("INST:SEL SINE;:CALC:FEED 'XFR:POW:RAT 3,1'") == [-200]
     assert controller.refusal("INP4 ON;:CALC:FEED 'XFR:POW:RAT 3,1'") == []
@@ -121,7 +121,7 @@ def test_the_two_resets_differ(controller, reset, expected):
     assert controller.ask("SOUR:VOLT? UNIT") == "VPK"
 
 
-def test_what_no_reset_touches(controller):
+def test_reset_keeps_status_enables(controller):
     controller.write("*ESE 61;*SRE 32", "STAT:OPER:ENAB 16;NTR 16;PTR 0", "SYST:KLOC ON")
     for reset in ("*RST", "SYST:PRES"):
         controller.write(reset)
@@ -274,7 +274,7 @@ def test_resolution_takes_the_units_of_the_spacing(swept, spacing, sent, number)
     assert swept.refusal(f"FREQ:RES {sent}") == ([] if number is None else [number])
 
 
-def test_a_manual_point_lies_within_the_band(swept):
+def test_manual_point_is_within_band(swept):
     assert swept.refusal("FREQ:MAN 99") == [-222]
     assert swept.refusal("FREQ:MAN 201") == [-222]
     swept.write("FREQ:MAN 150.01")

@@ -95,7 +95,7 @@ def test_source_after_sweep_is_a_choice(bench, stays, left):
     assert controller.instrument.output_vpk == left
 
 
-def test_what_silences_the_source(bench):
+def test_level_mode_and_reset_silence_source(bench):
     for message in ("SOUR:VOLT 0 VPK", "INST:SEL FFT", "*RST", "SYST:PRES"):
         controller = bench()
         controller.sweep()
@@ -148,7 +148,7 @@ def test_autocalibration_occurs_in_sweep_or_pause(bench):
     assert controller.instrument.measurement.spoilt
 
 
-def test_autocalibration_keeps_its_hours(bench):
+def test_autocalibration_follows_its_schedule(bench):
     controller = bench()
     controller.instrument.power_on()
     controller.write("CAL:AUTO ON", "STAT:OPER:PTR 1", "STAT:OPER?")

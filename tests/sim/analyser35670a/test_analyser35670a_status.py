@@ -7,7 +7,7 @@ import pytest
 MEASURING, AVERAGING, SETTLING, RANGING, CALIBRATING = 16, 256, 2, 4, 1
 
 
-def test_power_on_is_seen_once(bench):
+def test_power_on_bit_is_read_once(bench):
     controller = bench()
     controller.instrument.power_on()
     assert controller.integer("*ESR?") & 128

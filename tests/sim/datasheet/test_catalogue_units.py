@@ -135,7 +135,7 @@ def test_spellings_of_catalogues_are_read(symbol, text, value):
         ("k_t", "1 N\nm/A", "not a number"),
     ],
 )
-def test_what_is_no_quantity_is_refused(symbol, text, said):
+def test_invalid_quantity_is_refused(symbol, text, said):
     with pytest.raises(ValueError, match=said):
         parse_quantity(symbol, text)
 

@@ -99,7 +99,7 @@ def test_unusual_value_is_reported_in_one_sentence(values, key, remedy, tmp_path
     assert remedy in said
 
 
-def test_two_slips_are_told_at_once(tmp_path):
+def test_two_unit_slips_are_reported_together(tmp_path):
     with pytest.raises(ConfigurationError) as caught:
         load_unit(file_with(tmp_path, k_b=4.8, L_a=1200.0))
     assert "motor.k_b" in str(caught.value)

@@ -140,7 +140,7 @@ def test_value_changed_by_symbol_keeps_others(name):
         assert changed.physics == unit.physics
 
 
-def test_the_chain_is_told_with_its_sections():
+def test_chain_description_lists_sections():
     text = "\n".join(
         describe_chain(drives.unit(drives.COUPLINGS | drives.DRIVES["encoder, speed"]))
     )

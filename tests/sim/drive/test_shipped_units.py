@@ -43,7 +43,7 @@ def test_shipped_unit_is_plausible_and_names_source(name):
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_its_resonances_lie_within_its_limits(name):
+def test_resonances_are_within_limits(name):
     unit = load_unit(name)
     found = natural_frequencies(unit)
     assert 1.5 * unit.limits.start_hz < found.anti_resonances_hz[0] < found.resonances_hz[0]
@@ -51,7 +51,7 @@ def test_its_resonances_lie_within_its_limits(name):
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_it_moves_as_an_independent_plant_does(name):
+def test_motion_agrees_with_independent_plant(name):
     """With its clock, counts, clips, play and friction, below ARF, between and above RF."""
     unit = load_unit(name)
     document = tomllib.loads(config_path("units", name).read_text(encoding="utf-8"))
@@ -73,7 +73,7 @@ def test_it_moves_as_an_independent_plant_does(name):
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_its_play_shows(name):
+def test_backlash_has_visible_effect(name):
     """A unit whose response hardly departs from the linear one would tell nothing of its play."""
     unit = load_unit(name)
     modes = natural_frequencies(unit)

@@ -84,7 +84,7 @@ def fail(effort):
     raise ValueError(f"stop at {effort.simulated_s}")
 
 
-def test_a_block_that_fails_counts_no_further():
+def test_failing_block_stops_counting():
     with pytest.raises(ValueError, match=r"stop at 1\.0"), counting() as effort:
         fail(effort)
     spend(2.0)

@@ -59,7 +59,7 @@ def without_losses(unit, ratio, effects=()):
 
 @pytest.mark.parametrize("ratio", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("name", UNITS)
-def test_a_chain_without_losses_keeps_its_energy(name, ratio):
+def test_lossless_chain_conserves_energy(name, ratio):
     # 0.5 s of free motion, thousands of impacts; up to 1e-4 was measured, on EDSS at 0.5.
     history = energies(without_losses(UNITS[name], ratio), seed=1, samples=125)
     assert np.abs(history - 1.0).max() < 5e-4

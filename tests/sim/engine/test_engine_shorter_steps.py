@@ -80,7 +80,7 @@ def test_third_step_follows_failed_second():
     assert [f for f, step in seen if step == SHORTEST] == [74.0, 76.0]
 
 
-def test_what_grows_often_keeps_the_shorter_step():
+def test_repeated_growth_keeps_shorter_step():
     seen, _ = taken((LONG, SHORT), lambda f, step: step == LONG)
     # More than a tenth of eleven is two; from then on nothing is tried in vain.
     assert [f for f, step in seen if step == LONG] == [70.0, 72.0]

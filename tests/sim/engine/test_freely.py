@@ -107,7 +107,7 @@ def test_motion_without_bound_ends_the_whole():
         step_freely([asker(0, (300.0,), 1, (0, 1)), bad])
 
 
-def test_nobody_asks_for_nothing():
+def test_empty_requests_return_at_once():
     def silent():
         return 7
         yield

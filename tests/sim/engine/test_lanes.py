@@ -142,7 +142,7 @@ def test_machine_without_fused_multiply_rounds_twice():
     ("architecture", "triple", "sets"),
     [("x86", "x86_64-unknown-linux-gnu", "ldmxcsr"), ("arm", "aarch64-unknown-linux-gnu", "msr")],
 )
-def test_every_architecture_is_told_and_put_back(architecture, triple, sets):
+def test_denormals_mode_is_set_and_restored(architecture, triple, sets):
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     module = ir.Module()

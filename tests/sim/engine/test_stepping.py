@@ -91,7 +91,7 @@ def test_requests_of_one_program_share_calls(count, lanes, made, single, calls):
         {"steps": (SHORT,)},
     ],
 )
-def test_what_is_not_alike_is_stepped_apart(other, calls):
+def test_different_programs_are_stepped_separately(other, calls):
     plain, different = {"lanes": TWO}, {"lanes": TWO, **other}
     together = step_together([asker(**plain), asker(**different)])
     assert {systems for systems, _ in calls} == {1}
@@ -116,12 +116,12 @@ def test_repeated_request_leaves_the_other_unchanged(calls):
     assert calls[0] == (2, 4)
 
 
-def test_what_one_raises_ends_the_whole():
+def test_one_error_ends_all_requests():
     with pytest.raises(AnalysisError, match="at 110 Hz grew without bound"):
         step_together([asker(lanes=TWO), growing_asker(lanes=TWO - 1)])
 
 
-def test_who_asks_for_nothing_is_done():
+def test_empty_request_is_finished():
     def silent():
         return 7
         yield

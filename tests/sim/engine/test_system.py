@@ -23,7 +23,7 @@ FREQUENCIES = np.geomspace(1.0, 1000.0, 400)
     ],
     ids=["paper", "shaft-damping", "load"],
 )
-def test_transfer_is_that_of_the_published_equations(unit, effects, extras):
+def test_transfer_matches_published_equations(unit, effects, extras):
     quiet = unit.with_parameters(**FRICTIONLESS, b_t_deg=0.0)
     system = drivetrain_with(quiet, 0.5, [parse_effect(e) for e in effects]).system()
     expected = state_space(quiet, **extras)(2j * np.pi * FREQUENCIES)
@@ -101,12 +101,12 @@ def test_hardening_is_the_cubic_part_alone():
 
 
 @pytest.mark.parametrize("J", [0.0, -1.0, float("nan")])
-def test_an_inertia_that_is_none_is_refused(J):
+def test_invalid_inertia_is_refused(J):
     with pytest.raises(ConfigurationError, match=r"'q'.*above 0"):
         Inertia("q", J).enter(Assembly())
 
 
-def test_a_coordinate_given_twice_is_refused():
+def test_duplicate_coordinate_is_refused():
     assembly = oscillator()
     with pytest.raises(ConfigurationError, match="twice"):
         Inertia("q", 1.0).enter(assembly)

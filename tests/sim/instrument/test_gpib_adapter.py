@@ -61,14 +61,14 @@ def arduino(bench):
      (PROLOGIX_ETHERNET, b"Prologix GPIB-ETHERNET Controller version"),
      (AR488, b"AR488 GPIB controller")],
 )  # fmt: skip
-def test_each_dialect_says_who_it_is(bench, dialect, text):
+def test_version_reply_names_the_dialect(bench, dialect, text):
     host = Host(FakeAdapter(bench().instrument, dialect))
     reply = host.send(b"++ver\n")
     assert reply.startswith(text)
     assert reply.endswith(b"\r\n")
 
 
-def test_a_query_and_its_reply(host):
+def test_query_is_answered_on_read(host):
     assert host.send(b"*IDN?\n") == b""
     assert host.send(b"++read eoi\n") == IDENTITY
 
@@ -82,7 +82,7 @@ def test_settings_read_back_and_are_checked(host):
     assert host.send(b"++addr 11 97\n++addr\n") == b"11 97\r\n"
 
 
-def test_every_byte_passes_when_it_is_escaped(host):
+def test_every_escaped_byte_passes(host):
     """A block upload with the four bytes that need an escape."""
     values = np.array([1.0, 2.0])
     payload = bytearray(values.astype(">f8").tobytes())
@@ -97,7 +97,7 @@ def test_every_byte_passes_when_it_is_escaped(host):
     assert seen == [(message, True)]
 
 
-def test_what_is_not_escaped_is_lost(host):
+def test_unescaped_special_bytes_are_lost(host):
     seen = []
     host.adapter.instrument.listen = lambda data, end: seen.append(data) or len(data)
     host.send(b"FREQ:STEP +1E+2\n")
@@ -131,7 +131,7 @@ def test_late_reply_times_out_silently_and_remains(bench):
     assert controller.instrument.status.standard_event == 0
 
 
-def test_410_after_a_reply_left_behind(host):
+def test_410_follows_unread_reply(host):
     host.send(b"*IDN?\n*OPT?\n")
     assert host.send(b"++read eoi\n") == b'"1D2"\n'
     assert host.send(b"SYST:ERR?\n++read eoi\n") == b'-410,"Query interrupted"\n'
@@ -145,7 +145,7 @@ def test_auto_reads_after_every_line_and_annoys(host):
     assert host.send(b"SYST:ERR?\n++read eoi\n") == b'-420,"Query unterminated"\n'
 
 
-def test_an_ar488_may_read_after_questions_only(arduino):
+def test_ar488_reads_automatically_after_queries_only(arduino):
     assert arduino.send(b"++auto 2\n*RST\n*OPT?\n") == b'"1D2"\n'
     assert arduino.send(b"++auto 0\nSYST:ERR?\n++read eoi\n") == b'+0,"No error"\n'
 
@@ -182,7 +182,7 @@ def test_serial_poll_request_clear_and_trigger(host):
     assert not host.adapter.instrument.remote
 
 
-def test_nobody_at_the_address(host):
+def test_empty_address_gives_no_reply(host):
     host.send(b"++addr 5\n*IDN?\n")
     assert host.wait(3.0) == b""
     assert host.send(b"++read eoi\n") == b""
@@ -247,7 +247,7 @@ def test_a_prologix_does_not(host):
     assert host.send(b"SYST:ERR?\n++read eoi\n") == b'+0,"No error"\n'
 
 
-def test_verbose_is_a_toggle_that_echoes(arduino):
+def test_verbose_toggles_the_echo(arduino):
     assert arduino.send(b"++verbose\n") == b"Verbose: ON\r\n> "
     assert arduino.send(b"++addr\n") == b"++addr\r\n11\r\n> "
     assert b"Verbose: OFF" in arduino.send(b"++verbose\n")
@@ -269,7 +269,7 @@ def test_a_serial_line_has_a_speed(bench):
     assert struct.unpack(">d", data[6:14])[0] == pytest.approx(51.2)
 
 
-def test_a_held_bus_is_given_up(bench):
+def test_blocked_bus_times_out(bench):
     controller = bench()
     controller.sweep("ABOR;:INIT;*WAI")
     host = Host(FakeAdapter(controller.instrument))
@@ -318,7 +318,7 @@ def test_late_eoi_ends_no_message(bench, eos, answered):
         (b"++flags 6\n*IDN?\n++read eoi\n", b"Send^OK\r\n" + IDENTITY + b"Read^OK\r\n"),
     ],
 )  # fmt: skip
-def test_what_only_an_ar488_answers(arduino, line, answer):
+def test_ar488_commands_are_unknown_to_prologix(arduino, line, answer):
     assert arduino.send(line) == answer
     prologix = Host(FakeAdapter(arduino.adapter.instrument, PROLOGIX_USB))
     if line.split()[0] != b"++spoll":

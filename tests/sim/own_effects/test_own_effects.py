@@ -130,7 +130,7 @@ def test_posterior_name_depends_on_effect_file_text(unit, tmp_path):
 @pytest.mark.parametrize(
     "name", ["../tight_bearing.py", "/tight_bearing.py", "a/../../b.py", "effect.txt", "gone.py"]
 )
-def test_a_name_that_leads_elsewhere_is_refused(unit, name, monkeypatch):
+def test_name_of_another_folder_is_refused(unit, name, monkeypatch):
     monkeypatch.setenv("LASHBENCH_TRUST_EFFECTS", "1")
     unit.write_text(unit.read_text().replace("tight_bearing.py", name))
     with pytest.raises(ConfigurationError, match=r"own_effects\.files") as refusal:

@@ -11,7 +11,7 @@ from sim.instrument.bus import TalkState
 # ------------------------------------------------------------ language
 
 
-def test_who_it_is(bench):
+def test_identity_is_sr785(bench):
     assert bench.ask("*IDN?").startswith("Stanford_Research_Systems,SR785,")
 
 
@@ -101,7 +101,7 @@ def test_amplitude_and_offset_share_five_volts(bench):
 # ------------------------------------------------------------ interfaces and buffers
 
 
-def test_replies_go_where_outx_says_whoever_asked(bench):
+def test_outx_selects_the_reply_port(bench):
     bench.send("OUTX 1")
     bench.send("SRCO?")
     assert bench.box.talk().state is TalkState.NOTHING

@@ -22,7 +22,7 @@ FILLER = -3.4028235e38
 # ------------------------------------------------------------ sweep and source
 
 
-def test_a_sweep_measures_what_is_there():
+def test_sweep_measures_the_plant():
     bench = Bench()
     bench.swept(points=21, VIEW="0,3")
     bench.send("VIEW 1,4")
@@ -36,7 +36,7 @@ def test_a_sweep_measures_what_is_there():
         assert complex(one, other) == pytest.approx(known_gain(hz), rel=1e-5)
 
 
-def test_bins_ascend_whichever_way_it_sweeps():
+def test_bins_ascend_in_either_sweep_direction():
     bench = Bench()
     bench.swept(SSTR="2,200", SSTP="2,100")
     assert float(bench.ask("DBIN? 0,0")) == 100.0
@@ -141,7 +141,7 @@ def test_point_takes_longer_of_cycles_or_time(settle, integrate, hz, seconds):
     assert bench.box.agenda.now_s - begun_s == pytest.approx(10 * seconds, rel=0.02, abs=0.03)
 
 
-def test_the_source_drives_only_while_it_sweeps():
+def test_source_drives_only_during_sweep():
     bench = Bench()
     assert bench.box.driven_v == 0.0
     bench.swept(points=40)
@@ -170,7 +170,7 @@ def test_entering_fft_drives_if_switch_is_on():
     assert bench.box.driven_v == 0.0
 
 
-def test_a_ramp_takes_its_time():
+def test_ramp_has_its_duration():
     bench = Bench()
     bench.swept(points=40, SRMP="1", SRAT="0.5")
     bench.send("STRT")
@@ -206,7 +206,7 @@ def test_too_small_input_range_clips_and_reports():
     assert 0.25 < bench.trace()[0] < 0.45
 
 
-def test_autorange_goes_up_alone_unless_it_tracks():
+def test_autorange_only_rises_unless_tracking():
     for tracking, step in (("0", 0), ("1", -20)):
         bench = Bench(gain=lambda hz: 0.1)
         bench.swept(A2RG="1", I2RG="0 dBVpk", I2AR=tracking)

@@ -144,7 +144,7 @@ def test_report_is_written_to_working_folder(db, tmp_path, monkeypatch):
     assert "SN 7" in text
 
 
-def test_an_earlier_session_stands_behind_the_sweep(db):
+def test_earlier_session_is_drawn_behind_sweep(db):
     async def way():
         async with operated(db) as op:
             await op.connects("sim:")

@@ -48,7 +48,7 @@ def test_response_replay_takes_its_cycle_time():
 
 
 @pytest.mark.parametrize(("name", "text"), [("x.csv", "no table"), ("x.jsonl", "{}")])
-def test_what_is_no_recording_is_refused(tmp_path, name, text):
+def test_invalid_recording_is_refused(tmp_path, name, text):
     path = tmp_path / name
     path.write_text(text)
     with pytest.raises(InputError):

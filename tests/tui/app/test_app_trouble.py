@@ -232,7 +232,7 @@ def test_the_stop_key_works_without_a_session(tmp_path):
         run(lambda: way(url))
 
 
-def test_no_instrument_says_what_to_try(tmp_path):
+def test_missing_instrument_states_the_remedy(tmp_path):
     async def way():
         async with operated(tmp_path / "bench.db") as op:
             await op.goes_to(2)

@@ -155,7 +155,7 @@ def told_of(document):
     return "\n".join(line.plain for line in diagnosis_lines(document, COLOURS))
 
 
-def test_what_to_do_next_is_one_sentence():
+def test_next_step_is_one_sentence():
     named = DIAGNOSIS | {"next_measurement": None}
     assert next_sentence(named).startswith("to make sure, compare what is mounted")
     consistent = named | {"verdict": "consistent", "causes": []}
@@ -212,7 +212,7 @@ def test_diagnosis_states_causes_rivals_and_next_sweep():
     )
 
 
-def test_without_colour_everything_is_still_said(tmp_path, monkeypatch):
+def test_screen_is_complete_without_colour(tmp_path, monkeypatch):
     async def way():
         async with operated(tmp_path / "bench.db") as op:
             await op.connects("sim:")

@@ -134,7 +134,7 @@ def test_axes_labels_and_curves_can_be_read(theme):
     assert seen == {"axis", "data"}
 
 
-def test_without_known_colours_nothing_is_hidden():
+def test_plot_is_complete_without_known_colours():
     async def steps(app, pilot):
         for segment in app.query_one("#gain", Chart).render_line(10):
             front, back = segment.style.color.name, segment.style.bgcolor.name

@@ -55,7 +55,7 @@ def test_unit_file_from_commission_is_judged(tmp_path, sweep, capsys):
     ("tolerance", "points", "said"),
     [("0", 17, "all of its values are exact"), ("5%", 9, "needs 15 or more")],
 )
-def test_what_cannot_be_identified_is_refused(tmp_path, sweep, capsys, tolerance, points, said):
+def test_unidentifiable_drive_is_refused(tmp_path, sweep, capsys, tolerance, points, said):
     whole = read_response(sweep)
     kept = [hz in sorted(set(whole.frequency_hz))[:points] for hz in whole.frequency_hz]
     write_response(whole.take(kept), tmp_path / "few.csv")

@@ -140,12 +140,12 @@ def test_surprise_differs_by_seed_and_can_repeat(quick, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("words", [["--seed", "1"], ["--surprise", "--seed", "-1"]])
-def test_a_seed_goes_with_a_surprise(words, capsys):
+def test_seed_requires_surprise(words, capsys):
     assert main(["demo", *words]) == 2
     assert "--seed" in capsys.readouterr().err
 
 
-def test_interrupted_in_the_sweep_it_ends_safe(quick, tmp_path, capsys, monkeypatch):
+def test_interrupted_sweep_ends_safe(quick, tmp_path, capsys, monkeypatch):
     from daq.control import SessionControl
 
     _, demo = quick("load-inertia")
@@ -178,7 +178,7 @@ def test_interrupted_in_the_sweep_it_ends_safe(quick, tmp_path, capsys, monkeypa
         (document(verdict="unexplained"), "missed"),
     ],
 )
-def test_right_and_wrong_are_told_apart(found, outcome):
+def test_right_and_wrong_guesses_are_distinguished(found, outcome):
     rng = np.random.default_rng(1)
     hidden = secrets.Hidden(0.4, draw_effect(ADSS, (110, 170), rng, ["cable-stiffness"]), 1)
     assert secrets.compare(hidden, found) == outcome

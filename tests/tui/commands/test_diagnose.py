@@ -206,7 +206,7 @@ def test_unwritable_folder_is_refused_before_diagnosing(calls, capsys):
     assert line.startswith("error: /proc: cannot be used as a directory")
 
 
-def test_figures_go_where_they_are_asked_for(calls, capsys, monkeypatch, tmp_path):
+def test_figures_are_written_to_requested_folder(calls, capsys, monkeypatch, tmp_path):
     calls.compute = replace(calls.compute, draw_diagnosis=lambda result, folder: [folder / "a.png"])
     assert (
         main(["diagnose", SWEEP, "--unit", "adss", "--plots", str(tmp_path / "out")], calls.compute)

@@ -140,7 +140,7 @@ def test_an_old_python(monkeypatch):
     assert finding.remedy.startswith("install Python >=3.11")
 
 
-def test_packages_that_are_missing_old_or_broken(monkeypatch, tmp_path):
+def test_missing_old_or_broken_packages_are_reported(monkeypatch, tmp_path):
     (tmp_path / "broken_here.py").write_text("raise OSError('libfoo.so: cannot open')")
     monkeypatch.syspath_prepend(tmp_path)
     lines = ["numpy<2.5,>=99", "no-such-package>=1", "broken_here>=1", "pytest", 'x>=1; extra=="y"']
@@ -243,7 +243,7 @@ def test_terminals_good_and_bad(terminal):
     assert "UTF-8 locale" in only(surroundings.check_terminal()).remedy
 
 
-def test_folders_that_cannot_be_written(monkeypatch, tmp_path):
+def test_unwritable_folders_are_reported(monkeypatch, tmp_path):
     for variable in ("XDG_DATA_HOME", "XDG_CACHE_HOME", "XDG_STATE_HOME"):
         monkeypatch.setenv(variable, str(tmp_path / "not" / "yet"))
     assert all(finding.state == "ok" for finding in surroundings.check_folders())

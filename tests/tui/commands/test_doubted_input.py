@@ -104,7 +104,7 @@ def loose(tmp_path):
     return str(path)
 
 
-def test_the_history_passes_no_features_of_it(mistaken, loose, capsys):
+def test_history_passes_no_doubtful_features(mistaken, loose, capsys):
     words = ["history", "--db", str(mistaken), "--estimate", "none", "--judge", loose, "--json"]
     assert cli.main(words) == 7
     (row,) = json.loads(capsys.readouterr().out)["measurements"]
@@ -126,7 +126,7 @@ def test_extract_passes_no_noise_or_half_sweep(loose, tmp_path, capsys):
         assert ("UNDECIDED by limits loose" in capsys.readouterr().out) == (code == 7)
 
 
-def test_the_history_makes_no_estimate_of_it(mistaken, capsys):
+def test_history_estimates_no_doubtful_response(mistaken, capsys):
     assert cli.main(["history", "--db", str(mistaken), "--json"]) == 0
     out, err = capsys.readouterr()
     (row,) = json.loads(out)["measurements"]

@@ -34,7 +34,7 @@ def response_to(words):
 
 @pytest.mark.parametrize("words", SIGNALS)
 @pytest.mark.parametrize("kind", ["csv", "h5", "uff", "mat"])
-def test_every_file_keeps_what_is_refused(words, kind, tmp_path):
+def test_file_formats_preserve_refused_excitation(words, kind, tmp_path):
     path = tmp_path / f"r.{kind}"
     write_response(response_to(words), path)
     for answer in (estimate_response, diagnose_response):
@@ -44,7 +44,7 @@ def test_every_file_keeps_what_is_refused(words, kind, tmp_path):
 
 @pytest.mark.parametrize("verb", ["estimate", "diagnose"])
 @pytest.mark.parametrize("more", [[], ["--as-is"]])
-def test_the_verbs_refuse_it_at_once(verb, more, tmp_path, capsys):
+def test_verbs_refuse_excitation_at_once(verb, more, tmp_path, capsys):
     path = tmp_path / "r.csv"
     write_response(response_to("noise"), path)
     began_s = time.process_time()
@@ -59,7 +59,7 @@ def test_the_verbs_refuse_it_at_once(verb, more, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("more", [[], ["--as-is"]])
-def test_a_report_shows_it_without_an_estimate(more, tmp_path):
+def test_report_omits_estimate_of_refused_excitation(more, tmp_path):
     path, out = tmp_path / "r.csv", tmp_path / "r.html"
     write_response(response_to("noise"), path)
     assert main(["report", str(path), "--unit", "adss", "--out", str(out), *more]) == 0

@@ -65,7 +65,7 @@ def test_lost_connection_ends_with_source_off(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("made", ["", "in/two/"])
-def test_what_is_not_there_leaves_no_folder(tmp_path, capsys, made):
+def test_missing_instrument_leaves_no_folder(tmp_path, capsys, made):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         url = f"TCPIP::127.0.0.1::{free.getsockname()[1]}::SOCKET"
@@ -96,7 +96,7 @@ def test_no_check_exceeds_the_given_level(tmp_path):
 
 
 @pytest.mark.parametrize(("words", "code"), [(("--level", "0"), 5), (("--level", "3"), 5), ((), 2)])
-def test_nothing_is_sent_without_leave(tmp_path, words, code):
+def test_nothing_is_sent_without_permission(tmp_path, words, code):
     box = simulated("", LinearPlant(known_gain))
     with served(box) as url:
         assert first_day(url, tmp_path / "out", *words) == code

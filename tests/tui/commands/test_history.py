@@ -224,7 +224,7 @@ def ratios(run, *words, **options):
     return [None if ratio is None else ratio["value"] for ratio in ratios]
 
 
-def test_missing_estimates_are_made_once_and_kept(run, db):
+def test_missing_estimates_are_made_once(run, db):
     run(*measuring())
     run(*measuring())
     calls = []
@@ -300,7 +300,7 @@ def test_lost_cluster_stores_no_failed_estimate(run, db):
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".h5", ".uff", ".mat"])
-def test_export_gives_back_what_was_stored(run, db, tmp_path, suffix):
+def test_export_returns_stored_response(run, db, tmp_path, suffix):
     run(*measuring("--notes", "n", "--serial", "7"))
     out = tmp_path / f"x{suffix}"
     assert run("export", 1, "--out", out)[0] == 0
@@ -326,7 +326,7 @@ def test_export_gives_back_what_was_stored(run, db, tmp_path, suffix):
         (("one", "--out", "x.csv"), "not a whole number"),
     ],
 )
-def test_what_cannot_be_exported(run, tmp_path, monkeypatch, words, said):
+def test_impossible_export_is_refused(run, tmp_path, monkeypatch, words, said):
     monkeypatch.chdir(tmp_path)
     run(*measuring())
     code, _, err = run("export", *words)

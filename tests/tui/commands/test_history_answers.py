@@ -75,7 +75,7 @@ def test_refuted_model_gives_no_number_or_trend(run, db):
         (DIAGNOSIS, "open", None),
     ],
 )
-def test_a_diagnosis_decides_whose_numbers_are_told(run, db, diagnosis, state, ratio):
+def test_diagnosis_decides_which_numbers_are_shown(run, db, diagnosis, state, ratio):
     run(*measuring("--serial", "S"))
     estimated(db, 1, REFUTED)
     diagnosed(db, 1, diagnosis)
@@ -118,7 +118,7 @@ def test_several_models_left_widen_the_interval(run, db):
 
 
 @pytest.mark.parametrize("value", ["-5.0", "7.5", "1e300"])
-def test_a_ratio_that_cannot_be_is_refused(run, db, value):
+def test_impossible_ratio_is_refused(run, db, value):
     run(*measuring("--serial", "S"))
     diagnosed(db, 1, EXPLAINED)
     with sqlite3.connect(db) as raw:

@@ -88,7 +88,7 @@ VERBS = {
 
 @pytest.mark.parametrize("verb", VERBS)
 @pytest.mark.parametrize("way", ["itself", "a link", "a hard link"])
-def test_no_verb_writes_over_what_it_reads(verb, way, tmp_path, capsys):
+def test_no_verb_overwrites_its_input(verb, way, tmp_path, capsys):
     name, prepare = VERBS[verb]
     path = tmp_path / name
     words = prepare(path)
@@ -119,7 +119,7 @@ def test_interrupted_diagnosis_leaves_no_empty_folder(tmp_path):
     assert not (tmp_path / "some").exists()
 
 
-def test_a_folder_of_somebody_else_stays(tmp_path):
+def test_foreign_folder_is_kept(tmp_path):
     plots = tmp_path / "mine"
     plots.mkdir()
     response = a_response(tmp_path / "r.csv")

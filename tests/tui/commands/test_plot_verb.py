@@ -95,7 +95,7 @@ def test_model_or_stored_answer_is_drawn_beside(run, db, short, tmp_path):
         (["gone.csv", "--out", "a.png"], "gone.csv"),
     ],
 )
-def test_what_is_refused_leaves_no_picture(run, short, tmp_path, monkeypatch, words, said):
+def test_refused_plot_leaves_no_picture(run, short, tmp_path, monkeypatch, words, said):
     monkeypatch.chdir(tmp_path)
     code, _, err = run("plot", short, *words, history=False)
     assert (code, err.count("\n")) == (2, 1)

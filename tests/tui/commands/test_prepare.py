@@ -66,7 +66,7 @@ def prepared(folder, until=None):
     return effort.simulated_s, told
 
 
-def test_one_that_was_interrupted_goes_on(tmp_path):
+def test_interrupted_preparation_is_resumed(tmp_path):
     prepared(tmp_path, until=16)
     made = len(list(tmp_path.iterdir()))
     left, told = prepared(tmp_path)

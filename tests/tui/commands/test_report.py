@@ -102,7 +102,7 @@ def found():
         return makings.diagnosis(patch, ("load-inertia",), [("load-inertia",)])
 
 
-def test_a_diagnosis_stands_in_the_report(found, calls, tmp_path):
+def test_report_contains_the_diagnosis(found, calls, tmp_path):
     calls.compute = replace(calls.compute, diagnose_response=lambda *_, **__: found)
     out = tmp_path / "r.html"
     assert cli.main(["report", SAMPLE, "--unit", "adss", "--out", str(out)], calls.compute) == 0

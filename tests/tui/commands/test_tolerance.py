@@ -35,7 +35,7 @@ def answer(words, capsys):
     return json.loads(capsys.readouterr().out)
 
 
-def test_every_answer_says_what_was_believed(estimate, silent, capsys):
+def test_every_answer_states_tolerance_used(estimate, silent, capsys):
     shipped = answer([*estimate, "adss"], capsys)
     assert shipped["tolerance"]["R_m"] == 0.005
     assert shipped["tolerance"]["J_m"] == 0.0

@@ -43,7 +43,7 @@ def test_measurement_includes_its_predecessors_latest_first(measured):
     assert together(store, alone) == [alone]
 
 
-def test_what_cannot_be_followed_is_left_out(measured):
+def test_invalid_predecessor_is_omitted(measured):
     store, add = measured
     assert together(store, itself := add(2)) == [itself]
     other = add(None, serial="T")

@@ -5,7 +5,7 @@ from outputs.screen import operated, run
 from daq.configs import config_path
 
 
-def test_the_unit_step_tells_what_is_unusual(tmp_path):
+def test_unit_step_reports_unusual_values(tmp_path):
     text = config_path("templates", "two-stage").read_text(encoding="utf-8")
     odd, wrong = tmp_path / "odd.toml", tmp_path / "wrong.toml"
     odd.write_text(text.replace("b_t_deg = 0.12", "b_t_deg = 7.2"), encoding="utf-8")

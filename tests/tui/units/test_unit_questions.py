@@ -74,7 +74,7 @@ def test_answers_are_cross_checked_and_revisable():
     assert (unit_of(text).motor.k_b, unit_of(text).motor.k_t) == (0.035, 0.035)
 
 
-def test_an_input_that_ends_writes_nothing():
+def test_closed_input_writes_nothing():
     with pytest.raises(InputError, match="nothing was written"):
         ask_for_values(template("two-stage"), lambda text: None, lambda: "")
 
@@ -85,7 +85,7 @@ def test_any_input_gives_a_valid_unit_file(answers):
     assert unit_of(asked(answers)[0]).stages == 2
 
 
-def test_without_a_terminal_it_asks_nobody(tmp_path, capsys):
+def test_missing_terminal_asks_no_questions(tmp_path, capsys):
     out = tmp_path / "x.toml"
     command = [sys.executable, "-m", "tui.cli", "new-unit", "--ask", "--out", str(out)]
     done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True)
@@ -169,7 +169,7 @@ def test_warnings_and_refusals_of_a_checked_file(check, tmp_path):
     ("words", "said"),
     [([], "give --out FILE"), (["--check", "a.toml", "--out", "b.toml"], "leave out the other")],
 )
-def test_it_does_one_thing(words, said, tmp_path, monkeypatch, capsys):
+def test_conflicting_options_write_nothing(words, said, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert cli.main(["new-unit", *words]) == 2
     assert said in capsys.readouterr().err

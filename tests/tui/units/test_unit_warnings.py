@@ -52,7 +52,7 @@ def test_every_verb_with_unit_is_covered():
 
 
 @pytest.mark.parametrize("verb", WORDS)
-def test_what_is_unusual_is_told_once(verb, unit_file, capsys):
+def test_unusual_value_is_reported_once(verb, unit_file, capsys):
     unit_file("b_t_deg", 7.2)
     assert cli.main([verb, *WORDS[verb], "--unit", "mine.toml"]) != 0
     out, err = capsys.readouterr()
@@ -62,7 +62,7 @@ def test_what_is_unusual_is_told_once(verb, unit_file, capsys):
 
 
 @pytest.mark.parametrize("verb", ["simulate", "measure"])
-def test_what_cannot_be_is_refused(verb, unit_file, tmp_path, capsys):
+def test_impossible_value_is_refused(verb, unit_file, tmp_path, capsys):
     unit_file("k_t", 46.0)
     assert cli.main([verb, *WORDS[verb], "--unit", "mine.toml"]) == 2
     assert "mine.toml: values that cannot be: motor.k_b 0.046 V.s/rad" in capsys.readouterr().err

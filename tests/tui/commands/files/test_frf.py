@@ -193,7 +193,7 @@ def test_inconsistent_options_are_refused_in_one_line(change, said, tmp_path, ca
         (["--input", "V_i", "--output", "1"], "the output rises"),
     ],
 )
-def test_columns_that_are_no_record_are_refused(columns, said, tmp_path, capsys):
+def test_columns_without_record_are_refused(columns, said, tmp_path, capsys):
     path, _ = written(tmp_path, "csv", record("a periodic signal"))
     out = tmp_path / "out.csv"
     assert main(["frf", str(path), *columns, "--time", "time", "--out", str(out)]) == 2

@@ -12,7 +12,7 @@ from daq.store import Store
 from tui.bench import drives_hardware
 
 
-def test_a_measurement_tells_what_the_contract_says(run, db):
+def test_measure_json_has_contract_fields(run, db):
     code, out, err = run(*measuring("--json"))
     assert code == 0
     document = json.loads(out)
@@ -149,11 +149,11 @@ def test_hardware_is_not_driven_without_a_word(run, db, monkeypatch):
         ("prologix-tcp:h:1", True),
     ],
 )
-def test_what_counts_as_hardware(url, is_hardware):
+def test_address_decides_on_hardware(url, is_hardware):
     assert drives_hardware(url) is is_hardware
 
 
-def test_a_dry_run_touches_nothing(run, db):
+def test_dry_run_changes_nothing(run, db):
     code, out, _ = run(*measuring("--dry-run", "--json", url="prologix:/dev/none"))
     document = json.loads(out)
     assert code == 0

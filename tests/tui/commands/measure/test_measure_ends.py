@@ -192,7 +192,7 @@ SAID = ["--serial", "S", "--operator", "anna", "--notes", "one", "--spacing", "l
         (["--recipe", "adss", "--points", "5"], "start_hz 100.0 was given by recipe ADSS"),
     ],
 )
-def test_what_contradicts_the_stored_measurement_is_refused(run, db, words, said):
+def test_contradiction_to_stored_measurement_is_refused(run, db, words, said):
     assert run(*measuring(*SAID))[0] == 0
     bare = ["measure", "--unit", "adss", "--instrument", "sim:", "--resume", "1"]
     code, out, err = run(*bare, *words)

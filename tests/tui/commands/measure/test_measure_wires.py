@@ -48,7 +48,7 @@ def measure(db, url, *words) -> int:
     )
 
 
-def test_every_wire_gives_the_same_points(tmp_path):
+def test_every_wire_gives_equal_points(tmp_path):
     db = tmp_path / "bench.db"
     assert measure(db, "sim:?ratio=0.3&seed=4") == 0
     for wire in WIRES:
@@ -92,7 +92,7 @@ def test_all_wires_of_drivers_give_equal_points(tmp_path):
 
 
 @pytest.mark.parametrize("driver", [driver.scheme for driver in DRIVERS])
-def test_an_adapter_whose_eoi_comes_late_measures(tmp_path, driver):
+def test_adapter_with_late_eoi_measures(tmp_path, driver):
     """Its instrument sees no EOI: a line feed must end each message."""
     box = simulated(driver, LinearPlant(known_gain))
     with served(box, "prologix_pty", driver, dialect="ar488-late-eoi") as url:
@@ -101,7 +101,7 @@ def test_an_adapter_whose_eoi_comes_late_measures(tmp_path, driver):
 
 
 @pytest.mark.parametrize("flow", ["hardware", "software"])
-def test_flow_control_is_that_of_the_address(tmp_path, flow):
+def test_flow_control_follows_the_address(tmp_path, flow):
     with served(simulated("sr785", LinearPlant(known_gain)), "serial_pty", "sr785") as url:
         assert measure(tmp_path / "bench.db", f"{url}?baud=19200&flow={flow}") == 0
 
@@ -118,7 +118,7 @@ def test_another_seed_gives_other_points(tmp_path):
 @pytest.mark.parametrize(
     ("driver", "wire"), [("", "tcp"), ("", "prologix_pty"), ("sr785", "serial_pty")]
 )
-def test_kill_9_at_random_moments_loses_nothing(tmp_path, driver, wire):
+def test_random_kill_9_loses_no_point(tmp_path, driver, wire):
     """Two kills of one measurement, then on to the end: equal to an unbroken one."""
     chance = random.Random(wire)
     db = tmp_path / "bench.db"
@@ -198,7 +198,7 @@ def test_returning_adapter_is_found_again(tmp_path, capsys, wire):
         assert measure(db, url, "--resume", "1") == 0
 
 
-def test_what_the_watchdog_proves_later_is_told(tmp_path, capsys):
+def test_later_proof_of_watchdog_is_reported(tmp_path, capsys):
     """The gateway is away for longer than the session waits."""
     db, away = tmp_path / "bench.db", "link-away:point=3,seconds=11"
     box = linear_analyser(known_gain, [away])

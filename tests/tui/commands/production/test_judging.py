@@ -182,7 +182,7 @@ def history(tmp_path_factory):
         ("causes_not_tolerated = ['load-inertia']", UNDECIDED),
     ],
 )
-def test_history_and_report_judge_what_is_stored(run, limits, history, tmp_path, table, code):
+def test_history_and_report_judge_stored_results(run, limits, history, tmp_path, table, code):
     path = limits(table)
     found, out, _ = run("history", "--db", history, "--estimate", "none", "--judge", path, "--json")
     (row,) = json.loads(out)["measurements"]
@@ -199,7 +199,7 @@ def test_history_and_report_judge_what_is_stored(run, limits, history, tmp_path,
     assert run(*words)[0] == 0
 
 
-def test_measure_judges_what_it_measured(run, limits, tmp_path):
+def test_measure_judges_its_result(run, limits, tmp_path):
     words = ["measure", "--unit", "adss", "--instrument", "sim:?ratio=0.3&seed=1", *PLAN, *QUICK]
     words += ["--db", tmp_path / "bench.db", "--json"]
     for table, code in [("arf_hz = { lower = 100, upper = 200 }", PASS),

@@ -243,7 +243,7 @@ def test_any_serial_is_taken_clean_or_refused(text):
         (b"\xff\xfe\n", ["��"]),
     ],
 )
-def test_lines_end_as_a_scanner_ends_them(data, lines):
+def test_scanner_line_endings_are_recognised(data, lines):
     assert scanned(data) == lines
 
 
@@ -300,7 +300,7 @@ def test_table_escapes_spreadsheet_formulas(tmp_path):
         ("sleep 20", "it took longer than 0.2 s and was ended"),
     ],
 )
-def test_what_a_command_does_is_told(command, fault):
+def test_result_of_command_is_reported(command, fault):
     assert Hook(command).run("{}", bound_s=0.2 if "sleep" in command else 30.0) == fault
 
 
