@@ -44,8 +44,9 @@ may lie, and groups that each gets. Parts of the first take part, too: they have
 with, and may be all that there is."""
 
 _LOST = 60.0
-"""A part this far behind in log odds on all frequencies gets no further runs there: of one set in
-traces of refinement the log odds moved by up to 95, from -142 to -47, as its runs closed in."""
+"""A part this far behind in log odds on all frequencies gets no further runs there, but for the
+datasheet's machine: as its runs closed in on a response without noise, over datasheet values at 5 %,
+its log odds rose from 516 behind to 197 ahead."""
 
 _LEAST = 1e-12
 """Probability of a set that the network rules out."""
@@ -147,7 +148,11 @@ def _leading(
     ranked = sorted(odds, key=lambda key: -odds[key])
     first = odds[ranked[0]]
     near = [key for key in ranked[:most] if odds[key] >= first - behind]
-    parts = (key for key in ranked if set(key) < set(ranked[0]) and odds[key] >= first - lost)
+    parts = (
+        key
+        for key in ranked
+        if set(key) < set(ranked[0]) and (not key or odds[key] >= first - lost)
+    )
     return list(dict.fromkeys([*near, *parts]))
 
 

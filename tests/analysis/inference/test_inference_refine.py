@@ -58,6 +58,16 @@ def test_every_part_of_leading_set_is_examined(world):
     assert (LAG, MESH) in {one.hypothesis.effects for one in found.candidates}
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_plain_model_gets_runs_to_the_end(world, seed):
+    """However far behind it seems, it is compared by as many runs as any other set."""
+    seen = observed((LAG, LOAD), [0.9, 0.95], seed)
+    found = refine(Untrained((LAG, LOAD)), seen, seed=seed, executor=world)
+    runs = {one.hypothesis.effects: len(one.population) for one in found.candidates}
+    assert found.log_odds[()] < found.log_odds[LAG, LOAD] - 60.0
+    assert runs[()] == max(runs.values())
+
+
 def test_withheld_cause_is_not_simulated(world):
     found = refine(
         Untrained((LAG, LOAD)), observed((LOAD,), [0.8]), without=(LOAD,), executor=world
