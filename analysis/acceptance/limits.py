@@ -69,11 +69,6 @@ class LimitSet:
         """Whether a limit is of ARF, RF or damping."""
         return any(quantity in FEATURE_QUANTITIES for quantity, _ in self.acceptance.bounds())
 
-    @property
-    def needs_diagnosis(self) -> bool:
-        """Whether a cause is not tolerated, which only a diagnosis tells."""
-        return bool(self.acceptance.causes_not_tolerated)
-
 
 def load_limits(name_or_path: str) -> LimitSet:
     """Read a file of limits, or take those of a unit file.
