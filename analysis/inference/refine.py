@@ -44,9 +44,9 @@ may lie, and groups that each gets. Parts of the first take part, too: they have
 with, and may be all that there is."""
 
 _LOST = 60.0
-"""A part this far behind in log odds on all frequencies gets no further runs there, but for the
-datasheet's machine: as its runs closed in on a response without noise, over datasheet values at 5 %,
-its log odds rose from 516 behind to 197 ahead."""
+"""A part this far behind in log odds on all frequencies gets no further runs there. The plain model
+does: as its runs closed in on a response without noise, over datasheet values at 5 %, its log odds
+rose from 516 behind to 197 ahead."""
 
 _LEAST = 1e-12
 """Probability of a set that the network rules out."""
