@@ -12,12 +12,13 @@ LOWEST := .venv/lowest
 # Tests start some hundred programs; each would compile all that it imports.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help demo line test tests check pyright lowest clients first-day pictures train training bench blind faults fuzz soak docs audit lock clean
+.PHONY: help demo line test tests long check pyright lowest clients first-day pictures train training bench blind faults fuzz soak docs audit lock clean
 
 help:
 	@echo "make demo    the whole job without hardware; results in demo/"
 	@echo "make test    all checks and tests"
 	@echo "make check   style, types, floors, links and readability; under a minute"
+	@echo "make long    tests that compute whole answers; some minutes"
 	@echo "make pyright types once more, by another checker; a minute"
 	@echo "make lowest  some tests with the lowest versions that are allowed; two minutes"
 	@echo "make clients programs of others against the simulated analysers; a minute"
@@ -43,6 +44,10 @@ test: $(READY)
 
 tests: $(READY)
 	@$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile --no-loadscope-reorder
+
+# What asks once more, of other machines or in full, what a quick test asks every day.
+long: $(READY)
+	@$(BIN)/python -m pytest -m "long and not study" --numprocesses $(JOBS) --dist load tests
 
 check: $(READY)
 	@$(BIN)/ruff check --quiet .

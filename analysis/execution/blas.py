@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import scipy.linalg  # noqa: F401  it brings a library of its own, which the limit has to find
 from threadpoolctl import threadpool_limits
 
 __all__ = ["on_one_core"]

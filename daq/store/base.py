@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import Any, Self
 
 import sqlalchemy as sa
-from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy.dialects import sqlite
 from sqlalchemy.exc import DBAPIError
 
 from daq.errors import FileFormatError, InputError
@@ -156,8 +156,12 @@ def shared(
     """
     # Written before it is read: a transaction that reads first could lose the
     # race for the write lock to another program.
-    dialect = postgresql if connection.dialect.name == "postgresql" else sqlite
-    connection.execute(dialect.insert(where).values(row).on_conflict_do_nothing())
+    insert: Any = sqlite.insert
+    if connection.dialect.name == "postgresql":
+        from sqlalchemy.dialects import postgresql
+
+        insert = postgresql.insert
+    connection.execute(insert(where).values(row).on_conflict_do_nothing())
     names = row if by is None else (by,)
     same = [where.c[name] == row[name] for name in names]
     return int(connection.execute(sa.select(where.c.id).where(*same)).scalar_one())

@@ -14,7 +14,6 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm, matrix_balance
 
 from sim.engine.nonlinearity import Law, Nonlinearity, Reading, held
 
@@ -103,6 +102,8 @@ def _sequence(
     system: LinearParts, command: Nonlinearity, sees: Real, z: Complex, period: float
 ) -> Complex:
     """Samples of what a sensor sees over those of the command, by the exact discretisation."""
+    from scipy.linalg import expm, matrix_balance
+
     n = len(system.b)
     whole = np.zeros((n + 1, n + 1))
     whole[:n, :n], whole[:n, n] = system.A, command.inlet * command.feedthrough

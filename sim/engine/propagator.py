@@ -18,7 +18,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm, matrix_balance
 
 from sim.engine.layout import STEPS_SEEN
 from sim.engine.system import PiecewiseLinearSystem
@@ -98,6 +97,9 @@ def find_modes(system: PiecewiseLinearSystem, worst_condition: float = WORST_CON
 
 @lru_cache(maxsize=64)
 def _modes_of(matrix: bytes, n: int, worst_condition: float) -> Modes:
+    # Loaded on use: it takes longer than all else that a measurement loads, which needs none of it.
+    from scipy.linalg import matrix_balance
+
     A = np.frombuffer(matrix).reshape(n, n)
     # Stiffness over inertia makes entries of 1e9 beside entries of 1; balancing
     # keeps eigenvectors and exponentials accurate.
@@ -188,6 +190,8 @@ def _exponential(
     A: NDArray[np.float64], forcings: NDArray[np.float64], h: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The same as `_turn` from one exponential of an augmented matrix (Van Loan 1978)."""
+    from scipy.linalg import expm
+
     p, k = forcings.shape
     augmented = np.zeros((p + k, p + k))
     augmented[:p, :p], augmented[:p, p:] = A * h, forcings * h

@@ -2,7 +2,6 @@
 
 import math
 
-import control
 import numpy as np
 import pytest
 from oracle import rk4
@@ -41,7 +40,7 @@ def linear_response(parameters, extras, frequencies_hz):
     at = through(p["k_g1"] + p["c_g1"] * s, at + p["J_g1"] * s**2) / p["N_1"] ** 2
     rotor = p["J_m"] * s + p["B_m"] + at / s
     motor = p["k_a"] * p["k_t"] / ((p["L_a"] * s + p["R_m"]) * rotor + p["k_t"] * p["k_b"])
-    return motor * p["k_ts"] * control.tf([723439.0], [1.0, 1710.0, 723439.0])(s)
+    return motor * p["k_ts"] * 723439.0 / (s**2 + 1710.0 * s + 723439.0)
 
 
 def through(spring, beyond):

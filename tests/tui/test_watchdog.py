@@ -5,6 +5,7 @@ which lives here.
 """
 
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -372,13 +373,20 @@ print(sorted(set(sys.modules) - before), state)
 """
 
 
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    """A history with one measurement."""
+    db = tmp_path_factory.mktemp("measured") / "bench.db"
+    short = ["--level", "1", "--start", "130", "--stop", "170", "--points", "2", *QUICK]
+    place = ["--unit", "adss", "--instrument", "sim:", "--db", str(db)]
+    subprocess.run([LASHBENCH, "measure", *place, *short], check=True, capture_output=True)
+    return db
+
+
 @pytest.mark.parametrize(("driver", "wire"), EVERY_WIRE)
-def test_watchdog_loads_no_module_when_needed(tmp_path, driver, wire):
-    db = tmp_path / "bench.db"
+def test_watchdog_loads_no_module_when_needed(measured, db, driver, wire):
+    shutil.copy(measured, db)
     with served(simulated(driver, LinearPlant(known_gain)), wire, driver) as url:
-        short = ["--level", "1", "--start", "130", "--stop", "170", "--points", "2", *QUICK]
-        place = ["--unit", "adss", "--instrument", "sim:", "--db", str(db)]
-        subprocess.run([LASHBENCH, "measure", *place, *short], check=True, capture_output=True)
         run = subprocess.run(
             [sys.executable, "-I", "-c", LOADED_LATER, url, str(db)],
             capture_output=True, text=True, check=False,

@@ -1,6 +1,5 @@
 """The engine and the oracle, asked the same question in the same words; for the tests alone."""
 
-import control
 import numpy as np
 from oracle import rk4
 
@@ -44,6 +43,8 @@ def state_space(unit, c_s1=0.0, B_L=0.0, K_c=0.0):
     A[12, 2], A[12, 11], A[12, 12] = 723439.0 * p["k_ts"], -723439.0, -1710.0
     C = np.zeros((1, 13))
     C[0, 11] = 1.0
+    import control  # it loads matplotlib; most who draw on this file need neither
+
     return control.ss(A, B, C, 0.0)
 
 

@@ -5,20 +5,26 @@ import pytest
 from analysis.diagnosis import diagnose_response
 from daq.configs import config_path
 from daq.plan import SweepPlan, spaced_frequencies
+from sim.catalogue import CATALOGUE
 from sim.effects import EffectSetting
 from sim.response import simulate
 from sim.unit import load_unit
 
+FEW = {"load-inertia", "motor-inertia", "total-backlash", "mesh1-stiffness", "mesh2-stiffness"}
+
 
 @pytest.mark.slow
-def test_heavier_load_is_found_on_one_stage(tmp_path):
+@pytest.mark.parametrize("asked", [FEW, pytest.param(set(CATALOGUE), marks=pytest.mark.long)])
+def test_heavier_load_is_found_on_one_stage(asked, tmp_path):
     unit = load_unit(str(config_path("templates", "one-stage")))
     plan = SweepPlan(
         spaced_frequencies(30.0, 150.0, 14, "log"), (1.5, 4.0), settle_cycles=4, integrate_cycles=6
     )
     hidden = EffectSetting("load-inertia", {"J_L": 1.4 * unit.load.J_L})
     response = simulate(unit, 1.0, plan, effects=[hidden], seed=77)
-    found = diagnose_response(response, unit, cache=tmp_path).to_json()
+    found = diagnose_response(
+        response, unit, without=set(CATALOGUE) - asked, cache=tmp_path
+    ).to_json()
     assert [cause["effect"] for cause in found["causes"]] == ["load-inertia"]
     size = found["causes"][0]["parameters"]["J_L"]
     assert abs(size["value"] / (1.4 * unit.load.J_L) - 1.0) < 0.2

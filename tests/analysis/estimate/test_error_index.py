@@ -1,3 +1,5 @@
+from functools import cache
+
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -42,12 +44,17 @@ def test_error_follows_gradient_far_from_kink():
     assert got.std_hz == pytest.approx(2.0 * 0.5, rel=1e-6)
 
 
+@cache
+def normal_draws(seed):
+    return np.random.default_rng(seed).normal(size=(2, 400_000))
+
+
 @pytest.mark.parametrize("seed", range(3))
 @settings(max_examples=20, deadline=None)
 @example(arf=-2.0, rf=-1.0, arf_std=0.0, rf_std=0.5)
 @given(arf=st.floats(-3.0, 3.0), rf=st.floats(-3.0, 3.0), arf_std=STD, rf_std=STD)
 def test_error_equals_spread_of_draws(seed, arf, rf, arf_std, rf_std):
-    draws = np.random.default_rng(seed).normal(size=(2, 400_000))
+    draws = normal_draws(seed)
     misfits = np.stack([np.zeros(400_000), arf + arf_std * draws[0], rf + rf_std * draws[1]])
     seen = 2.0 * np.std(np.ptp(misfits, axis=0))
     told = error_index(arf, rf, 0.0, 0.0, arf_s_std_hz=arf_std, rf_s_std_hz=rf_std).std_hz

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from importlib import metadata
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -24,10 +25,7 @@ from sim.effects import EffectSetting
 from sim.engine.effort import counting
 from sim.unit import load_unit
 
-distributed = pytest.importorskip("distributed")
-cloudpickle = pytest.importorskip("cloudpickle")
-# Workers cannot import this file: what they are to do travels whole.
-cloudpickle.register_pickle_by_value(sys.modules[__name__])
+pytestmark = pytest.mark.skipif(find_spec("distributed") is None, reason="needs distributed")
 
 BEGIN = "import sys; from distributed.cli.dask_{0} import main; sys.argv[0] = 'dask-{0}'; main()"
 QUIET = {"DASK_LOGGING__DISTRIBUTED": "error", "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "0"}
@@ -74,9 +72,14 @@ def scheduler(tmp_path_factory):
 @pytest.fixture(scope="module")
 def workers(scheduler):
     """The scheduler's address and two workers on this machine."""
+    import cloudpickle
+    from distributed import Client
+
+    # Workers cannot import this file: what they are to do travels whole.
+    cloudpickle.register_pickle_by_value(sys.modules[__name__])
     both = [begin_worker(scheduler) for _ in range(2)]
     try:
-        with distributed.Client(scheduler, timeout=60.0, set_as_default=False) as client:
+        with Client(scheduler, timeout=60.0, set_as_default=False) as client:
             client.wait_for_workers(2, timeout=120.0)
         yield scheduler, both
     finally:
@@ -208,7 +211,7 @@ def test_an_address_without_a_scheduler_is_refused():
 )
 def test_invalid_address_is_refused_before_connecting(address, monkeypatch):
     # A client that was begun would take twenty seconds to end, and print a traceback.
-    monkeypatch.setattr(distributed, "Client", None)
+    monkeypatch.setattr("distributed.Client", None)
     with pytest.raises(InputError, match="is no address of a Dask scheduler"):
         ClusterExecutor(address)
 

@@ -156,7 +156,7 @@ def test_senseless_requests_are_refused(wrong):
         reproduce(**wrong)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("count", [1, pytest.param(None, marks=pytest.mark.study)])
 def test_paper_scheme_reproduces_table_2(count):
     """In a row drawn at random, and in every row in a study."""

@@ -1,6 +1,7 @@
 """Responses as pandas tables."""
 
 import sys
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from daq.errors import InputError
 from daq.frames import COLUMNS
 from daq.frf import FrequencyResponse, PointFlag
 
-pd = pytest.importorskip("pandas")
+pytestmark = pytest.mark.skipif(find_spec("pandas") is None, reason="needs pandas")
 
 
 @pytest.fixture
