@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from daq.excitation.plan import ExcitedPlan
 from daq.frf import DB_PER_NEPER, FrequencyResponse, PointFlag
 from daq.plan import SweepPlan
 
@@ -35,6 +36,10 @@ def response_of_cycles(
     with np.errstate(divide="ignore", invalid="ignore"):
         gain_std_db = DB_PER_NEPER * along.ravel() / magnitude
         phase_std_deg = np.degrees(across.ravel() / magnitude)
+    excited = isinstance(plan, ExcitedPlan)
+    restless = worst.ravel() > PERIODIC_SCATTER
+    if isinstance(plan, ExcitedPlan) and plan.signal.kind == "noise":
+        restless = np.zeros_like(restless)
     return FrequencyResponse.from_arrays(
         np.tile(np.asarray(plan.frequencies_hz, dtype=float), levels),
         level,
@@ -45,11 +50,11 @@ def response_of_cycles(
         dc_v=cycles[..., 0].real.mean(axis=2).ravel() * level,
         harmonic2=cycles[..., 2].mean(axis=2).ravel(),
         harmonic3=cycles[..., 3].mean(axis=2).ravel(),
-        flags=np.where(worst.ravel() > PERIODIC_SCATTER, int(PointFlag.NOT_PERIODIC), 0),
-        direction=plan.direction,
+        flags=np.where(restless, int(PointFlag.NOT_PERIODIC), 0),
+        direction=None if excited else plan.direction,
         settle_cycles=plan.settle_cycles,
         integrate_cycles=plan.integrate_cycles,
-        from_rest=plan.from_rest,
+        from_rest=None if excited else plan.from_rest,
         provenance=provenance,
     )
 

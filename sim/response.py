@@ -8,7 +8,7 @@ error bar of every point. It judges nothing.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.errors import AnalysisError
+from daq.excitation.plan import ExcitedPlan
 from daq.frf import GAIN_STD_COMPONENTS, GAIN_STD_IS, FrequencyResponse, error_words
 from daq.plan import SweepPlan
 from sim.effects import EffectSetting
@@ -28,8 +29,9 @@ from sim.engine.engine import HARMONICS, LONGEST_STEP_S, Motion, Stretch, carry
 from sim.engine.freely import dealt_out, goes_freely, step_freely
 from sim.engine.stepping import Asking, shared_out, step_together
 from sim.engine.system import Law, PiecewiseLinearSystem
+from sim.excitation.simulate import cycles_by_signal
 from sim.reading import PERIODIC_SCATTER, response_of_cycles, scatter_of_cycles
-from sim.servo import START_SPREAD, Servo, parameters_of, states_at_start
+from sim.servo import START_SPREAD, Servo, groups_alike, parameters_of, states_at_start
 from sim.unit import Unit
 
 __all__ = [
@@ -92,11 +94,13 @@ def simulate(
         If the motion grew without bound.
     """
     servo = Servo.of(unit, ratio, effects, seed)
-    done = count(1)
+    done, parts = count(1), len(plan.frequencies_hz)
+    if isinstance(plan, ExcitedPlan):
+        parts = plan.parts
 
     def point_done() -> None:
         if progress is not None:
-            progress(next(done) / len(plan.frequencies_hz))
+            progress(next(done) / parts)
 
     (cycles,) = simulate_cycles([servo], plan, longest_step_s=longest_step_s, point_done=point_done)
     provenance = {
@@ -111,6 +115,11 @@ def simulate(
         "longest_step_s": float(longest_step_s),
         "dc_offset_v": plan.dc_offset_v,
     }
+    if isinstance(plan, ExcitedPlan):
+        provenance |= plan.signal.stated()
+        if plan.signal.kind == "noise":
+            provenance[GAIN_STD_IS] = "error bar"
+            del provenance[GAIN_STD_COMPONENTS]
     return response_of_cycles(cycles, plan, unit.name, provenance)
 
 
@@ -148,11 +157,16 @@ def simulate_cycles(
     AnalysisError
         If a motion grew without bound, at the last of the steps.
     """
+    if isinstance(plan, ExcitedPlan):
+        return cycles_by_signal(
+            servos, plan, longest_step_s=longest_step_s, shorter_steps_s=shorter_steps_s,
+            single=single, workers=workers, part_done=lambda share: point_done(),
+        )  # fmt: skip
     levels, workers = len(plan.levels_vpk), workers or _cores()
     points = np.asarray(plan.frequencies_hz)
     # Points that start from rest do not depend on each other: sharing those out among the cores
     # leaves the lanes full.
-    groups = list(_groups(servos, levels, 1 if plan.from_rest else workers))
+    groups = list(groups_alike(servos, levels, 1 if plan.from_rest else workers))
     lanes = levels * max(map(len, groups), default=1)
     freely = goes_freely(lanes, len(groups) * (len(points) if plan.from_rest else 1), single)
     shares = [slice(None)]
@@ -306,32 +320,10 @@ def _sweep(
     return np.ascontiguousarray(lanes.transpose(3, 4, 0, 1, 2)), steps
 
 
-def _groups(servos: Sequence[Servo], levels: int, workers: int) -> Iterable[list[int]]:
-    """Indices of servos that share their linear part, in lots that fill lanes and cores."""
-    alike: dict[bytes, list[int]] = {}
-    for index, servo in enumerate(servos):
-        alike.setdefault(_linear_key(servo.system), []).append(index)
-    for members in alike.values():
-        share = -(-len(members) // workers) if len(alike) < workers else len(members)
-        size = max(min(share, _LANES_PER_LOT // levels), 1)
-        for start in range(0, len(members), size):
-            yield members[start : start + size]
-
-
 def _shares(plan: SweepPlan, workers: int) -> list[slice]:
     """Points in turn to each worker: low frequencies take longer than high ones."""
     count = min(workers, len(plan.frequencies_hz))
     return [slice(first, None, count) for first in range(count)]
-
-
-def _linear_key(system: PiecewiseLinearSystem) -> bytes:
-    reading = np.array([system.reading.delay_s, system.reading.sample_s])
-    parts = [system.A, system.b, system.f, system.o, reading]
-    for law in system.nonlinearities:
-        stribeck = float(law.law is Law.FRICTION and law.parameters[1] != 0.0)
-        fixed = np.array([law.law, law.feedthrough, law.stiffness, law.damping, stribeck, law.read])
-        parts += [law.inlet, law.outlet, fixed, np.array(law.hears).ravel()]
-    return b"".join(np.ascontiguousarray(part, dtype=float).tobytes() for part in parts)
 
 
 def _worth(system: PiecewiseLinearSystem) -> float:
@@ -349,6 +341,3 @@ def _version() -> str:
         return version("lashbench")
     except PackageNotFoundError:
         return "unknown"
-
-
-_LANES_PER_LOT = 64

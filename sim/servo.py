@@ -5,7 +5,7 @@ Owns the start: at rest, each mesh somewhere inside its play. It steps nothing.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,16 @@ from sim.engine.layout import HELD
 from sim.engine.system import Law, PiecewiseLinearSystem
 from sim.unit import Unit
 
-__all__ = ["START_SPREAD", "Servo", "parameters_of", "states_at_start"]
+__all__ = [
+    "START_SPREAD",
+    "Servo",
+    "groups_alike",
+    "linear_key",
+    "parameters_of",
+    "states_at_start",
+]
+
+_LANES_PER_LOT = 64
 
 START_SPREAD = 0.02
 """How far from the middle of its play a mesh starts at most, as a share of the half play.
@@ -112,3 +121,26 @@ def parameters_of(servos: Sequence[Servo], levels: int) -> NDArray[np.float64]:
         for servo in servos
     ]
     return np.repeat(np.stack(per_servo, axis=-1), levels, axis=-1)
+
+
+def groups_alike(servos: Sequence[Servo], levels: int, workers: int) -> Iterable[list[int]]:
+    """Indices of servos that share their linear part, in lots that fill lanes and cores."""
+    alike: dict[bytes, list[int]] = {}
+    for index, servo in enumerate(servos):
+        alike.setdefault(linear_key(servo.system), []).append(index)
+    for members in alike.values():
+        share = -(-len(members) // workers) if len(alike) < workers else len(members)
+        size = max(min(share, _LANES_PER_LOT // levels), 1)
+        for start in range(0, len(members), size):
+            yield members[start : start + size]
+
+
+def linear_key(system: PiecewiseLinearSystem) -> bytes:
+    """What systems have in common that are stepped side by side, as bytes."""
+    reading = np.array([system.reading.delay_s, system.reading.sample_s])
+    parts = [system.A, system.b, system.f, system.o, reading]
+    for law in system.nonlinearities:
+        stribeck = float(law.law is Law.FRICTION and law.parameters[1] != 0.0)
+        fixed = np.array([law.law, law.feedthrough, law.stiffness, law.damping, stribeck, law.read])
+        parts += [law.inlet, law.outlet, fixed, np.array(law.hears).ravel()]
+    return b"".join(np.ascontiguousarray(part, dtype=float).tobytes() for part in parts)

@@ -34,6 +34,7 @@ from analysis.execution.progress import Progress, part_of
 from analysis.inference.exclusion import ExclusionLimit
 from analysis.inference.posterior import Posterior, limits
 from analysis.inference.refine import refine
+from analysis.observation.excitation import refuse_signal
 from analysis.observation.joint import check_together, unit_doubts
 from analysis.observation.observation import Observation, observe
 from analysis.observation.rounding import settled
@@ -102,6 +103,7 @@ def diagnose_response(
     responses: tuple[FrequencyResponse, ...] = (response, *further)
     check_together(responses)
     responses, doubts = thin_responses(tuple(map(settled, responses)))
+    refuse_signal(responses)
     observed = observe(*responses)
     _refuse_few(observed)
     started = time.perf_counter()

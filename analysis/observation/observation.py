@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.observation.excitation import excitation_doubt
+from analysis.observation.excitation import excitation_doubt, signal_of
 from analysis.observation.rounding import settled
 from analysis.observation.stated_error import stated_error
 from daq.errors import AnalysisError, InputError
+from daq.excitation.plan import ExcitedPlan
 from daq.frf import DB_PER_NEPER, FrequencyResponse, PointFlag
 from daq.plan import SweepPlan
 
@@ -297,15 +298,23 @@ def _plans(swept: Sequence[_Level]) -> tuple[tuple[SweepPlan, NDArray[np.int64]]
     for (_, grid), places in sorted(alike.items(), key=lambda one: one[0][0]):
         response = swept[places[0]].readings
         settle, integrate = response.settle_cycles, response.integrate_cycles
+        levels = tuple(swept[place].source_vpk for place in places)
+        signal = signal_of(response)
         plan = SweepPlan(
             grid,
-            tuple(swept[place].source_vpk for place in places),
+            levels,
             direction=response.direction or "up",
             settle_cycles=SETTLE_CYCLES if settle is None else settle,
             integrate_cycles=INTEGRATE_CYCLES if integrate is None else integrate,
             from_rest=bool(response.from_rest),
             dc_offset_v=response.dc_offset_v,
         )
+        if signal is not None:
+            plan = ExcitedPlan(
+                grid, levels, settle_cycles=plan.settle_cycles,
+                integrate_cycles=plan.integrate_cycles, dc_offset_v=plan.dc_offset_v,
+                excitation=signal,
+            )  # fmt: skip
         _refuse_endless(plan)
         rows = [np.arange(first[place], first[place + 1]) for place in places]
         plans.append((plan, np.concatenate(rows)))

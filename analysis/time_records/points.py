@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from daq.excitation.signal import Excitation
+
 __all__ = ["Points"]
 
 
@@ -42,3 +44,5 @@ class Points:
     integrate_cycles: int | None = None
     coherence: NDArray[np.float64] | None = None
     """Of the input with the output at each frequency, 0 to 1, where it is known."""
+    signal: Excitation | None = None
+    """What drove the servo, where a simulation can be driven by it."""

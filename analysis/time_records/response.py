@@ -124,7 +124,8 @@ def response_of_record(
             "record_s": round(record.duration_s, 6),
             "record_rate_hz": record.rate_hz,
             "gain_std_is": "error bar",
-        },
+        }
+        | ({} if points.signal is None else points.signal.stated()),
     )
     told = (f"the input is {_words(kind)}; {points.method}", *points.notes, *_doubt(points, keep))
     return response, told

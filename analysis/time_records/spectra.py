@@ -6,7 +6,7 @@ nothing about what the signal is.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from scipy.signal import ShortTimeFFT, get_window
 
 from analysis.time_records.points import Points
 from daq.errors import AnalysisError, InputError
+from daq.excitation.signal import MOST_LINES, Excitation, Kind
 from daq.time_records.record import TimeRecord
 
 __all__ = ["Estimator", "noise_response", "periodic_response", "period_of"]
@@ -69,6 +70,9 @@ def noise_response(
     bias = np.sqrt(np.maximum(bias**2 - noise_of_bias**2, 0.0))
     share = np.hypot(share, bias)
     level = np.full(frequency.size, np.sqrt(2.0) * float(np.std(record.input_v)))
+    signal = None
+    if estimator == "H1":
+        signal = _signal("noise", size / rate, np.flatnonzero(keep), np.sqrt(power[keep]))
     notes = (
         f"{len(record) // size} segments without overlap; coherence "
         f"{np.min(_coherence(whole)[keep]):.3f} to {np.max(_coherence(whole)[keep]):.3f}",
@@ -77,7 +81,10 @@ def noise_response(
     return Points(
         frequency[keep], level[keep], gain[keep], share[keep], share[keep],
         f"{estimator} by averaged segments (Hann, half overlapped)", notes,
+        settle_cycles=None if signal is None else 1,
+        integrate_cycles=None if signal is None else whole[3],
         coherence=_coherence(whole)[keep],
+        signal=signal,
     )  # fmt: skip
 
 
@@ -198,8 +205,27 @@ def periodic_response(record: TimeRecord, period: int, lines: float = 1e-3) -> P
         )[: along.size]  # fmt: skip
         along = across = np.sqrt(both)
     level = np.full(frequency.size, np.sqrt(2.0) * float(np.std(record.input_v)))
+    # The phasors of sines, for the input is their imaginary part.
+    signal = _signal("periodic", period / record.rate_hz, np.flatnonzero(keep), 1j * x.mean(axis=0))
     return Points(
         frequency, level, np.asarray(gain), np.asarray(along), np.asarray(across),
         f"mean over {periods} periods of {period / record.rate_hz:.6g} s",
         ("the level is that of a sine of the input's rms",),
+        settle_cycles=None if signal is None else 1,
+        integrate_cycles=None if signal is None else periods,
+        signal=signal,
+    )  # fmt: skip
+
+
+def _signal(
+    kind: Kind, period_s: float, lines: NDArray[np.intp], phasors: NDArray[Any]
+) -> Excitation | None:
+    """What drove the servo; None where it has more lines than a file should hold."""
+    if lines.size > MOST_LINES:
+        return None
+    phase = np.degrees(np.angle(phasors)) if kind == "periodic" else np.empty(0)
+    size = np.abs(phasors)
+    return Excitation(
+        kind, float(period_s), tuple(lines.tolist()), tuple((size / size.max()).tolist()),
+        tuple(phase.tolist()),
     )  # fmt: skip

@@ -32,7 +32,18 @@ from sim.engine.solving import kinds_of, law_coefficients, law_parameters, order
 from sim.engine.stepping import Asking, Steps, step_together
 from sim.engine.system import PiecewiseLinearSystem
 
-__all__ = ["HARMONICS", "LONGEST_STEP_S", "Motion", "Stretch", "advance", "carry", "carry_each"]
+__all__ = [
+    "HARMONICS",
+    "LONGEST_STEP_S",
+    "Motion",
+    "Moving",
+    "Stretch",
+    "advance",
+    "carry",
+    "carry_each",
+    "program_of",
+    "times",
+]
 
 HARMONICS = 4
 """Fourier coefficients kept per cycle: 0 (mean), 1, 2 and 3."""
@@ -117,7 +128,7 @@ def advance(
     Motion
         One per stretch, as soon as it is done.
     """
-    moving = _Moving(system, find_modes(system) if modes is None else modes, single)
+    moving = Moving(system, find_modes(system) if modes is None else modes, single)
     for stretch in stretches:
         (motion,) = step_together([_dwell(moving, parameters, state, stretch, longest_step_s)])
         state = motion.state
@@ -157,7 +168,7 @@ def carry(
     AnalysisError
         If a motion grew without bound, at the last of the steps.
     """
-    moving = _Moving(system, find_modes(system), single)
+    moving = Moving(system, find_modes(system), single)
     return _carry(moving, parameters, state, stretches, steps_s, done)
 
 
@@ -177,13 +188,13 @@ def carry_each(
     Asking
         One for each stretch, which gives a list of one motion.
     """
-    moving = _Moving(system, find_modes(system), single)
+    moving = Moving(system, find_modes(system), single)
     for stretch in stretches:
         yield _carry(moving, parameters, state, [stretch], steps_s, done)
 
 
 def _carry(
-    moving: _Moving,
+    moving: Moving,
     parameters: NDArray[np.float64],
     state: NDArray[np.float64],
     stretches: Sequence[Stretch],
@@ -220,7 +231,7 @@ def _carry(
 
 
 @dataclass(frozen=True, eq=False)
-class _Moving:
+class Moving:
     """A system and its modes, and what does not change with the drive."""
 
     system: PiecewiseLinearSystem
@@ -267,7 +278,7 @@ class _Moving:
 
 
 def _dwell(
-    moving: _Moving,
+    moving: Moving,
     parameters: NDArray[np.float64],
     state: NDArray[np.float64],
     stretch: Stretch,
@@ -280,21 +291,21 @@ def _dwell(
     phasor = stretch.amplitude * np.exp(1j * stretch.phase)
     forced = propagator.drive[:, None] * phasor
     # Im(Y exp(i theta)) = Re(Y) sin(theta) + Im(Y) cos(theta), plus a constant.
-    through = _times(moving.rows, forced) + moving.through * phasor
+    through = times(moving.rows, forced) + moving.through * phasor
     waves = np.stack([through.real, through.imag, moving.through * stretch.offset], axis=1)
     gain = moving.look @ propagator.push
     if moving.direct.any():
         gain = gain + moving.direct
     state, kept = state[: len(system.b)], state[len(system.b) :]
-    layout, coefficients = _program(
+    layout, coefficients = program_of(
         moving, propagator, gain, bool(drift.any() or stretch.offset.any())
     )
     stepped = yield Steps(
         layout,
         coefficients,
         {
-            "q": _times(modes.weights, state - forced.imag),
-            "seen": _times(moving.rows, state) + moving.through * (phasor.imag + stretch.offset),
+            "q": times(modes.weights, state - forced.imag),
+            "seen": times(moving.rows, state) + moving.through * (phasor.imag + stretch.offset),
             "force": np.zeros((len(moving.kinds), state.shape[1])),
             "drift": drift,
             "waves": waves.reshape(-1, state.shape[1]),
@@ -310,7 +321,7 @@ def _dwell(
     if system.reading != Reading() or moving.direct[-1].any():
         turn = turn * _recorded(moving, propagator)[:, None]
     # The last forces push the coordinates in the step that is not made any more.
-    end = stepped.q + _times(propagator.push, stepped.force)
+    end = stepped.q + times(propagator.push, stepped.force)
     # Motion that grew without bound is not finite: `carry` says so.
     with np.errstate(invalid="ignore"):
         # The kernel counts the phase from the start of the stretch; results count
@@ -318,13 +329,13 @@ def _dwell(
         return Motion(
             _coefficients(stepped.sums, propagator.steps_per_cycle) * turn,
             stepped.peak,
-            np.concatenate([_times(modes.shapes, end) + forced.imag, stepped.held]),
+            np.concatenate([times(modes.shapes, end) + forced.imag, stepped.held]),
             propagator.step_s,
         )
 
 
-def _program(
-    moving: _Moving, propagator: Propagator, gain: NDArray[np.float64], steady: bool
+def program_of(
+    moving: Moving, propagator: Propagator, gain: NDArray[np.float64], steady: bool
 ) -> tuple[Layout, NDArray[np.float64]]:
     """What steps a system at one drive frequency, and with which numbers.
 
@@ -352,7 +363,7 @@ def _program(
     return Layout(structure), np.concatenate([part.ravel() for part in parts])
 
 
-def _recorded(moving: _Moving, propagator: Propagator) -> NDArray[np.complex128]:
+def _recorded(moving: Moving, propagator: Propagator) -> NDArray[np.complex128]:
     """On each harmonic (4,): what is between the output and the bench's records."""
     omega = 2j * np.pi * propagator.frequency_hz * np.arange(HARMONICS)
     factor = moving.system.reading.factor(omega)
@@ -362,7 +373,7 @@ def _recorded(moving: _Moving, propagator: Propagator) -> NDArray[np.complex128]
     return factor
 
 
-def _times(matrix: NDArray[np.float64], columns: NDArray) -> NDArray:
+def times(matrix: NDArray[np.float64], columns: NDArray) -> NDArray:
     """Product in one order of additions; BLAS would choose it by the number of columns."""
     total = np.zeros((len(matrix), columns.shape[1]), dtype=columns.dtype)
     for row, column in enumerate(columns):

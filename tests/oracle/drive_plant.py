@@ -295,3 +295,40 @@ def sweep(
     for i, hertz in enumerate(frequencies_hz):
         _dwell(m, bench, volts, float(hertz), settle, cycles, step_s, clock, counter, y, found[i])
     return found / volts
+
+
+@njit(cache=True)
+def _by_signal(m, volts, dt, every, y, kept):
+    """What is read after each `every` steps; `volts` at every half step, one more at the end."""
+    k = np.empty((4, _N))
+    at = np.empty(_N)
+    for n in range(kept.size * every):
+        a, b, c = volts[2 * n], volts[2 * n + 1], volts[2 * n + 2]
+        _slopes(m, a, m.k_ts * (y[14] if m.at_load else y[2]), y, k[0])
+        for stage, (share, u) in enumerate(((0.5, b), (0.5, b), (1.0, c))):
+            for j in range(_N):
+                at[j] = y[j] + share * dt * k[stage, j]
+            _slopes(m, u, m.k_ts * (at[14] if m.at_load else at[2]), at, k[stage + 1])
+        for j in range(_N):
+            y[j] += dt / 6.0 * (k[0, j] + 2.0 * (k[1, j] + k[2, j]) + k[3, j])
+        if n % every == every - 1:
+            kept[n // every] = y[15] if m.filtered else m.k_ts * (y[14] if m.at_load else y[2])
+
+
+def by_signal(
+    document: dict[str, Any],
+    ratio: float,
+    volts: np.ndarray,
+    step_s: float,
+    every: int,
+    **changed: float,
+) -> np.ndarray:
+    """What is read after every so many steps, from rest, of a drive without a clock.
+
+    `volts`: the input at every half step from t = 0 to the end, one more than twice the steps.
+    """
+    m, bench = plant_of(document, ratio, **changed)
+    assert bench.rate_hz == 0.0
+    kept = np.zeros((len(volts) - 1) // (2 * every))
+    _by_signal(m, volts, step_s, every, np.zeros(_N), kept)
+    return kept

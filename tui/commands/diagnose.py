@@ -105,12 +105,14 @@ def _diagnose_files(
     console: Console,
 ) -> int:
     response, *others = read_files(files, given, console)
+    from analysis.observation.excitation import refuse_signal
     from analysis.observation.incomplete import state_doubt
     from analysis.observation.input_check import check_inputs
     from analysis.observation.joint import check_together, unit_doubts
     from analysis.observation.stated_error import error_doubts, error_notes
 
     check_together((response, *others))
+    refuse_signal((response, *others))
     said = check_inputs((response, *others), subject, as_is)
     for note in error_notes((response, *others)):
         console.note(note)

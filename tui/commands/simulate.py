@@ -35,24 +35,28 @@ def simulate(
     points: Whole,
     spacing: Literal["lin", "log"] = "lin",
     direction: Literal["up", "down"] = "up",
-    settle_cycles: Whole = 20,
-    integrate_cycles: Whole = 30,
+    settle_cycles: Whole | None = None,
+    integrate_cycles: Whole | None = None,
     offset: Real = 0.0,
     from_rest: bool = False,
+    excitation: Literal["stepped", "multisine", "chirp", "noise"] = "stepped",
+    resolution: Real | None = None,
+    phases: Literal["schroeder", "random"] | None = None,
     effect: list[str] | None = None,
     set_: Annotated[list[str] | None, Parameter(name="--set")] = None,
     seed: Whole = 0,
     out: Path,
     console: Injected,
 ) -> None:
-    """Simulate a stepped-sine sweep and write the response to a file.
+    """Simulate a measurement, a stepped-sine sweep if not told otherwise, and write the response.
 
     Parameters
     ----------
     ratio
         Contribution ratio of stage 1 to the total backlash, 0 to 1.
     level
-        Source level in V peak; repeat it for several.
+        Source level in V peak, of other signals that of a sine of the same rms; repeat it for
+        several.
     start
         Lowest frequency in Hz.
     stop
@@ -64,14 +68,23 @@ def simulate(
     direction
         Order in which the frequencies are visited.
     settle_cycles
-        Drive cycles waited at each point.
+        Drive cycles waited at each point, 20 if not given; periods or segments of other signals, 2.
     integrate_cycles
-        Drive cycles averaged at each point.
+        Drive cycles averaged at each point, 30 if not given; periods of a multisine or chirp, 8;
+        segments of noise, half overlapped, 40.
     offset
         Constant voltage added to the source, in V.
     from_rest
         Start every point from rest, as the paper does; without it the motion
         carries on from point to point as in a real sweep.
+    excitation
+        Signal that drives the servo: a multisine or chirp that is repeated and averaged, or noise
+        (H1, Hann).
+    resolution
+        Step of frequencies of such a signal, Hz: 1 over its period or segment; the smallest step
+        between the points if not given.
+    phases
+        Of the lines of a multisine: Schroeder's, for low peaks, or random ones by the seed.
     effect
         Extension of the model, ID:param=value[,param=value]; repeat it for several.
     set_
@@ -82,6 +95,7 @@ def simulate(
     out
         File to write: csv, h5, uff or mat by its suffix.
     """
+    from daq.excitation.choices import plan_by_signal, signal_words, usual_cycles
     from daq.formats import check_writable, write_response
     from daq.plan import SweepPlan, spaced_frequencies
     from sim.effects import parse_effect
@@ -90,9 +104,10 @@ def simulate(
     check_writable(out, unit)
     if seed < 0:
         raise InputError(f"--seed {seed} is negative; give 0 or more")
-    if points * len(level) * integrate_cycles > _MOST_CYCLES:
+    cycles = usual_cycles(excitation, settle_cycles, integrate_cycles)
+    if points * len(level) * cycles[1] > _MOST_CYCLES:
         raise InputError(
-            f"{points} points of {integrate_cycles} cycles at {len(level)} levels are more than "
+            f"{points} points of {cycles[1]} cycles at {len(level)} levels are more than "
             f"{_MOST_CYCLES} cycles; give fewer"
         )
     subject = read_unit(unit, console, settings=parameter_settings(set_ or []))
@@ -100,11 +115,18 @@ def simulate(
         frequencies_hz=spaced_frequencies(start, stop, points, spacing),
         levels_vpk=tuple(level),
         direction=direction,
-        settle_cycles=settle_cycles,
-        integrate_cycles=integrate_cycles,
+        settle_cycles=cycles[0],
+        integrate_cycles=cycles[1],
         from_rest=from_rest,
         dc_offset_v=offset,
     )
+    if excitation != "stepped":
+        excited = plan_by_signal(plan, excitation, resolution, phases, seed)
+        console.note(signal_words(excited))
+        plan = excited
+    elif resolution is not None or phases is not None:
+        raise InputError("--resolution and --phases are for other signals than a stepped sine; "
+                         "give --excitation, or leave them out")  # fmt: skip
     if plan.duration_s > _LONGEST_S:
         raise InputError(
             f"the sweep lasts {plan.duration_s:.3g} s, more than {_LONGEST_S:.0f} s; "

@@ -1,7 +1,8 @@
-"""A response that was not measured with a stepped sine is refused early."""
+"""A response of a signal that nobody states is refused early; one that is stated is compared."""
 
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,10 @@ from worlds import time_records as known
 
 from analysis.diagnosis import diagnose_response
 from analysis.estimate import estimate_response
+from analysis.observation.observation import observe
 from analysis.time_records.response import response_of_record
 from daq.errors import InputError
+from daq.excitation.signal import excitation_of
 from daq.formats import read_response, write_response
 from daq.time_records.record import TimeRecord
 from sim.unit import load_unit
@@ -26,10 +29,14 @@ SIGNALS = {
 }
 
 
-def response_to(words):
+def response_to(words, stated=False):
     rng = np.random.default_rng(0)
     record = TimeRecord(known.RATE, *known.driven(SIGNALS[words](rng), rng, noise=0.02))
-    return response_of_record(record, unit="ADSS", start_hz=20.0, stop_hz=110.0)[0]
+    response = response_of_record(record, unit="ADSS", start_hz=20.0, stop_hz=110.0)[0]
+    if stated:
+        return response
+    known_of_it = {k: v for k, v in response.provenance.items() if k != "excitation_signal"}
+    return replace(response, provenance=known_of_it)
 
 
 @pytest.mark.parametrize("words", SIGNALS)
@@ -40,6 +47,46 @@ def test_file_formats_preserve_refused_excitation(words, kind, tmp_path):
     for answer in (estimate_response, diagnose_response):
         with pytest.raises(InputError, match=f"from {words}, not from a stepped sine"):
             answer(read_response(path), load_unit("adss"))
+
+
+@pytest.mark.parametrize("words", ["a periodic signal", "noise"])
+@pytest.mark.parametrize("kind", ["csv", "h5", "uff", "mat"])
+def test_every_file_keeps_the_signal(words, kind, tmp_path):
+    path, made = tmp_path / f"r.{kind}", response_to(words, stated=True)
+    write_response(made, path)
+    kept = read_response(path)
+    assert excitation_of(kept.provenance) == excitation_of(made.provenance)
+    ((plan, rows),) = observe(kept).plans
+    assert plan.excitation == excitation_of(made.provenance)
+    assert len(rows) == len(made)
+
+
+@pytest.mark.parametrize("words", ["a periodic signal", "noise"])
+def test_a_diagnosis_of_a_stated_signal_is_refused_with_the_way_on(words, tmp_path, capsys):
+    path = tmp_path / "r.csv"
+    write_response(response_to(words, stated=True), path)
+    assert main(["diagnose", str(path), "--unit", "adss", "--as-is"]) == 2
+    told = capsys.readouterr()
+    assert not told.out
+    (error,) = [line for line in told.err.splitlines() if line.startswith("error")]
+    assert words in error
+    assert "`estimate`" in error
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("period_s", -1.0), ("lines", [3, 2]), ("kind", "music"), ("phase_deg", [0.0])],
+)
+def test_a_signal_that_cannot_be_is_refused_by_its_key(key, value, tmp_path, capsys):
+    made = response_to("a periodic signal", stated=True)
+    signal = dict(made.provenance["excitation_signal"]) | {key: value}
+    path = tmp_path / "r.csv"
+    write_response(
+        replace(made, provenance=dict(made.provenance) | {"excitation_signal": signal}), path
+    )
+    assert main(["estimate", str(path), "--unit", "adss"]) == 2
+    (error,) = [x for x in capsys.readouterr().err.splitlines() if x.startswith("error")]
+    assert key in error
 
 
 @pytest.mark.parametrize("verb", ["estimate", "diagnose"])

@@ -47,9 +47,9 @@ def extract(
         tell(document, lines, json, console)
         return 0
     from analysis.acceptance import judge as judged_by
-    from analysis.observation.excitation import excitation_doubt
+    from analysis.observation.excitation import sine_doubt
     from analysis.observation.incomplete import state_doubt
 
-    doubts = [excitation_doubt(response), state_doubt(response.provenance.get("state"))]
+    doubts = [sine_doubt(response), state_doubt(response.provenance.get("state"))]
     judgement = judged_by(limits, features=document, doubt="; ".join(filter(None, doubts)))
     return tell_judged(judgement, document, lines, json, console)

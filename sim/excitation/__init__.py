@@ -1,0 +1,1 @@
+"""Servos that a multisine, a chirp or noise drives, and what an estimator reads of them."""
