@@ -72,7 +72,7 @@ def cycles_by_signal(
     with ThreadPoolExecutor(workers) as pool:
         done = list(pool.map(read, groups))
     spend(len(servos) * plan.duration_s, len(servos) * plan.duration_s / longest_step_s)
-    results: list[NDArray[np.complex128]] = [np.empty(0)] * len(servos)
+    results = [np.empty(0, dtype=complex)] * len(servos)
     for group, found in zip(groups, done, strict=True):
         for position, index in enumerate(group):
             results[index] = found[position]

@@ -20,18 +20,18 @@ def over_time(signal, count=4096):
     return t, np.imag(np.exp(2j * np.pi * turns) @ signal.phasors())
 
 
-def test_a_signal_has_the_rms_of_a_sine_of_1_v():
+def test_signals_have_a_unit_sines_rms():
     for signal in (multisine(GRID, 1.0, "schroeder"), chirp(20.0, 40.0, 1.0)):
         assert np.std(over_time(signal)[1]) == pytest.approx(np.sqrt(0.5), rel=1e-6)
 
 
-def test_schroeders_phases_keep_peaks_lower_than_random_ones():
+def test_schroeder_phases_lower_the_peaks():
     low = np.abs(over_time(multisine(GRID, 1.0, "schroeder"))[1]).max()
     high = [np.abs(over_time(multisine(GRID, 1.0, "random", s))[1]).max() for s in range(5)]
     assert low < min(high)
 
 
-def test_a_chirp_goes_from_start_to_stop():
+def test_chirp_goes_from_start_to_stop():
     signal = chirp(20.0, 120.0, 2.0)
     t, u = over_time(signal, 1 << 14)
     inside = (t > 0.2) & (t < 1.8)
@@ -41,7 +41,7 @@ def test_a_chirp_goes_from_start_to_stop():
     assert 1.0 / late > 100.0
 
 
-def test_noise_is_white_in_its_band_and_another_by_each_seed():
+def test_noise_is_white_in_its_band():
     signal = noise(20.0, 40.0, 1.0)
     lines, phasors = signal.drawn(np.random.default_rng(1), 200)
     assert lines[0] / 200 == pytest.approx(20.0, abs=0.5)
@@ -53,7 +53,7 @@ def test_noise_is_white_in_its_band_and_another_by_each_seed():
     assert abs(np.vdot(other, phasors)) < 0.2
 
 
-def test_what_a_file_says_is_the_signal():
+def test_file_document_restores_the_signal():
     for signal in (multisine(GRID, 1.0, "random", 3), noise(20.0, 40.0, 0.5)):
         kept = excitation_of({SIGNAL_KEY: signal.to_json()})
         assert kept.lines == signal.lines
@@ -81,7 +81,7 @@ def test_no_document_is_half_accepted(document):
     assert excitation_of({SIGNAL_KEY: signal.to_json()}).lines == signal.lines
 
 
-def test_a_plan_reads_driven_frequencies_alone():
+def test_plan_refuses_frequencies_not_driven():
     signal = multisine(GRID, 1.0, "schroeder")
     with pytest.raises(InputError, match="21 Hz"):
         ExcitedPlan((20.0, 21.0), (1.0,), excitation=signal)
@@ -100,7 +100,7 @@ def test_a_plan_reads_driven_frequencies_alone():
         ({}, {"resolution_hz": float("nan")}, "resolution"),
     ],
 )
-def test_choices_that_do_not_go_together_are_refused(changed, options, said):
+def test_contradictory_choices_are_refused(changed, options, said):
     settle, integrate = usual_cycles("multisine", None, None)
     plan = SweepPlan(
         tuple(GRID), (1.0,), settle_cycles=settle, integrate_cycles=integrate, **changed

@@ -32,7 +32,7 @@ SIGNALS = {
 
 
 @pytest.mark.parametrize("name", SIGNALS)
-def test_without_play_and_friction_it_is_the_linear_response(name):
+def test_linear_servo_shows_its_linear_response(name):
     signal, settle, averages = SIGNALS[name]
     unit = load_unit("adss").with_parameters(b_t_deg=1e-9, T_f_m=1e-12, T_f_L=1e-12, R_m=6.0)
     plan = ExcitedPlan(
@@ -57,7 +57,7 @@ def record_of(levels, periods=8, period_s=0.4, seed=0):
         yield TimeRecord(10_000.0, volts[50::50], output + 2e-4 * rng.normal(size=output.size))
 
 
-def test_an_independent_plant_shows_what_is_simulated_and_its_ratio_is_found(tmp_path, capsys):
+def test_estimate_finds_independent_plants_ratio(tmp_path, capsys):
     files, off = [], {"signal": [], "sine": []}
     unit = load_unit("adss")
     for number, record in enumerate(record_of((1.5, 3.0))):

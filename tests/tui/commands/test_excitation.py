@@ -62,7 +62,7 @@ def test_every_file_keeps_the_signal(words, kind, tmp_path):
 
 
 @pytest.mark.parametrize("words", ["a periodic signal", "noise"])
-def test_a_diagnosis_of_a_stated_signal_is_refused_with_the_way_on(words, tmp_path, capsys):
+def test_diagnosis_of_stated_signal_is_refused(words, tmp_path, capsys):
     path = tmp_path / "r.csv"
     write_response(response_to(words, stated=True), path)
     assert main(["diagnose", str(path), "--unit", "adss", "--as-is"]) == 2
@@ -77,7 +77,7 @@ def test_a_diagnosis_of_a_stated_signal_is_refused_with_the_way_on(words, tmp_pa
     ("key", "value"),
     [("period_s", -1.0), ("lines", [3, 2]), ("kind", "music"), ("phase_deg", [0.0])],
 )
-def test_a_signal_that_cannot_be_is_refused_by_its_key(key, value, tmp_path, capsys):
+def test_impossible_signal_is_refused_by_key(key, value, tmp_path, capsys):
     made = response_to("a periodic signal", stated=True)
     signal = dict(made.provenance["excitation_signal"]) | {key: value}
     path = tmp_path / "r.csv"
