@@ -53,7 +53,7 @@ def test_sweep_is_stored_with_source_off(tmp_path, capsys):
     assert "[limits]" in kept.header.configurations["bench"]
 
 
-def test_hardware_is_not_driven_unasked(tmp_path):
+def test_hardware_is_driven_only_with_yes(tmp_path):
     plan = SweepPlan((130.0,), (2.5,))
     with pytest.raises(InputError, match="yes=True"):
         lb.measure(plan, "adss", "GPIB0::11::INSTR", db=tmp_path / "lab.db")
@@ -84,7 +84,7 @@ def test_fault_states_stored_points_and_source_off(tmp_path):
         lb.measure(plan, "adss", address, db=tmp_path / "lab.db", yes=True)
 
 
-def test_half_a_model_is_refused():
+def test_ratio_without_unit_is_refused():
     response = FrequencyResponse.from_arrays([100.0, 110.0], 1.0, [1j, 2j], unit="ADSS")
     with pytest.raises(InputError, match="a unit and a ratio"):
         lb.plot(response, ratio=0.3)

@@ -52,7 +52,7 @@ def diagnosed(verdict, *models):
     }
 
 
-def test_over_models_is_the_mixture_of_all():
+def test_value_over_models_is_their_mixture():
     """0.75 of 0.2 +- 0.01 and 0.25 of 0.6 +- 0.01: 0.3 +- sqrt(0.01^2 + 0.03)."""
     left = [model(ratio=0.2, probability=0.6), model("cable-stiffness", ratio=0.6, probability=0.2)]
     found = accept_model(estimated(), diagnosed("consistent", *left)).over_models(

@@ -65,7 +65,7 @@ def test_every_parameter_distinguishes_units():
 
 
 @pytest.mark.parametrize("name", ["adss", "edss"])
-def test_limits_move_no_range_of_a_cause(name, tmp_path):
+def test_limits_do_not_change_cause_ranges(name, tmp_path):
     unit, mine = load_unit(name), load_unit(renamed(name, tmp_path))
     for effect in CATALOGUE:
         logs = [Hypothesis(one, (effect,)).logs for one in (unit, mine)]

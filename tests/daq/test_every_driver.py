@@ -92,7 +92,7 @@ def test_points_are_correct_in_requested_order(driver, frequencies):
 
 
 @every_driver
-def test_errors_are_as_wide_as_readings_scatter(driver):
+def test_stated_errors_match_scatter_of_readings(driver):
     """30 readings each of one frequency: some 68 % of parts lie within one standard error."""
     instrument, analyser = bench(driver, noise_v=3e-3, seed=5)
     analyser.identify()
@@ -201,9 +201,7 @@ def test_unreadable_source_is_unknown_without_raising(driver):
     ranges=st.tuples(st.none() | st.floats(), st.none() | st.floats()),
     cycles=st.tuples(st.integers(-5, 100000), st.integers(-5, 100000)),
 )
-def test_settings_are_refused_whole_or_taken_whole(
-    driver, level, offset, slew, span, ranges, cycles
-):
+def test_settings_are_taken_whole_or_refused(driver, level, offset, slew, span, ranges, cycles):
     instrument, analyser = bench(driver)
     analyser.identify()
     wanted = PointSettings(level, *cycles, offset, slew, ranges)

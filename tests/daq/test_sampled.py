@@ -202,7 +202,7 @@ def card(tmp_path, monkeypatch):
     sys.modules.pop("sounddevice", None)
 
 
-def test_a_sound_card_is_measured_with(card):
+def test_sound_card_measures_a_response(card):
     import sounddevice
 
     url = "sampled:sound:default?out=1.5&in1=1.5&in2=1.5&block=64"

@@ -66,7 +66,7 @@ def running(bench, *faults, clock=None):
     return controller
 
 
-def test_silence_takes_no_part_in_the_bus(bench):
+def test_silent_instrument_ignores_the_bus(bench):
     now = [0.0]
     controller = running(bench, "silence:point=3,seconds=10", clock=lambda: now[0])
     instrument = controller.instrument

@@ -319,7 +319,7 @@ def test_hislip_interrupts_requests_service_and_locks(wires):
         max_size=6,
     )
 )
-def test_noise_hurts_no_other_client(gateways, wire, data):
+def test_garbage_affects_no_other_client(gateways, wire, data):
     url = gateways[wire]
     with socket.create_connection(place(url), 5.0) as noisy, suppress(ConnectionError):
         for part in data:

@@ -93,7 +93,7 @@ def paths(value, at=()):
 
 
 @given(data=st.data())
-def test_no_single_bad_value_is_half_accepted(data):
+def test_single_bad_value_refuses_the_unit(data):
     bad = document()
     *sections, key = data.draw(st.sampled_from(sorted(paths(bad))))
     place = bad

@@ -226,12 +226,12 @@ def test_diagnose_simulates_where_the_cluster_is(capsys, cluster):
     assert cluster.left
 
 
-def test_the_papers_numbers_need_no_cluster(capsys):
+def test_cluster_option_is_refused_for_paper(capsys):
     assert main(["diagnose", "--paper", "--unit", "adss", "--cluster", "x"]) == 2
     assert "--cluster" in capsys.readouterr().err
 
 
-def test_two_frequencies_need_no_cluster(capsys):
+def test_cluster_option_is_refused_for_frequencies(capsys):
     words = ["estimate", "--unit", "adss", "--arf-hz", "128", "--rf-hz", "137", "--cluster", "x"]
     assert main(words) == 2
     assert "--cluster" in capsys.readouterr().err

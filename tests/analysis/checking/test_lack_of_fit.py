@@ -32,7 +32,7 @@ def noise(rng, count):
     return [fit(0.02 * rng.standard_normal((3, ROWS))) for _ in range(count)]
 
 
-def test_noise_leaves_as_much_as_noise():
+def test_noise_has_no_structure():
     """300 draws against 48 others each: more than 2.5 in one of a hundred, more or less."""
     rng = np.random.default_rng(0)
     left = []

@@ -139,7 +139,7 @@ def test_a_damaged_file_is_refused_by_key(old, new, told):
         read(text)
 
 
-def test_how_values_are_known_is_no_physics():
+def test_origin_of_values_is_not_physics():
     unit = read(commissioned_unit_text(DATASHEET, found(), "A7", date(2026, 11, 2)))
     bare = unit.model_copy(update={"commissioning": None})
     assert unit.physics == bare.physics

@@ -98,7 +98,7 @@ def test_densities_are_student_t_or_zero_unobserved():
     assert np.all(fit.density[:2][~known] == 0.0)
 
 
-def test_leaning_is_the_most_probable_deviation():
+def test_fitted_deviation_is_most_probable():
     rng = np.random.default_rng(4)
     slope, truth = rng.standard_normal((3, 200)), np.array([0.4, -0.2, 0.0])
     std, sigmas = rng.uniform(0.05, 0.2, 200), np.array([0.5, 0.5, 1e-4])

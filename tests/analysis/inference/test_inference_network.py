@@ -58,7 +58,7 @@ def read(scales, one):
     return scales.inputs(one, np.zeros((count, 4, levels, points), dtype=np.float32))
 
 
-def test_reference_reads_as_zero(scales):
+def test_reference_response_gives_zero_input(scales):
     """A response equal to the reference has no log gain and no phase beyond it."""
     frequency_hz = np.linspace(100.0, 180.0, 20)
     reference = reference_response(scales.prior.unit, frequency_hz)
@@ -90,7 +90,7 @@ def test_many_points_are_averaged_without_loss():
     assert np.all(np.diff(gain) > 0.0)
 
 
-def test_missing_point_leaves_no_trace(scales):
+def test_missing_point_is_zero_in_every_channel(scales):
     frequency_hz = np.linspace(100.0, 180.0, 20)
     gain = np.ones((1, 1, 20), dtype=complex)
     gain[0, 0, 7] = np.nan

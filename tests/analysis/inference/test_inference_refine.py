@@ -59,7 +59,7 @@ def test_every_part_of_leading_set_is_examined(world):
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_plain_model_gets_runs_to_the_end(world, seed):
+def test_plain_model_gets_as_many_runs(world, seed):
     """However far behind it seems, it is compared by as many runs as any other set."""
     seen = observed((LAG, LOAD), [0.9, 0.95], seed)
     found = refine(Untrained((LAG, LOAD)), seen, seed=seed, executor=world)

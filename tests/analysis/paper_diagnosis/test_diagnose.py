@@ -197,7 +197,7 @@ def test_the_papers_rows_are_read_as_printed() -> None:
     assert reading.values[4] == pytest.approx(2 * 0.135 * 40.0)
 
 
-def test_every_pair_loses_energy() -> None:
+def test_every_pair_contains_a_dissipation() -> None:
     pairs = possible_pairs(CATALOGUE)
     n, k = len(CATALOGUE), len(DISSIPATION)
     assert len(pairs) == len(set(pairs)) == k * (n - k) + k * (k - 1) // 2

@@ -212,7 +212,7 @@ def test_pairs_are_guessed_additively_then_simulated() -> None:
     assert after.expected == pytest.approx(after.floor, abs=1.5)
 
 
-def test_every_further_cause_must_pay() -> None:
+def test_useless_cause_lowers_the_probability() -> None:
     """Where the plain model is right, causes that change nothing stay less probable."""
     baseline, other = made(()), made(("tachometer-gain",))
     right = Reading(np.array([60.0, -30.0, 80.0, -5.0, 8.0]), np.full(5, 0.5))

@@ -158,7 +158,7 @@ def test_browser_shows_report_on_few_pages(report, explained, tmp_path):
     assert Page(seen.text).tags.count("script") == page.tags.count("script") == 1
 
 
-def test_the_browser_would_have_complained(tmp_path):
+def test_browser_check_finds_faulty_page(tmp_path):
     bad = tmp_path / "bad.html"
     bad.write_text("<!DOCTYPE html><script>null.x</script><img src='https://example.org/a.png'>")
     assert look(bad, tmp_path).complaints

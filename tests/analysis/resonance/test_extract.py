@@ -46,7 +46,7 @@ def rms(values):
     return np.sqrt(np.mean(values**2, axis=0))
 
 
-def test_the_noted_truth_is_the_one_meant():
+def test_noted_truth_has_known_extrema():
     np.testing.assert_allclose(NOTED.extrema(), (39.966, 70.168), atol=1e-3)
 
 
@@ -142,7 +142,7 @@ def cramer_rao(truth, noise):
     ],
     ids=["130/145 Hz, 2 %", "130/145 Hz, 5 %", "130/145 Hz on 61 points"],
 )
-def test_no_unbiased_reader_could_do_much_better(truth):
+def test_errors_approach_the_cramer_rao_bound(truth):
     off, std = readings(truth, TWO_PERCENT)
     least = cramer_rao(truth, TWO_PERCENT)
     # 60 draws know a standard deviation to 9 %.

@@ -64,7 +64,7 @@ def test_quoted_words_read_back_in_any_quotes():
     assert not feed.accepts("XFR:POW:RAT 2,1", '"XFR:POW:RAT 3,1"')
 
 
-def test_switches():
+def test_switch_is_sent_and_read_back():
     switch = Switch("continuous", "INIT:CONT")
     assert (switch.command(True), switch.command(False)) == ("INIT:CONT ON", "INIT:CONT OFF")
     assert switch.accepts(True, "+1")

@@ -43,7 +43,7 @@ def test_page_of_tested_files_names_all_programs():
         assert f"| {file.program} |" in page
 
 
-def test_every_profile_is_of_some_use():
+def test_every_profile_loads_with_title():
     for name in config_names("profiles"):
         assert load_profile(name).title
 

@@ -30,7 +30,7 @@ from daq.frf import PointFlag
 from daq.hp35670a.identity import parse_identity
 
 
-def test_identify():
+def test_identification_reads_identity_and_options():
     analyser, script = driver(IDENTIFY)
     identity = analyser.identify()
     script.finish()
@@ -95,7 +95,7 @@ def test_second_level_needs_no_reset_or_calibration():
     script.finish()
 
 
-def test_a_point():
+def test_point_dialogue_gives_gain_and_variances():
     analyser, script = prepared(DRIVE + POINT + END)
     (point,) = analyser.sweep([100.3])
     script.finish()

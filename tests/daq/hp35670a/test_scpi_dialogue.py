@@ -87,7 +87,7 @@ def test_damaged_reply_clears_and_drains(ask, reply):
     script.finish()
 
 
-def test_a_lost_link_is_not_talked_to():
+def test_lost_link_gets_no_further_message():
     script = Trouble("> X?\n< GONE")
     dialogue = Dialogue(script)
     dialogue.trusted = True

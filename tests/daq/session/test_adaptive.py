@@ -77,7 +77,7 @@ def test_budget_of_coarse_sweep_refines_nothing():
     assert sweep.reason == "budget spent"
 
 
-def test_known_at_once_is_over_at_once():
+def test_known_features_need_no_refinement():
     sweep = AdaptiveSweep(plan(), Refinement(10.0, 100), judge)
     assert len(run(sweep)) == 1
     assert sweep.reason == "target reached"

@@ -8,7 +8,7 @@ from daq.errors import InputError, MeasurementError
 from daq.session.bench_lock import BenchLock
 
 
-def test_links_to_one_history_are_one_bench(tmp_path):
+def test_links_to_one_history_share_lock(tmp_path):
     history = tmp_path / "bench.db"
     history.touch()
     (tmp_path / "elsewhere").mkdir()

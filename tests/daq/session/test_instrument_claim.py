@@ -40,7 +40,7 @@ def test_address_spellings_claim_one_instrument(same):
     assert len({wire_name(url) for url in same}) == 1
 
 
-def test_other_instruments_are_others():
+def test_different_addresses_are_different_instruments():
     urls = [
         "TCPIP::127.0.0.1::5025::SOCKET", "TCPIP::127.0.0.1::5026::SOCKET", "GPIB0::11::INSTR",
         "GPIB1::11::INSTR", "GPIB0::12::INSTR", "GPIB0::11::96::INSTR", "TCPIP::h::INSTR",
@@ -60,7 +60,7 @@ def test_other_history_on_same_instrument_is_refused(tmp_path):
     BenchLock(tmp_path / "two.db", instrument=url).release()
 
 
-def test_simulated_instruments_are_as_many_as_wanted(tmp_path):
+def test_simulated_instruments_are_never_claimed(tmp_path):
     with (
         BenchLock(tmp_path / "one.db", instrument="sim:"),
         BenchLock(tmp_path / "two.db", instrument="sim:"),

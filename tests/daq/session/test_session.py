@@ -31,7 +31,7 @@ def test_measurement_is_complete_with_its_response(store):
     assert found.readback == {"SWE:STIM": "5 CYCLE"}
 
 
-def test_the_order_of_things(store):
+def test_session_acts_are_in_order(store):
     analyser = FakeAnalyser()
     events = measured(store, analyser=analyser)
     assert [entry[0] for entry in analyser.log] == [
@@ -62,7 +62,7 @@ def test_the_order_of_things(store):
     assert analyser.driven[1:] == [(v, f) for v in (0.5, 1.0) for f in PLAN.frequencies_hz]
 
 
-def test_downwards_is_downwards(store):
+def test_downward_sweep_descends(store):
     plan = SweepPlan(PLAN.frequencies_hz, (1.0,), direction="down")
     analyser = FakeAnalyser()
     measured(store, new(plan), analyser)

@@ -45,7 +45,7 @@ every_error = pytest.mark.parametrize("fault", ERRORS, ids=lambda e: type(e).__n
         (("after", 10), 9),
     ],
 )
-def test_a_fault_at_any_moment(store, fault, moment, kept):
+def test_fault_at_any_moment_switches_off(store, fault, moment, kept):
     analyser = FakeAnalyser({moment: fault})
     finished, error = broken(store, analyser)
     assert error is fault

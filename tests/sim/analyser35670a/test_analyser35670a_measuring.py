@@ -159,7 +159,7 @@ def test_settle_and_integrate_cycles_reach_the_device(bench):
         (["SWE:MODE MAN", "FREQ:MAN 150"], [150]),
     ],
 )
-def test_which_points_are_measured(bench, changes, expected):
+def test_sweep_settings_decide_measured_points(bench, changes, expected):
     plant = Recording()
     bench(plant=plant).sweep(*changes)
     assert plant.frequencies == pytest.approx(expected)

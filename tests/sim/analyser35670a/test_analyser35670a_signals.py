@@ -46,7 +46,7 @@ def test_fixed_range_clips_and_flags_point(bench):
     assert np.abs(gains) == pytest.approx(np.full(401, clipped), rel=1e-4)
 
 
-def test_the_bits_of_half_range(bench):
+def test_half_range_bits_follow_input_level(bench):
     controller = bench(plant=LinearPlant(lambda hz: 0.1), **NOISELESS)
     controller.sweep("VOLT1:RANG 1.2 VPK", "VOLT2:RANG 5 VPK", "SOUR:VOLT 1 VPK")
     assert controller.integer("STAT:QUES:VOLT:COND?") == ABOVE_HALF_1

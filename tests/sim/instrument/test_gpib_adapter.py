@@ -137,7 +137,7 @@ def test_410_follows_unread_reply(host):
     assert host.send(b"SYST:ERR?\n++read eoi\n") == b'-410,"Query interrupted"\n'
 
 
-def test_auto_reads_after_every_line_and_annoys(host):
+def test_automatic_read_after_command_gives_420(host):
     assert host.send(b"++auto 1\n*OPT?\n") == b'"1D2"\n'
     host.send(b"*RST\n")
     host.wait(1.1)
@@ -204,7 +204,7 @@ def test_a_dead_instrument_answers_no_poll(bench):
     assert host.send(b"++addr\n") == b"11\r\n"
 
 
-def test_a_restart_is_deaf_and_forgets(host):
+def test_restart_ignores_input_and_resets_settings(host):
     host.send(b"++rst\n")
     assert host.send(b"++addr\n") == b""
     assert host.wait(4.9) == b""
@@ -241,7 +241,7 @@ def test_an_ar488_cuts_long_lines(arduino):
     assert errors.startswith(b"-1")
 
 
-def test_a_prologix_does_not(host):
+def test_prologix_passes_long_lines(host):
     line = b";".join([b":FREQ:STEP 5"] * 20)
     host.send(line + b"\n")
     assert host.send(b"SYST:ERR?\n++read eoi\n") == b'+0,"No error"\n'

@@ -281,7 +281,7 @@ def test_device_recovers_from_any_input(data):
 
 
 @pytest.mark.parametrize("fault", sorted(MODEL.faults))
-def test_every_fault_strikes(fault):
+def test_every_fault_has_effect(fault):
     bench = Bench([f"{fault}:point=0"])
     try:
         bench.swept(points=10)

@@ -41,7 +41,7 @@ def test_text_after_unit_is_its_serial_number(tmp_path):
     run(way)
 
 
-def test_a_digit_after_connecting_is_a_step(tmp_path):
+def test_digit_after_connecting_selects_step(tmp_path):
     async def way():
         async with operated(tmp_path / "bench.db") as op:
             await op.connects("sim:?seed=3")

@@ -40,7 +40,7 @@ OPENED = kinds.Opened(7, PLAN, 0, 6, 12.0)
 SOURCE_OFF = kinds.CheckLine("source", "pass", "confirmed off")
 
 
-def test_the_trial_point_is_not_called_off():
+def test_trial_point_shows_source_on():
     assert told(OPENED).source_text == "SOURCE not asked yet"
     assert told(OPENED, SOURCE_OFF).source_text == "SOURCE ON at 1.5 V peak"
     held = told(OPENED, SOURCE_OFF, kinds.Paused(SourceState.CONFIRMED_OFF), hold=True)

@@ -234,7 +234,7 @@ def test_drawn_effect_is_in_range_and_visible(unit, name):
                 assert abs(value / known - 1.0) > 0.1
 
 
-def test_every_effect_is_drawn_at_last():
+def test_every_common_effect_is_drawn():
     rng = np.random.default_rng(1)
     seen = {draw_effect(ADSS, (110.0, 170.0), rng).id for _ in range(500)}
     assert seen == set(COMMON)

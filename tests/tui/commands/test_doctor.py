@@ -131,7 +131,7 @@ def test_failing_check_does_not_end_others():
     assert "--debug doctor" in found[1].remedy
 
 
-def test_an_old_python(monkeypatch):
+def test_old_python_is_a_failure(monkeypatch):
     assert only(software.check_python()).state == "ok"
     monkeypatch.setattr(platform, "python_version", lambda: "3.9.18")
     finding = only(software.check_python())

@@ -129,7 +129,7 @@ def test_impossible_request_is_one_line(run, words, code, said):
     assert said in errors[0]
 
 
-def test_hardware_is_not_driven_without_a_word(run, db, monkeypatch):
+def test_hardware_is_driven_only_with_yes(run, db, monkeypatch):
     monkeypatch.setattr("sys.stdin", io.StringIO("y\n"))
     code, out, err = run(*measuring(url="TCPIP::127.0.0.1::9::SOCKET"))
     assert (code, out) == (2, "")
@@ -183,7 +183,7 @@ def test_adaptive_adds_points_within_its_budget(run, db):
 
 @pytest.mark.parametrize("band", [(110, 175, 40), (115, 165, 26), (33, 47, 3), (100.1, 180.3, 7)])
 @pytest.mark.parametrize("direction", ["up", "down"])
-def test_no_end_of_a_band_is_lost(run, db, band, direction):
+def test_both_ends_of_band_are_measured(run, db, band, direction):
     start, stop, points = band
     plan = ["--level", "2.5", "--start", start, "--stop", stop, "--points", points]
     code, _, _ = run(*measuring("--direction", direction, plan=plan))

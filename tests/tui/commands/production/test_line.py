@@ -221,7 +221,7 @@ def test_unwritable_table_does_not_stop_line(here, tmp_path):
 
 
 @given(st.text(st.characters(codec="utf-8"), max_size=30))
-def test_any_serial_is_taken_clean_or_refused(text):
+def test_any_serial_is_cleaned_or_refused(text):
     try:
         serial = clean_serial(text)
     except InputError as error:
