@@ -92,10 +92,10 @@ def test_coarse_log_grid_keeps_deep_valley():
 @pytest.mark.parametrize(
     "name",
     [
-        "low-pass at 1.1 RF, zeta 1",
+        pytest.param("low-pass at 1.1 RF, zeta 1", marks=pytest.mark.long),
         "low-pass at RF, zeta 0.7",
-        "zeta 0.3 / 0.3",
-        "mode above the band",
+        pytest.param("zeta 0.3 / 0.3", marks=pytest.mark.long),
+        pytest.param("mode above the band", marks=pytest.mark.long),
         "constant noise above the valley's depth",
     ],
 )

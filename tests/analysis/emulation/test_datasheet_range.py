@@ -34,7 +34,7 @@ def test_noise_leaves_datasheet_range_unchanged():
     np.testing.assert_allclose(found.reach, SIGMAS)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_sharp_resonance_off_datasheet_is_found(seed):
     """At 5 % the resonance of a robot's axis moves by its width, and slopes tell little."""
     unit = load_unit("r3-1")

@@ -46,7 +46,7 @@ def within(found, truth, sigmas):
     return abs(found.value - truth) <= sigmas * found.std
 
 
-@pytest.mark.parametrize("ratio", [0.15, 0.6])
+@pytest.mark.parametrize("ratio", [0.15, pytest.param(0.6, marks=pytest.mark.long)])
 def test_short_sweep_estimates_ratio_off_datasheet(ratio, cache):
     unit = load_unit("adss")
     machine = unit.with_parameters(
@@ -122,7 +122,9 @@ def test_driven_dc_offset_is_no_backlash():
     assert estimate_response(stripped, unit).warnings
 
 
-@pytest.mark.parametrize(("level_vpk", "seed"), [(0.25, 1), (0.5, 2), (0.5, 3)])
+@pytest.mark.parametrize(
+    ("level_vpk", "seed"), [(0.25, 1), (0.5, 2), pytest.param(0.5, 3, marks=pytest.mark.long)]
+)
 def test_uninformative_sweep_leaves_ratio_open(level_vpk, seed, cache):
     """The motor is held by friction, or moves within its play: every ratio shows the same.
 
@@ -182,7 +184,7 @@ def test_seed_gives_same_answer_with_cached_machines(tmp_path):
 @pytest.mark.parametrize(
     ("name", "truth"),
     [
-        ("practice-09", 0.9328),
+        pytest.param("practice-09", 0.9328, marks=pytest.mark.long),
         # The dear one of the two; `make blind` runs it.
         pytest.param("practice-10", 0.5484, marks=pytest.mark.study),
     ],
@@ -201,7 +203,7 @@ def test_practice_sets_without_hidden_cause(name, truth):
     "number",
     # It was advised on the wrong stage, as was 06; `make blind` runs these six more.
     [
-        "04",
+        pytest.param("04", marks=pytest.mark.long),
         *(pytest.param(n, marks=pytest.mark.study) for n in ("02", "03", "05", "06", "07", "08")),
     ],
 )

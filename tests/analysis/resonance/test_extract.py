@@ -54,9 +54,9 @@ def test_noted_truth_has_known_extrema():
     ("truth", "how"),
     [
         (NOTED, {}),
-        (Truth(), {}),
-        (Truth(integrator=False), {}),
-        (Truth(corner=135.0, delay_s=1e-3), {}),
+        pytest.param(Truth(), {}, marks=pytest.mark.long),
+        pytest.param(Truth(integrator=False), {}, marks=pytest.mark.long),
+        pytest.param(Truth(corner=135.0, delay_s=1e-3), {}, marks=pytest.mark.long),
         (Truth(corner=135.0, delay_s=1e-3), {"stated": False}),
     ],
     ids=["noted", "5 %", "bare", "filtered", "filtered, noise unknown"],
@@ -74,6 +74,7 @@ def test_linear_truth_is_within_bounds_and_errors(truth, how):
     assert np.all(np.abs(off.mean(axis=0)) < 4 * error / math.sqrt(DRAWS))
 
 
+@pytest.mark.long
 def test_twice_the_noise_power_stays_within_bounds():
     off, std = readings(NOTED, 0.02)
     error = rms(off)
@@ -135,9 +136,10 @@ def cramer_rao(truth, noise):
     "truth",
     [
         Truth(zero=130, pole=145, zeta_zero=0.02, zeta_pole=0.02, start=100, stop=180),
-        Truth(zero=130, pole=145, start=100, stop=180),
-        Truth(
-            zero=130, pole=145, zeta_zero=0.02, zeta_pole=0.02, start=100, stop=180, step=80 / 60
+        pytest.param(Truth(zero=130, pole=145, start=100, stop=180), marks=pytest.mark.long),
+        pytest.param(
+            Truth(130, 0.02, 145, 0.02, start=100, stop=180, step=80 / 60),
+            marks=pytest.mark.long,
         ),
     ],
     ids=["130/145 Hz, 2 %", "130/145 Hz, 5 %", "130/145 Hz on 61 points"],
@@ -154,7 +156,7 @@ def test_errors_approach_the_cramer_rao_bound(truth):
 
 
 def test_bars_grow_with_noise():
-    widths = [rms(readings(NOTED, noise, draws=20)[1])[0] for noise in (0.005, 0.02, 0.05)]
+    widths = [rms(readings(NOTED, noise, draws=8)[1])[0] for noise in (0.005, 0.02, 0.05)]
     assert widths[1] / widths[0] == pytest.approx(4, rel=0.1)
     assert widths[2] / widths[1] == pytest.approx(2.5, rel=0.1)
 

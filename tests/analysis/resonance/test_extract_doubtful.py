@@ -22,7 +22,7 @@ from daq.frf import DB_PER_NEPER, FrequencyResponse, PointFlag
 )
 def test_feature_outside_band_is_null_with_reason(band, missing, why):
     truth = Truth(zeta_zero=0.03, start=band[0], stop=band[1])
-    for seed in range(10):
+    for seed in range(4):
         (level,) = extract(truth.measured(seed, 0.02))
         assert (level.arf is None) == (missing in ("arf", "both"))
         assert (level.rf is None) == (missing in ("rf", "both"))
@@ -36,14 +36,23 @@ def test_feature_outside_band_is_null_with_reason(band, missing, why):
 def test_remaining_feature_in_band_is_read():
     truth = Truth(zeta_zero=0.03, start=42)
     off = []
-    for seed in range(50):
+    for seed in range(20):
         (level,) = extract(truth.measured(seed, 0.02))
         off.append((level.rf.frequency_hz - truth.extrema()[1]) / level.rf.std_hz)
     assert np.sqrt(np.mean(np.square(off))) < 1.4
 
 
-@pytest.mark.parametrize("points", [31, 61, 181])
-@pytest.mark.parametrize("stated", [True, False])
+@pytest.mark.parametrize(
+    ("points", "stated"),
+    [
+        (31, True),
+        (61, False),
+        *(
+            pytest.param(*one, marks=pytest.mark.long)
+            for one in ((31, False), (61, True), (181, True), (181, False))
+        ),
+    ],
+)
 def test_noise_has_no_features(points, stated):
     found = 0
     for seed in range(40):
