@@ -211,13 +211,16 @@ def plot(
     unit: str | None = None,
     ratio: float | None = None,
 ) -> Figure:
-    """Draw one or several responses, with the model of a unit and a ratio if both are given.
+    """Draw one or several responses, with the model of a unit and the band of its datasheet.
+
+    Without a ratio the band is that of any ratio (`analysis.estimate.datasheet_band`).
 
     Raises
     ------
     InputError
-        If there are too many, not as many names, or a unit without a ratio.
+        If there are too many, not as many names, or a ratio without a unit.
     """
+    from analysis.estimate.datasheet_band import Known, datasheet_band
     from analysis.plots import Curve, draw_overlay, predicted
     from daq.errors import InputError
     from sim.unit import load_unit
@@ -226,14 +229,17 @@ def plot(
     shown = list(names) or [f"response {number}" for number in range(1, len(plain) + 1)]
     if len(shown) != len(plain):
         raise InputError(f"{len(shown)} names for {len(plain)} responses; give one for each")
-    if (unit is None) != (ratio is None):
-        raise InputError("a model needs a unit and a ratio; give both, or none")
+    if unit is None and ratio is not None:
+        raise InputError("a ratio is that of a unit's model; give the unit, too")
     curves = []
     for name, response in zip(shown, plain, strict=True):
-        model: tuple[FrequencyResponse, ...] = ()
-        if unit is not None and ratio is not None:
-            model = predicted(response, load_unit(unit), ratio)
-        curves.append(Curve(name, response, model))
+        if unit is None:
+            curves.append(Curve(name, response))
+            continue
+        subject, known = load_unit(unit), Known(None if ratio is None else (ratio, 0.0))
+        model = () if ratio is None else predicted(response, subject, ratio)
+        band = datasheet_band(response, subject, known, progress=_progress())
+        curves.append(Curve(name, response, model, band))
     return draw_overlay(curves)
 
 

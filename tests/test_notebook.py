@@ -86,5 +86,5 @@ def test_fault_states_stored_points_and_source_off(tmp_path):
 
 def test_ratio_without_unit_is_refused():
     response = FrequencyResponse.from_arrays([100.0, 110.0], 1.0, [1j, 2j], unit="ADSS")
-    with pytest.raises(InputError, match="a unit and a ratio"):
+    with pytest.raises(InputError, match="give the unit"):
         lb.plot(response, ratio=0.3)

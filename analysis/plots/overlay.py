@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from analysis.drawing.palette import LEVEL_COLOURS
 from analysis.drawing.picture import save_picture
+from analysis.estimate.datasheet_band import DatasheetBand, LevelBand
 from analysis.plots.traces import Trace, level_traces, on_one_branch
 from daq.errors import InputError
 from daq.frf import FrequencyResponse
@@ -45,11 +46,15 @@ _SHARP, _BAND = 3.0, 0.2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Curve:
-    """A response to draw, the name it has in the legend, and what a model gives for its sweep."""
+    """A response to draw, the name it has in the legend, and what a model gives for its sweep.
+
+    `band`: where units of the datasheet read; its median stands for a model that is not given.
+    """
 
     name: str
     response: FrequencyResponse
     model: tuple[FrequencyResponse, ...] = ()
+    band: DatasheetBand | None = None
 
 
 def draw_overlay(curves: Sequence[Curve]) -> Figure:
@@ -77,7 +82,10 @@ def draw_overlay(curves: Sequence[Curve]) -> Figure:
         for response in one.model
         for trace in level_traces(response)
     ]
-    placed = on_one_branch([trace for _, trace in (*drawn, *models)])
+    bands = [(i, one) for i, curve in enumerate(curves) if curve.band for one in curve.band.levels]
+    middles = [(i, _median(one)) for i, one in bands]
+    models += [(i, trace) for i, trace in middles if not curves[i].model]
+    placed = on_one_branch([trace for _, trace in (*drawn, *models, *middles)])
     levels = _levels([trace for _, trace in drawn])
     styles = _Styles(levels, len(curves))
     entries = _entries(curves, levels, styles, bool(models))
@@ -85,17 +93,25 @@ def draw_overlay(curves: Sequence[Curve]) -> Figure:
     rows = math.ceil(len(entries) / columns) + 1
     figure = Figure(figsize=(_WIDTH_IN, _HEIGHT_IN + _ROW_IN * rows), layout="constrained")
     gain, phase = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    for place, ((curve, _), trace) in enumerate(zip((*drawn, *models), placed, strict=True)):
+    both = (*drawn, *models)
+    for place, ((curve, _), trace) in enumerate(zip(both, placed[: len(both)], strict=True)):
         style = styles.of(curve, trace.source_vpk, model=place >= len(drawn))
         _line(gain, trace.frequency_hz, trace.gain_db, trace.gain_std_db, style)
         _line(phase, trace.frequency_hz, trace.phase_deg, trace.phase_std_deg, style)
         if np.isfinite(trace.spoilt_db).any():
             hollow = style | {"linestyle": "none", "markerfacecolor": "none"}
             gain.plot(trace.frequency_hz, trace.spoilt_db, **hollow)
+    for (curve, one), middle in zip(bands, placed[len(drawn) + len(models) :], strict=True):
+        colour = styles.of(curve, one.source_vpk)["color"]
+        turned = middle.phase_deg - one.phase_deg[1]
+        for axes, edges in ((gain, one.gain_db), (phase, one.phase_deg + turned)):
+            axes.fill_between(
+                one.frequency_hz, edges[0], edges[2], color=colour, alpha=_BAND, linewidth=0.0
+            )
     _dress(gain, phase, curves, placed)
     figure.legend(
-        handles=entries, title=_legend_title(placed, bool(models)), title_fontsize=8, fontsize=8,
-        loc="outside upper center", ncols=columns,
+        handles=entries, title=_legend_title(placed, bool(models), curves), title_fontsize=8,
+        fontsize=8, loc="outside upper center", ncols=columns,
     )  # fmt: skip
     return figure
 
@@ -211,15 +227,32 @@ def _columns(labels: Sequence[Any]) -> int:
     return max(1, min(len(labels), int(_WIDTH_IN / widest), 6))
 
 
-def _legend_title(traces: Sequence[Trace], model: bool) -> str:
+def _median(one: LevelBand) -> Trace:
+    """The middle of a band, as a trace without errors."""
+    unknown = np.full(len(one.frequency_hz), np.nan)
+    return Trace(
+        one.source_vpk,
+        one.frequency_hz,
+        one.gain_db[1],
+        unknown,
+        one.phase_deg[1],
+        unknown,
+        unknown,
+    )
+
+
+def _legend_title(traces: Sequence[Trace], model: bool, curves: Sequence[Curve]) -> str:
     parts = []
     if any(np.isfinite(t.gain_std_db).any() or np.isfinite(t.phase_std_deg).any() for t in traces):
-        parts.append("bands: ± one standard error, as stated")
+        parts.append("bands along the line: ± one standard error, as stated")
     if any(np.isfinite(t.spoilt_db).any() for t in traces):
         parts.append("hollow: spoilt readings")
     if model:
         parts.append("dashed: model")
-    return "; ".join(parts)
+    title = "; ".join(parts)
+    for words in dict.fromkeys(curve.band.words for curve in curves if curve.band):
+        title += f"\n{words}"
+    return title
 
 
 def _dress(gain: Axes, phase: Axes, curves: Sequence[Curve], traces: Sequence[Trace]) -> None:

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from analysis.estimate.datasheet_band import DatasheetBand, LevelBand
 from analysis.plots import Curve, draw_overlay
 from analysis.plots.traces import level_traces, on_one_branch
 from daq.errors import InputError
@@ -128,6 +129,23 @@ def test_model_is_dashed_on_branch_of_measurement():
     one, two = long_lines(figure.axes[1])
     assert (one.get_linestyle(), two.get_linestyle()) == ("-", "--")
     assert np.abs(one.get_ydata() - two.get_ydata()).max() < 20.0
+
+
+def test_datasheet_band_is_about_its_median():
+    hz, phase = np.linspace(100.0, 140.0, 5), np.linspace(-170.0, -190.0, 5)
+    level = LevelBand(2.5, hz, np.array([[-9.0], [-7.0], [-4.0]]) + np.zeros(5),
+                      phase + 360.0 + np.array([[-5.0], [0.0], [8.0]]))  # fmt: skip
+    seen = FrequencyResponse.from_arrays(hz, 2.5, 0.5 * np.exp(1j * np.radians(phase)), unit="ADSS")
+    figure = draw_overlay(
+        [Curve("a.csv", seen, band=DatasheetBand((level,), "datasheet", "WORDS"))]
+    )
+    gain, phases = figure.axes
+    for axes, low, high in ((gain, -9.0, -4.0), (phases, -195.0, -162.0)):
+        (band,) = axes.collections
+        corners = band.get_paths()[0].vertices
+        assert (corners[:, 1].min(), corners[:, 1].max()) == pytest.approx((low, high))
+    assert "WORDS" in figure.legends[0].get_title().get_text()
+    assert legend(figure)[-1] == "model"
 
 
 def test_spoilt_readings_are_hollow_and_break_line():

@@ -194,8 +194,8 @@ def test_prediction_has_dashed_line_and_error_bars():
     """The prediction lies in a band, and stated errors are bars."""
     gain = response().at_level(1.5)
     model = Prediction(
-        "plain model", HERTZ, gain.gain_db - 6.0, np.full(41, 2.0), gain.phase_deg,
-        np.full(41, 5.0), 0,
+        "plain model", HERTZ, gain.gain_db - 6.0, gain.gain_db + [[-8.0], [-4.0]], gain.phase_deg,
+        gain.phase_deg + [[-5.0], [5.0]], 0,
     )  # fmt: skip
 
     async def steps(app, pilot):

@@ -75,12 +75,15 @@ def test_model_or_stored_answer_is_drawn_beside(run, db, short, tmp_path):
     assert "r = 0.300" in err
     assert len(beside.read_bytes()) > len(bare.read_bytes())
     code, _, err = run("plot", "1", "--model", "--out", beside)
-    assert code == 2
-    assert "no accepted model" in err
+    assert code == 0, err
+    assert "ADSS, any r" in err
+    assert "32 simulated units" in err
+    assert "r anywhere from 0 to 1" in err
     keep(db, {"value": 0.41, "std": 0.02, "interval95": [0.37, 0.45]})
     code, _, err = run("plot", "1", "--model", "--out", beside)
     assert code == 0, err
     assert "ADSS, r = 0.410" in err
+    assert "r = 0.410 +- 0.020 by the stored answer" in err
 
 
 @pytest.mark.parametrize(
@@ -89,7 +92,7 @@ def test_model_or_stored_answer_is_drawn_beside(run, db, short, tmp_path):
         (["--out", "a.gif"], ".png, .svg, .pdf"),
         (["--out", "nosuffix"], "no suffix"),
         (["--ratio", "0.3", "--out", "a.png"], "--model"),
-        (["--model", "--out", "a.png"], "needs --unit and --ratio"),
+        (["--model", "--out", "a.png"], "needs --unit"),
         (["--model", "--unit", "adss", "--ratio", "1.5", "--out", "a.png"], "give 0 to 1"),
         (["--only-level", "9", "--out", "a.png"], "it has 1.5, 2.5"),
         (["gone.csv", "--out", "a.png"], "gone.csv"),

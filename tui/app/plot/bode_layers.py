@@ -44,7 +44,7 @@ def gain_layers(
     curves: list[Layer] = []
     seen: list[Array] = []
     for one in predictions:
-        low, high = one.gain_db - one.gain_std_db, one.gain_db + one.gain_std_db
+        low, high = one.gain_band_db
         bands.append(Band(one.frequency_hz, low, high, palette.tint(one.colour)))
         curves.append(Curve(one.frequency_hz, one.gain_db, palette.colour(one.colour), dashed=True))
         seen += [part[_within(one.frequency_hz, band_hz)] for part in (low, high)]
@@ -84,7 +84,7 @@ def phase_layers(
     marks: list[Layer] = []
     seen: list[Array] = []
     for one, phase in zip(predictions, smooth[len(traces) :], strict=True):
-        low, high = phase - one.phase_std_deg, phase + one.phase_std_deg
+        low, high = one.phase_band_deg + (phase - one.phase_deg)
         bands.append(Band(one.frequency_hz, low, high, palette.tint(one.colour)))
         curves.append(Curve(one.frequency_hz, phase, palette.colour(one.colour), dashed=True))
         seen.append(phase[_within(one.frequency_hz, band_hz)])

@@ -1,4 +1,4 @@
-"""From the document of a diagnosis to what plots draw: predictions, residuals, distributions.
+"""What plots draw of a diagnosis or a datasheet: predictions, residuals, distributions.
 
 Owns that reading. A document of an earlier version may lack them: then there is nothing to draw.
 """
@@ -6,7 +6,7 @@ Owns that reading. A document of an earlier version may lack them: then there is
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -15,7 +15,17 @@ from tui.app.plot.layers import Array, Band, Curve, Layer, Line, Marks
 from tui.app.plot.scales import frequency_scale, linear_scale
 from tui.app.plot.traces import LEVEL_MARKS, Prediction
 
-__all__ = ["MODEL_NAMES", "Which", "predictions_of", "ratio_drawing", "residual_drawing"]
+if TYPE_CHECKING:
+    from analysis.estimate.datasheet_band import DatasheetBand
+
+__all__ = [
+    "MODEL_NAMES",
+    "Which",
+    "band_predictions",
+    "predictions_of",
+    "ratio_drawing",
+    "residual_drawing",
+]
 
 Which = Literal["baseline", "extended"]
 
@@ -46,13 +56,28 @@ def predictions_of(document: Mapping[str, Any], which: Which) -> list[Prediction
                 MODEL_NAMES[which],
                 hertz[at],
                 part["gain_db"][at],
-                part["gain_std_db"][at],
+                _about(part["gain_db"][at], part["gain_std_db"][at]),
                 part["phase_deg"][at],
-                part["phase_std_deg"][at],
+                _about(part["phase_deg"][at], part["phase_std_deg"][at]),
                 index,
             )
         )
     return found
+
+
+def band_predictions(band: DatasheetBand) -> list[Prediction]:
+    """What units of the datasheet read at each level, in the sweep that was made first."""
+    found: dict[float, Prediction] = {}
+    for one in band.levels:
+        index = len(found)
+        low, middle, high = one.gain_db
+        phase_low, phase, phase_high = one.phase_deg
+        prediction = Prediction(
+            band.name, one.frequency_hz, middle, np.stack([low, high]),
+            phase, np.stack([phase_low, phase_high]), index,
+        )  # fmt: skip
+        found.setdefault(one.source_vpk, prediction)
+    return list(found.values())
 
 
 def residual_drawing(chart: Chart, document: Mapping[str, Any], which: Which) -> Drawing | None:
@@ -123,6 +148,11 @@ def _rows(told: Mapping[str, Any]) -> tuple[Array, Array, Any]:
     """Level and frequency of each reading, and which belong to the first sweep."""
     sweeps = np.array(told["sweep"])
     return _numbers(told["source_vpk"]), _numbers(told["frequency_hz"]), sweeps == 0
+
+
+def _about(middle: Array, std: Array) -> Array:
+    """A band of one standard deviation of a single reading."""
+    return np.stack([middle - std, middle + std])
 
 
 def _numbers(values: Sequence[float | None]) -> Array:

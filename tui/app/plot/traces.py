@@ -91,15 +91,15 @@ class Trace:
 class Prediction:
     """What a model says of one source level; arrays of shape (points,), ascending frequency.
 
-    `gain_std_db`, `phase_std_deg`: one standard deviation of a single reading beside it.
+    `gain_band_db`, `phase_band_deg`: low and high edge of the band about it, (2, points).
     """
 
     name: str
     frequency_hz: NDArray[np.float64]
     gain_db: NDArray[np.float64]
-    gain_std_db: NDArray[np.float64]
+    gain_band_db: NDArray[np.float64]
     phase_deg: NDArray[np.float64]
-    phase_std_deg: NDArray[np.float64]
+    phase_band_deg: NDArray[np.float64]
     colour: int
 
 

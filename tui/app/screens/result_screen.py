@@ -7,7 +7,7 @@ and what is there of it is shown.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from textual.app import ComposeResult
 from textual.binding import Binding
@@ -17,9 +17,9 @@ from analysis.execution.pace import Pace, duration
 from tui.app.plot.bode import BodePlot
 from tui.app.plot.chart import Chart
 from tui.app.plot.curves import index_drawing
-from tui.app.plot.predictions import Which, predictions_of
+from tui.app.plot.predictions import Which, band_predictions, predictions_of
 from tui.app.plot.traces import LEVEL_MARKS, Prediction, traces_of_response
-from tui.app.step_screen import StepScreen
+from tui.app.screens.earlier_sweep import EarlierSweep
 from tui.app.widgets.plain import Words
 
 if TYPE_CHECKING:
@@ -28,13 +28,15 @@ if TYPE_CHECKING:
 
 __all__ = ["ResultScreen", "answer_lines"]
 
-_MODELS: tuple[Which | None, ...] = ("extended", "baseline", None)
-"""Whose prediction is shown, in the order of the key."""
+Shown = Which | Literal["datasheet"] | None
+"""Whose prediction is under the points."""
+
+_DIAGNOSED: tuple[Which, ...] = ("extended", "baseline")
 
 _INDEX_WORDS = "error index in Hz over the contribution ratio of stage 1: least is likeliest"
 
 
-class ResultScreen(StepScreen):
+class ResultScreen(EarlierSweep):
     """What the response says of the gears."""
 
     STEP = 5
@@ -46,10 +48,14 @@ takes a while; the screen stays free meanwhile. Where the unit's own model does 
 response there is no advice before a diagnosis (step 6); after it, the numbers are those of the
 model that the diagnosis accepts.
 
-After a diagnosis, M puts a model's prediction under the points: a dashed line in the band of one
-standard deviation, with the cause that was named or without. Each level is predicted from the
-others.
+M puts a model's prediction under the points, a dashed line in its band. Before a diagnosis it is
+what units of this datasheet read: some are simulated, with values off by their tolerances and the
+ratio of the estimate (any ratio, before it), and the band holds the middle 68 % of them. It takes
+some seconds beside the screen; M again ends it. After a diagnosis there are also the model with
+the cause that was named and the one without, in the band of one standard deviation. Each level is
+predicted from the others then.
 
+L puts the latest complete session of this unit behind the points.
 V changes between the Bode plot and the error index, the paper's measure over the ratio: the
 least index marks the likeliest ratio. E estimates once more. A response that looks like a mistake
 is not estimated; A takes it as it stands. Ctrl+Y copies everything.
@@ -61,9 +67,10 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
             "model",
             "Model",
             id="result.model",
-            tooltip="The model's prediction: plain, with the cause, none",
+            tooltip="The model's prediction: by the datasheet, by the diagnosis, none",
         ),
         Binding("g", "panels", "Gain/phase", id="result.panels", show=False),
+        Binding("l", "reference", "Reference", id="result.reference", show=False),
         Binding("e", "estimate", "Estimate", id="result.estimate", show=False),
         Binding("a", "as_is", "As it is", id="result.as-is", show=False),
     ]
@@ -84,8 +91,8 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
 
     def __init__(self) -> None:
         super().__init__()
-        self._model: Which | None = "extended"
-        self._pace = Pace()
+        self._model: Shown = "extended"
+        self._pace, self._band_pace = Pace(), Pace()
 
     def body(self) -> ComposeResult:
         """Plot above, words below; side by side where there is room."""
@@ -115,9 +122,11 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
 
     def show_body(self) -> None:
         """Plot and words from the desk."""
-        results = self.desk.results
+        results, measurement = self.desk.results, self.desk.measurement
         plot = self.query_one(BodePlot)
         traces = [] if results.response is None else traces_of_response(results.response)
+        if self.desk.reference is not None and self.desk.reference_name != f"#{measurement}":
+            traces += traces_of_response(self.desk.reference, self.desk.reference_name)
         features = [
             (feature.frequency_hz, f"{LEVEL_MARKS[at % len(LEVEL_MARKS)]}{name}")
             for at, level in enumerate(results.features)
@@ -133,18 +142,22 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
     def hint(self) -> str:
         """Wait, or go on."""
         if "result" in self.bench.analyses.progress:
-            return "Estimating beside the screen; look around.  Ctrl+N: on to the diagnosis"
+            return "Estimating beside the screen.  M: the model.  Ctrl+N: on to the diagnosis"
         if "result" in self.desk.results.faults:
             return "E: estimate once more.  A: take it as it is.  Ctrl+N: on to the diagnosis"
         if self.desk.results.estimate is None:
             return "E: estimate once more.  Ctrl+N: on to the diagnosis"
         if self.desk.results.diagnosis is not None:
             return "M: another model.  V: the error index.  Ctrl+N: on to the diagnosis"
-        return "V: the error index.  Ctrl+Y: copy.  Ctrl+N: on to the diagnosis"
+        return "M: the model.  V: the error index.  Ctrl+N: on to the diagnosis"
 
     def copy_text(self) -> str:
         """All lines."""
         return "\n".join(self._lines())
+
+    def shown_measurement(self) -> int | None:
+        """The one that the results are about."""
+        return self.desk.measurement
 
     def action_view(self) -> None:
         """Bode plot or error index."""
@@ -153,27 +166,50 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
 
     def action_model(self) -> None:
         """Another model's prediction under the points, or none."""
-        diagnosis = self.desk.results.diagnosis
-        if diagnosis is None:
-            self.notify("diagnose first: step 6")
-            return
-        document = diagnosis.to_json()
-        there: list[Which | None] = [
-            one for one in _MODELS if one is None or predictions_of(document, one)
-        ]
-        if len(there) == 1:
-            self.notify("this diagnosis tells no prediction; D in step 6 makes it anew")
-        shown = _shown(self._model, document)
-        self._model = there[(there.index(shown) + 1) % len(there)]
+        there = self._models()
+        self._model = there[(there.index(self._shown()) + 1) % len(there)]
+        if self._model == "datasheet" and self.desk.results.band is None:
+            self.bench.analyses.begin("band")
+        elif self._model is None:
+            self.bench.analyses.stop("band")
         self.show()
 
-    def _predictions(self) -> list[Prediction]:
+    def _models(self) -> list[Shown]:
+        """Models whose prediction can be shown, in the order of the key; none last."""
         diagnosis = self.desk.results.diagnosis
-        if diagnosis is None or self._model is None:
+        told: list[Shown] = []
+        if diagnosis is not None:
+            document = diagnosis.to_json()
+            told = [one for one in _DIAGNOSED if predictions_of(document, one)]
+        return [*told, "datasheet", None]
+
+    def _shown(self) -> Shown:
+        """The model that is shown: where no cause is named, the plain one in place of the other."""
+        there = self._models()
+        wanted = (self._model, "baseline") if self._model == "extended" else (self._model,)
+        return next((one for one in wanted if one in there), None)
+
+    def _predictions(self) -> list[Prediction]:
+        results, shown = self.desk.results, self._shown()
+        if shown == "datasheet":
+            return [] if results.band is None else band_predictions(results.band)
+        if shown is None or results.diagnosis is None:
             return []
-        document = diagnosis.to_json()
-        shown = _shown(self._model, document)
-        return [] if shown is None else predictions_of(document, shown)
+        return predictions_of(results.diagnosis.to_json(), shown)
+
+    def _band_lines(self) -> list[str]:
+        """What the datasheet's band is, or how far it is."""
+        if self._shown() != "datasheet":
+            return []
+        results = self.desk.results
+        if "band" in self.bench.analyses.progress:
+            fraction, text = self.bench.analyses.progress["band"]
+            left_s = self._band_pace.remaining_s(fraction)
+            left = "" if left_s is None else f", {duration(left_s)} left"
+            return [f"{text or 'simulating'} {100 * fraction:.0f} %{left}; M ends it"]
+        if "band" in results.faults:
+            return [f"NO PREDICTION: {results.faults['band']}"]
+        return [] if results.band is None else [results.band.words]
 
     def action_panels(self) -> None:
         """Gain alone, or gain and phase."""
@@ -197,7 +233,7 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
         from analysis.resonance.records import summary
 
         desk, results = self.desk, self.desk.results
-        lines: list[str] = []
+        lines = self._band_lines()
         below: list[str] = []
         if results.estimate is not None and desk.unit is not None:
             diagnosis = None if results.diagnosis is None else results.diagnosis.to_json()
@@ -217,13 +253,6 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
             wide = not self.has_class("-narrow") and not self.has_class("-side")
             lines += [head, *(summary(results.features) if wide else _brief(results.features))]
         return [*lines, *below] or [f"reading {head}"]
-
-
-def _shown(asked: Which | None, document: Mapping[str, Any]) -> Which | None:
-    """The model that is shown: where no cause is named, the plain one in place of the other."""
-    if asked == "extended" and not predictions_of(document, "extended"):
-        asked = "baseline"
-    return asked if asked is None or predictions_of(document, asked) else None
 
 
 def _brief(features: Sequence[LevelFeatures]) -> list[str]:

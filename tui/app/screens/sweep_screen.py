@@ -17,13 +17,12 @@ from textual.widgets import ProgressBar
 from tui.app.dialogs.dialogs import QuestionDialog
 from tui.app.plot.bode import BodePlot
 from tui.app.plot.traces import traces_of_points, traces_of_response
-from tui.app.state.sessions import latest_complete, one_session
-from tui.app.step_screen import StepScreen
+from tui.app.screens.earlier_sweep import EarlierSweep
+from tui.app.state.sessions import one_session
 from tui.app.widgets.plain import Words
 from tui.app.words import clock_in, plan_words, point_words, span_words
 
 if TYPE_CHECKING:
-    from daq.frf import FrequencyResponse
     from daq.store_records import Measurement
 
 __all__ = ["SweepScreen"]
@@ -31,7 +30,7 @@ __all__ = ["SweepScreen"]
 _VIEWS = ("-both", "-gain-only", "-phase-only")
 
 
-class SweepScreen(StepScreen):
+class SweepScreen(EarlierSweep):
     """Start, watch, pause, stop."""
 
     STEP = 4
@@ -220,26 +219,9 @@ standard error.
         self._view = (self._view + 1) % len(_VIEWS)
         self._show_view()
 
-    def action_reference(self) -> None:
-        """Put the latest complete session of this unit behind the sweep, or take it away."""
-        desk = self.desk
-        if desk.reference is not None:
-            desk.reference = None
-            self.show()
-        elif desk.unit is not None:
-            read = partial(
-                latest_complete, desk.db, desk.unit.name, desk.serial, desk.run.measurement
-            )
-            self.bench.beside.do(
-                "reference", read, self._take_reference, "The reference cannot be read"
-            )
-
-    def _take_reference(self, found: tuple[int, FrequencyResponse] | None) -> None:
-        if found is None:
-            self.notify("no earlier complete session of this unit")
-            return
-        self.desk.reference_name, self.desk.reference = f"#{found[0]}", found[1]
-        self.show()
+    def shown_measurement(self) -> int | None:
+        """The one of the session."""
+        return self.desk.run.measurement
 
     def on_bode_plot_cursor_moved(self) -> None:
         """The reading follows the cursor."""

@@ -21,11 +21,12 @@ from daq.servers.place import HistoryPlace
 from tui.app.messages import AnalysisDone, AnalysisFailed, AnalysisProgressed, Job
 
 if TYPE_CHECKING:
+    from analysis.estimate.datasheet_band import DatasheetBand
     from daq.frf import FrequencyResponse
     from daq.store_records import Measurement
     from sim.unit import Unit
 
-__all__ = ["Analyses", "Task", "diagnose", "read_result", "write_report"]
+__all__ = ["Analyses", "Task", "diagnose", "draw_band", "read_result", "write_report"]
 
 Post = Callable[[Message], object]
 Progress = Callable[[float, str], None]
@@ -49,6 +50,16 @@ def _diagnose(responses: Sequence[FrequencyResponse], unit: Unit, progress: Prog
     )
 
 
+def _band(
+    response: FrequencyResponse, unit: Unit, estimate: Any, progress: Progress
+) -> DatasheetBand:
+    from analysis.estimate.datasheet_band import datasheet_band, known_of_estimate
+
+    words = "simulating units of the datasheet"
+    known = known_of_estimate(estimate)
+    return datasheet_band(response, unit, known, progress=lambda part: progress(part, words))
+
+
 def _report(task: Task, diagnosis: Any, path: Path) -> None:
     from tui.measurements.reports import report_measurement
 
@@ -68,6 +79,9 @@ class Analyses:
         Gives the document of ``estimate --json``.
     diagnose
         Gives something with ``to_json()`` and ``summary()``, of a response and those it follows.
+    band
+        Gives what units of the datasheet read in the sweep of a response, by what its estimate
+        knows, which may be None.
     report
         Writes a file about a task's measurement, with its diagnosis or None.
     """
@@ -75,6 +89,7 @@ class Analyses:
     estimate: Callable[[FrequencyResponse, Unit, Progress], Mapping[str, Any]] = _estimate
     diagnose: Callable[[Sequence[FrequencyResponse], Unit, Progress], Any] = _diagnose
     report: Callable[[Task, Any, Path], None] = _report
+    band: Callable[[FrequencyResponse, Unit, Any, Progress], DatasheetBand] = _band
 
 
 class _GivenUp(Exception):
@@ -198,6 +213,16 @@ def diagnose(task: Task, analyses: Analyses) -> None:
         return made
 
     task.run("diagnosis", work)
+
+
+def draw_band(task: Task, analyses: Analyses, estimate: Any) -> None:
+    """What units of the datasheet would have read; the estimate that it is by goes with it."""
+
+    def work() -> tuple[DatasheetBand, Any]:
+        made = analyses.band(task.response(), task.unit, estimate, task.progress("band"))
+        return made, estimate
+
+    task.run("band", work)
 
 
 def write_report(task: Task, analyses: Analyses, diagnosis: Any, path: Path) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.errors import LashbenchError
-from tui.app.state.analyses import Analyses, Task, diagnose, read_result, write_report
+from tui.app.state.analyses import Analyses, Task, diagnose, draw_band, read_result, write_report
 from tui.app.state.desk import Results
 from tui.app.state.host import Host
 
@@ -37,7 +37,7 @@ class AnalysisKeeper:
     def __init__(self, app: Host, analyses: Analyses) -> None:
         self._app = app
         self._analyses = analyses
-        self._given_up = threading.Event()
+        self._given_up: dict[str, threading.Event] = {}
         self.progress: dict[str, tuple[float, str]] = {}
         """How far each is and what it does, by job; none that is over."""
 
@@ -47,11 +47,12 @@ class AnalysisKeeper:
         if job in self.progress or desk.measurement is None or desk.unit is None:
             return
         post = self._app.post_message
-        task = Task(post, desk.db, desk.measurement, desk.unit, self._given_up,
-                    desk.results.as_is)  # fmt: skip
+        given_up = self._given_up[job] = threading.Event()
+        task = Task(post, desk.db, desk.measurement, desk.unit, given_up, desk.results.as_is)
         works: dict[str, Callable[[], None]] = {
             "result": partial(read_result, task, self._analyses),
             "diagnosis": partial(diagnose, task, self._analyses),
+            "band": partial(draw_band, task, self._analyses, desk.results.estimate),
             "report": partial(
                 write_report, task, self._analyses,
                 desk.results.diagnosis, path or Path("report.html"),
@@ -64,13 +65,18 @@ class AnalysisKeeper:
     def view(self, measurement: int | None) -> None:
         """Make a measurement the one that results are about; work on another is given up."""
         self.give_up()
-        self._given_up = threading.Event()
         self.progress.clear()
         self._app.desk.measurement, self._app.desk.results = measurement, Results()
 
     def give_up(self) -> None:
         """End what runs, at its next word."""
-        self._given_up.set()
+        for one in self._given_up.values():
+            one.set()
+
+    def stop(self, job: messages.Job) -> None:
+        """End one analysis, at its next word; nothing comes of it."""
+        if self.progress.pop(job, None) is not None:
+            self._given_up[job].set()
 
     # ------------------------------------------------------------ told by the workers
 
@@ -96,6 +102,12 @@ class AnalysisKeeper:
         self.progress.pop(message.job, None)
         if message.job == "result":
             desk.results.estimate = message.result
+            if desk.results.band is not None:
+                self.begin("band")  # anew, by what the estimate knows
+        elif message.job == "band":
+            desk.results.band, by = message.result
+            if by is not desk.results.estimate:
+                self.begin("band")
         elif message.job == "diagnosis":
             desk.results.diagnosis = message.result
             self._app.notify("diagnosis done: step 6")

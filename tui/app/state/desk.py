@@ -21,6 +21,7 @@ from tui.measure_options import PlanOptions
 from tui.measurements.follow_up import following
 
 if TYPE_CHECKING:
+    from analysis.estimate.datasheet_band import DatasheetBand
     from analysis.resonance.records import LevelFeatures
     from daq.analyser import Identity
     from daq.frf import FrequencyResponse
@@ -46,6 +47,8 @@ class Results:
     features: tuple[LevelFeatures, ...] = ()
     estimate: Mapping[str, Any] | None = None
     """The document of ``estimate --json``."""
+    band: DatasheetBand | None = None
+    """What units of the datasheet read in this sweep."""
     diagnosis: Any = None
     """With ``to_json()`` and ``summary()``."""
     report: Path | None = None

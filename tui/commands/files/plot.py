@@ -21,6 +21,7 @@ from tui.reading_options import NO_OPTIONS, ReadingOptions, read_file
 from tui.text.output import Console, Injected
 
 if TYPE_CHECKING:
+    from analysis.estimate.datasheet_band import Known
     from analysis.plots import Curve
     from daq.frf import FrequencyResponse
     from sim.effects import EffectSetting
@@ -34,8 +35,7 @@ class _Model:
     """What is simulated beside a response."""
 
     unit: Unit
-    ratio: float
-    effects: tuple[EffectSetting, ...]
+    known: Known
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,15 +78,17 @@ def plot(
     only_level
         Draw this source level only, in V peak; repeat it for several.
     model
-        Simulate the same sweeps and draw them dashed: with --unit and --ratio, or of an identifier
-        with the answer that the history holds.
+        Simulate the same sweeps and draw them dashed, in the band that holds the middle 68 % of
+        units of the datasheet: with --unit, or of an identifier with the answer that the history
+        holds.
     ratio
-        Contribution ratio of the model, 0 to 1.
+        Contribution ratio of the model, 0 to 1; any, if left out and not known.
     effect
         Extension of the model, ID:param=value[,param=value]; repeat it for several.
     """
     from analysis.drawing.picture import checked_picture
     from sim.effects import parse_effect
+    from sim.unit import load_unit
 
     if not sources:
         raise InputError("FILE_OR_ID is missing; give a response file or an identifier")
@@ -106,8 +108,8 @@ def plot(
         raise InputError("--effect extends a model of --ratio; give --ratio, too")
     if ratio is not None and not 0.0 <= ratio <= 1.0:
         raise InputError(f"--ratio {ratio:g} is no contribution ratio; give 0 to 1")
-    if model and files and (unit is None or ratio is None):
-        raise InputError("--model of a file needs --unit and --ratio; give both")
+    if model and files and unit is None:
+        raise InputError("--model of a file needs --unit; give adss, edss or a unit file")
     wanted = _Wanted(unit, ratio, tuple(map(parse_effect, effect or ())))
     levels = tuple(only_level or ())
     curves = []
@@ -119,7 +121,7 @@ def plot(
             response, chosen = _stored(history, number, wanted, model)
         response = _at_levels(response, levels, source)
         if model:
-            chosen = chosen or _given(wanted)
+            chosen = chosen or _given(load_unit(unit or ""), wanted)
         curves.append(_curve(name, response, chosen, console))
     from analysis.plots import save_overlay
 
@@ -175,8 +177,9 @@ def _stored(
             except ConfigurationError as error:
                 raise InputError(f"{error}; give --unit") from error
         if wanted.ratio is not None:
-            return response, _Model(subject, wanted.ratio, wanted.effects)
+            return response, _given(subject, wanted)
         from analysis.answer import accept_model
+        from analysis.estimate.datasheet_band import Known
         from sim.effects import EffectSetting
         from tui.measurements.stored_answers import kept_diagnosis, kept_estimate
 
@@ -184,10 +187,7 @@ def _stored(
         document = None if kept is None else kept.document
         answer = accept_model(kept_estimate(store, number, subject), document)
     if answer.contribution_ratio is None:
-        raise InputError(
-            f"measurement {number} has no accepted model ({answer.source}); give --ratio, or run "
-            f"history or report --diagnose first"
-        )
+        return response, _Model(subject, Known())
     named = document["causes"] if document is not None else ()
     effects = tuple(
         EffectSetting(
@@ -195,15 +195,16 @@ def _stored(
         )
         for one in named
     )
-    return response, _Model(subject, float(answer.contribution_ratio["value"]), effects)
+    ratio = answer.contribution_ratio
+    about = float(ratio["value"]), float(ratio.get("std") or 0.0)
+    return response, _Model(subject, Known(about, effects=effects, words="by the stored answer"))
 
 
-def _given(wanted: _Wanted) -> _Model:
-    from sim.unit import load_unit
+def _given(unit: Unit, wanted: _Wanted) -> _Model:
+    from analysis.estimate.datasheet_band import Known
 
-    assert wanted.unit is not None
-    assert wanted.ratio is not None
-    return _Model(load_unit(wanted.unit), wanted.ratio, wanted.effects)
+    told = None if wanted.ratio is None else (wanted.ratio, 0.0)
+    return _Model(unit, Known(told, effects=wanted.effects))
 
 
 def _curve(
@@ -216,11 +217,18 @@ def _curve(
 
     if model is None:
         return Curve(name, response)
+    from analysis.estimate.datasheet_band import datasheet_band
     from analysis.observation.joint import unit_doubts
 
-    for doubt in unit_doubts([response], model.unit):
+    unit, known = model.unit, model.known
+    for doubt in unit_doubts([response], unit):
         console.note(f"warning: {doubt}")
-    extended = f" with {' and '.join(one.id for one in model.effects)}" if model.effects else ""
-    console.note(f"simulating {name}: {model.unit.name}, r = {model.ratio:.3f}{extended}")
-    beside = predicted(response, model.unit, model.ratio, model.effects, progress=console.progress)
-    return Curve(name, response, beside)
+    extended = f" with {' and '.join(one.id for one in known.effects)}" if known.effects else ""
+    at = f"r = {known.ratio[0]:.3f}" if known.ratio is not None else "any r"
+    console.note(f"simulating {name}: {unit.name}, {at}{extended}")
+    beside: tuple[FrequencyResponse, ...] = ()
+    if known.ratio is not None:
+        beside = predicted(response, unit, known.ratio[0], known.effects)
+    band = datasheet_band(response, unit, known, progress=console.progress)
+    console.note(band.words)
+    return Curve(name, response, beside, band)
