@@ -236,11 +236,12 @@ class Server:
                 terminal.unplug(now_s, away_s)
             self.addresses[name] = terminal.path
         if away_s is not None:
-            self._away_until = now_s + away_s
+            gone, self._away_until = self._away_until is not None, now_s + away_s
             for cable in self._cables:
                 if isinstance(cable, FakeAdapter):
                     cable.restart(now_s, away_s)
-            for listener in self._listeners:
+            # A measurement goes on while the gateway is away, and so do faults of the link.
+            for listener in () if gone else self._listeners:
                 self._selector.unregister(listener.wire)
                 listener.leave()
 

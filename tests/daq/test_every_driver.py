@@ -183,6 +183,17 @@ def test_second_client_can_make_safe_anytime(driver, taken):
 
 
 @every_driver
+@pytest.mark.parametrize("fault", ["slow-reply", "silence"])
+def test_late_instrument_is_awaited(driver, fault):
+    instrument, analyser = prepared(driver, [f"{fault}:point=1,seconds=0.3"])
+    points = list(analyser.sweep(GRID))
+    assert len(points) == len(GRID)
+    assert all(right(point) for point in points)
+    assert instrument.faults.faults[0].struck
+    assert analyser.make_safe() is OFF
+
+
+@every_driver
 def test_unreadable_source_is_unknown_without_raising(driver):
     instrument, analyser = prepared(driver, ["dropped-connection:point=1"])
     points = analyser.sweep(GRID)
