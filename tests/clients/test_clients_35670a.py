@@ -14,8 +14,8 @@ pytestmark = [pytest.mark.clients, pytest.mark.filterwarnings("ignore")]
 
 
 @pytest.fixture
-def box():
-    return linear_analyser(known_gain, noise_v=1e-4, converter_noise=1e-5)
+def box(heard):
+    return heard(linear_analyser(known_gain, noise_v=1e-4, converter_noise=1e-5))
 
 
 def place(url):

@@ -15,8 +15,8 @@ pytestmark = [pytest.mark.clients, pytest.mark.filterwarnings("ignore")]
 
 
 @pytest.fixture
-def box():
-    return simulated("sr785", LinearPlant(known_gain), noise_v=1e-5)
+def box(heard):
+    return heard(simulated("sr785", LinearPlant(known_gain), noise_v=1e-5))
 
 
 def place(url):
