@@ -20,6 +20,7 @@ from analysis.answer import CALL_FOR_DIAGNOSIS
 from analysis.ensemble.datasheet_belief import HINT, believed_document, believed_lines, trusts_much
 from analysis.ensemble.machine import Machine
 from analysis.estimate.backlash import Backlash, Uncertain, backlash_of_places
+from analysis.estimate.datasheet_posterior import DatasheetValue, datasheet_lines
 from analysis.estimate.design import RATIO, Axis
 from analysis.estimate.frequency_scale import REFUTED, frequency_doubt
 from analysis.estimate.from_features import IndexCurve, index_curve_of_response
@@ -52,7 +53,8 @@ class Estimate:
     `curve` is the paper's error index over the ratio, None where the response
     shows no pair of features. `simulated_s` says how many seconds of motion
     were simulated for it; `sweeps` what was swept, where it was a response. `refuted`: whether
-    the plain model does not fit, so that its numbers are no answer before a diagnosis.
+    the plain model does not fit, so that its numbers are no answer before a diagnosis. `datasheet`:
+    what a response says of each value of it.
     """
 
     unit: str
@@ -66,6 +68,7 @@ class Estimate:
     sweeps: tuple[dict[str, Any], ...] = ()
     refuted: bool = False
     believed: Mapping[str, Any] = field(default_factory=dict)
+    datasheet: tuple[DatasheetValue, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The document of ``estimate --json``."""
@@ -78,6 +81,7 @@ class Estimate:
             "error_index": None if self.curve is None else self.curve.to_json(),
             "sweeps": list(self.sweeps),
             **self.believed,
+            "datasheet": {one.symbol: one.to_json() for one in self.datasheet},
             "refuted": self.refuted,
             "warnings": list(self.warnings),
             "simulated_s": self.simulated_s,
@@ -90,6 +94,8 @@ class Estimate:
         lines = [f"{self.unit}: backlash by stage{head}", *told.lines("  ")]
         lines += [f"  {text}" for text in sweep_lines(self.sweeps)]
         lines += [f"  {text}" for text in believed_lines(self.believed)]
+        if not self.refuted:
+            lines += [f"  {text}" for text in datasheet_lines(self.to_json())]
         if self.curve is not None:
             lines.append(self.curve.summary())
         lines.append(f"  motion simulated for this: {self.simulated_s:.0f} s")
@@ -177,6 +183,7 @@ def estimate_response(
         found,
         sweeps=tuple(sweep_document(plan) for plan, _ in observation.plans),
         refuted=misfit > _WIDE_RESIDUAL,
+        datasheet=posterior.datasheet,
     )
 
 

@@ -18,12 +18,13 @@ from numpy.typing import NDArray
 
 from analysis.emulation.likelihood import Match, match_prediction
 from analysis.emulation.noise_level import likeliest_noise, possible_noises
-from analysis.emulation.parameter_posterior import calibrate
+from analysis.emulation.parameter_posterior import ParameterPosterior, calibrate
 from analysis.emulation.quadratic import QuadraticEmulator
 from analysis.ensemble.datasheet_spread import Spread, spread_of
 from analysis.ensemble.machine import Draws, Machine
 from analysis.ensemble.run_cache import run_families
 from analysis.ensemble.runs import Population
+from analysis.estimate.datasheet_posterior import DatasheetValue, datasheet_values
 from analysis.estimate.design import RATIO, Axis, Families, near_families, wide_families
 from analysis.execution.executor import Executor
 from analysis.execution.progress import Progress
@@ -38,7 +39,8 @@ class Posterior:
     """Posterior of the free numbers on a regular grid.
 
     `values` one array per axis; `weight` (...) sums to one over the grid;
-    `best` its centre and `match` what is left there; `draws` all runs made.
+    `best` its centre and `match` what is left there; `draws` all runs made; `datasheet` what is
+    learned of each value of it.
     """
 
     axes: tuple[Axis, ...]
@@ -47,6 +49,7 @@ class Posterior:
     best: tuple[float, ...]
     match: Match
     draws: Draws
+    datasheet: tuple[DatasheetValue, ...] = ()
 
 
 def fit_posterior(
@@ -107,6 +110,29 @@ def fit_posterior(
         tuple(float(v) for v in best),
         match(heard),
         draws,
+        _datasheet(unit, heard, population, calibrated, axes, spread),
+    )
+
+
+def _datasheet(
+    unit: Unit,
+    observation: Observation,
+    population: Population,
+    found: ParameterPosterior,
+    axes: Sequence[Axis],
+    spread: Spread,
+) -> tuple[DatasheetValue, ...]:
+    """What is learned of the datasheet, over the places that the answer leaves open."""
+    low, high = np.array([axis.low for axis in axes]), np.array([axis.high for axis in axes])
+    width = 0.6 * np.array([axis.scale for axis in axes])
+    emulator = _emulator(observation, population, width, spread)
+    sizes, ways = np.linalg.eigh(found.covariance)
+    # These have the mean and the covariance of the answer.
+    steps = ways * np.sqrt(len(sizes) * np.maximum(sizes, 0.0))
+    places = np.clip(found.mean + np.concatenate([steps.T, -steps.T]), low, high)
+    used = np.any(population.deviations != 0.0, axis=0)
+    return datasheet_values(
+        unit, observation, spread, used, [emulator.predict(place) for place in places]
     )
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
 
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from analysis.commissioning.coordinates import RATIO, Coordinates
 from analysis.commissioning.identification import simulate_drives
 from analysis.commissioning.regression import Gaussian, expected_std
+from analysis.execution.blas import on_one_core
 from analysis.execution.executor import Executor
 from analysis.execution.progress import Progress, part_of
 from analysis.inference.plans import landmarks
@@ -37,8 +38,12 @@ __all__ = ["Planned", "plan_sweep"]
 _TOTAL = "b_t_deg"
 """Name of the total backlash, among coordinates and in documents."""
 
-_POINTS = 61
-"""Frequencies of the ensemble's sweep; a shorter sweep takes some of them."""
+_LOOKS = ((61, 20, 30), (41, 10, 15), (31, 6, 10), (21, 3, 6))
+"""Frequencies of the ensemble's sweep, of which a shorter one takes some, and cycles that settle
+and are averaged at each: the first that drives the ensemble no longer than `_LONGEST_S`, or the
+last. A slow drive takes few cycles of seconds in place of many."""
+
+_LONGEST_S = 150.0
 
 _BAND = (0.6, 1.6)
 """Its ends, as multiples of the lowest anti-resonance and of the usual resonance."""
@@ -58,9 +63,11 @@ _PER_COORDINATE, _LEAST_FAMILIES = 3, 24
 _FEWEST = 11
 """Points that a sweep has at least."""
 
-_SETTLE_CYCLES, _INTEGRATE_CYCLES = 20, 30
 _STILL = 0.5
 """Gain at a level, over that at the highest, below which friction holds the drive still."""
+
+_NOTHING = 0.9
+"""Expected error over that of the datasheet above which a sweep tells nothing."""
 
 _ENOUGH = 1.05
 """Of sweeps that are as good as the best but for this factor the shortest is taken."""
@@ -73,8 +80,8 @@ class Planned:
     `arf_hz`, `rf_hz`: 5 %, 50 % and 95 % quantiles over drives as the datasheet allows, at the
     middle level; None where most show none. `expected_std`: expected error of the `quantity`,
     ``contribution_ratio`` or ``b_t_deg``, by a linear estimate, and `usual_std` that of the best
-    sweep of one level in the same time. `still_vpk`: levels that friction holds. `limits`: what
-    the unit's limits cut off.
+    sweep of one level in the same time; `prior_std` is that of the datasheet. `still_vpk`: levels
+    that friction holds. `limits`: what the unit's limits cut off.
     """
 
     unit: str
@@ -85,6 +92,7 @@ class Planned:
     quantity: str
     expected_std: float
     usual_std: float
+    prior_std: float
     still_vpk: tuple[float, ...]
     limits: tuple[str, ...]
 
@@ -142,6 +150,11 @@ class Planned:
             f"  expected error of the {self._expected} "
             f"({self.usual_std:.2g}{self._symbol} with one level in the same time)",
         ]
+        if self.expected_std > _NOTHING * self.prior_std:
+            lines.append(
+                f"  no sweep of this time tells it: the datasheet leaves {self.prior_std:.2g}"
+                f"{self._symbol}"
+            )
         if self.still_vpk:
             still = ", ".join(f"{level:g}" for level in self.still_vpk)
             lines.append(f"  friction holds the drive at {still} V: little motion there")
@@ -161,6 +174,7 @@ class Planned:
         return text
 
 
+@on_one_core()
 def plan_sweep(
     unit: Unit,
     minutes: float,
@@ -186,7 +200,8 @@ def plan_sweep(
     observation = unread(wide, USUAL_NOISE_V)
     parts = list(_parts(wide, observation, 60.0 * minutes))
     if not parts:
-        shortest = _plan(wide.frequencies_hz[:: _POINTS // _FEWEST], wide.levels_vpk[-1:])
+        few = wide.frequencies_hz[:: (len(wide.frequencies_hz) - 1) // (_FEWEST - 1)]
+        shortest = replace(wide, frequencies_hz=few, levels_vpk=wide.levels_vpk[-1:])
         raise InputError(
             f"{minutes:g} min: the shortest useful sweep of {unit.name} takes "
             f"{shortest.duration_s / 60.0:.2g} min; give more"
@@ -198,11 +213,11 @@ def plan_sweep(
         coordinates, observation, prior, families, np.random.default_rng(seed), executor, report
     )
     found = []
+    values = scale * coordinates.factors(drawn.z)[:, coordinates.symbols.index(quantity)]
     for rows, frequencies, levels in parts:
-        values = scale * coordinates.factors(drawn.z)[:, coordinates.symbols.index(quantity)]
         columns = np.tile(rows, drawn.y.shape[1] // len(observation))
         std = expected_std(drawn, prior, columns, values)
-        plan = _plan(frequencies, levels)
+        plan = replace(wide, frequencies_hz=frequencies, levels_vpk=levels)
         found.append((std, plan.duration_s, plan))
     least = min(std for std, _, _ in found)
     std, _, plan = min((one for one in found if one[0] <= _ENOUGH * least), key=lambda one: one[1])
@@ -212,7 +227,7 @@ def plan_sweep(
     arf, rf = _features(np.array(wide.frequencies_hz), middle)
     return Planned(
         unit.name, plan, plan.duration_s / 60.0, arf, rf, quantity, std, min(single, default=std),
-        _still(wide, log_gain), cut,
+        float(np.std(values)), _still(wide, log_gain), cut,
     )  # fmt: skip
 
 
@@ -236,13 +251,11 @@ def _wide_plan(unit: Unit) -> tuple[SweepPlan, tuple[str, ...]]:
     if stop < high:
         cut.append(f"limits.stop_hz = {limits.stop_hz:g} cuts off what lies above")
     levels = tuple(float(f"{share * limits.source_vpk:.2g}") for share in _LEVELS)
-    return _plan(spaced_frequencies(start, stop, _POINTS, "log"), levels), tuple(cut)
-
-
-def _plan(frequencies: tuple[float, ...], levels: tuple[float, ...]) -> SweepPlan:
-    return SweepPlan(
-        frequencies, levels, settle_cycles=_SETTLE_CYCLES, integrate_cycles=_INTEGRATE_CYCLES
-    )
+    looks = [
+        SweepPlan(spaced_frequencies(start, stop, n, "log"), levels, "up", settle, integrate)
+        for n, settle, integrate in _LOOKS
+    ]
+    return next((one for one in looks if one.duration_s <= _LONGEST_S), looks[-1]), tuple(cut)
 
 
 def _parts(
@@ -254,7 +267,7 @@ def _parts(
         band = np.arange(round(first * (len(grid) - 1)), round(last * (len(grid) - 1)) + 1)
         for count in (1, 2, 3):
             for levels in combinations(wide.levels_vpk, count):
-                kept = _densest(grid, band, levels, longest_s)
+                kept = _densest(wide, band, levels, longest_s)
                 if kept is not None:
                     rows = np.isin(observation.frequency_hz, grid[kept])
                     rows &= np.isin(observation.source_vpk, levels)
@@ -262,7 +275,7 @@ def _parts(
 
 
 def _densest(
-    grid: NDArray[np.float64],
+    wide: SweepPlan,
     band: NDArray[np.int64],
     levels: tuple[float, ...],
     longest_s: float,
@@ -270,7 +283,9 @@ def _densest(
     """As many points (n,) of a band, evenly spread, as fit into a time; None where too few do."""
     for stride in range(1, (len(band) - 1) // (_FEWEST - 1) + 1):
         kept = band[: (len(band) - 1) // stride * stride + 1 : stride]
-        if _plan(tuple(grid[kept].tolist()), levels).duration_s <= longest_s:
+        frequencies = tuple(wide.frequencies_hz[i] for i in kept)
+        part = replace(wide, frequencies_hz=frequencies, levels_vpk=levels)
+        if part.duration_s <= longest_s:
             return np.asarray(kept)
     return None
 

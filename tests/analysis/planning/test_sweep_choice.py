@@ -1,6 +1,7 @@
 """A planned sweep: what it says of a unit, and that it is one that can be measured."""
 
 import math
+import re
 from dataclasses import replace
 
 import pytest
@@ -75,6 +76,14 @@ def test_too_short_time_states_shortest_sweep(name):
     """One stage is no fault, and couplings, which place the features, leave these in the limits."""
     with pytest.raises(InputError, match="the shortest useful sweep"):
         plan_sweep(load_unit(name), 1e-6)
+
+
+@pytest.mark.parametrize(("name", "most_min"), [("feed-axis", 0.2), ("srv02-torsion", 0.3)])
+def test_slow_drives_get_few_cycles(name, most_min):
+    """Of 50 cycles at 11 points the shortest sweeps took 0.45 and 1.3 min."""
+    with pytest.raises(InputError, match="the shortest useful sweep") as told:
+        plan_sweep(load_unit(name), 1e-6)
+    assert 0.01 < float(re.search(r"takes (\S+) min", str(told.value))[1]) < most_min
 
 
 @pytest.mark.study
