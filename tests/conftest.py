@@ -19,7 +19,8 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
 
-settings.register_profile("side by side", deadline=None)
+# Every day draws other examples: forty a day are many before long.
+settings.register_profile("side by side", deadline=None, max_examples=40)
 settings.load_profile("side by side")
 
 

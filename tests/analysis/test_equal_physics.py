@@ -104,7 +104,7 @@ READINGS = st.integers(1, 8).flatmap(
 )
 
 
-@settings(max_examples=12, deadline=None)  # each writes four files, and starts programs
+@settings(max_examples=5, deadline=None)  # each writes four files, and starts programs
 @given(READINGS)
 def test_every_format_gives_the_same_observation(readings):
     frequency, level, gain_db, phase, std = readings

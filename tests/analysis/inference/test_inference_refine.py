@@ -16,7 +16,7 @@ def observed(effects, sizes, seed=1):
     return synthetic_runs.observed(effects, sizes, np.random.default_rng(seed))
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_hidden_cause_is_found_among_proposed_ones(world, seed):
     """A network that favours three causes alike, and says nothing of the ratio."""
     found = refine(
@@ -58,7 +58,7 @@ def test_every_part_of_leading_set_is_examined(world):
     assert (LAG, MESH) in {one.hypothesis.effects for one in found.candidates}
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(n, marks=pytest.mark.long) for n in (2, 3))])
 def test_plain_model_gets_as_many_runs(world, seed):
     """However far behind it seems, it is compared by as many runs as any other set."""
     seen = observed((LAG, LOAD), [0.9, 0.95], seed)

@@ -29,7 +29,7 @@ def test_local_runs_stay_near_their_centre(looking):
     assert (len(hunt.found), hunt.best) == (1, hunt.found[key])
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(n, marks=pytest.mark.long) for n in (2, 3))])
 def test_further_runs_concentrate_on_true_model(looking, seed):
     hunt = looking(seed)
     reach = (0.3, 0.3)

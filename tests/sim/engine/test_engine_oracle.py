@@ -82,7 +82,7 @@ BANDS = {
 }
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
 @pytest.mark.parametrize("name", BANDS)
 def test_undamped_units_scatter_as_the_oracle_does(name, seed):
     # Eight p-values below (two units, two seeds, mean and scatter), each at or below 1e-3

@@ -92,7 +92,7 @@ def test_growth_at_every_step_is_an_error():
         taken((LONG, SHORT), lambda f, step: f == 76.0)
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.long) for n in (1, 2))])
 def test_shaft_hardening_beyond_step_stays_finite(seed):
     system, parameters, _ = machine(2e7)
     start = np.zeros((len(system.states), 2))

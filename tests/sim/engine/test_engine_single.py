@@ -113,7 +113,7 @@ def test_system_without_modes_keeps_double_precision():
     assert np.array_equal(one[1], other[1])
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
 @pytest.mark.parametrize(
     ("unit", "ratio", "band"),
     [(ADSS, 0.25, np.linspace(100.0, 165.0, 12)), (EDSS, 0.5, np.linspace(40.0, 117.0, 12))],
