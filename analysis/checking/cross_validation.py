@@ -93,7 +93,7 @@ def hold_out_surface(
     shape = (3, len(observation))
     residual, std = np.full(shape, np.nan), np.full(shape, np.nan)
     score = 0.0
-    folds = _folds(observation)
+    folds = split_folds(observation)
 
     def others_only(fold: _Fold) -> list[Fit]:
         return surface.walk(start, fold[1], tries=_TRIES)
@@ -109,7 +109,7 @@ def hold_out_surface(
     return HeldOut(score, residual, std)
 
 
-def _folds(observation: Observation) -> list[_Fold]:
+def split_folds(observation: Observation) -> list[_Fold]:
     """Rows that are predicted at a time, and which of the others (rows,) that is done by."""
     down = _downwards(observation)
     if len(observation.levels) > 1 and 0 < down.sum() < len(down):

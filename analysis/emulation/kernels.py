@@ -283,7 +283,7 @@ def _farthest(far):
 
 
 @part()
-def _nearest(far, most, guess, near):
+def find_nearest(far, most, guess, near):
     """Which runs (most,) are the nearest, in any order; the limit that they lie within.
 
     By halving what may be the limit, as counting goes in vectors and sorting does not. `guess`: a
@@ -354,7 +354,7 @@ def _by_row(runs, point, mean, variance, distance):
             distance[i] += squares[i] / rows
             far[i] = squares[i] / runs.alike[row, i]
             least = min(least, runs.alike[row, i])
-        limit = _nearest(far, most, limit, near)
+        limit = find_nearest(far, most, limit, near)
         _offsets(runs.charted[row], point[row], runs.width, near, near_offset)
         for at in range(most):
             i = near[at]

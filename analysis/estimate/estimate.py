@@ -228,11 +228,12 @@ def free_axes(unit: Unit, total_backlash_unknown: bool = False) -> tuple[Axis, .
     if unit.stages == 1:
         return (_play_axis(unit),)
     if total_backlash_unknown:
-        return replace(RATIO, coarse=17, scale=0.12), _total_axis(unit)
+        return replace(RATIO, coarse=17, scale=0.12), total_axis(unit)
     return (RATIO,)
 
 
-def _total_axis(unit: Unit) -> Axis:
+def total_axis(unit: Unit) -> Axis:
+    """The total backlash as a second axis of an estimate, which a grid runs through."""
     b_t = unit.backlash.b_t_deg
 
     def put(machine: Machine, value: float) -> Machine:

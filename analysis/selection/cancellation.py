@@ -107,9 +107,9 @@ def cancellation_ratio(
         groups += [group] * _GROUPS
     made = simulate_groups(hypothesis.unit, groups, observation, rng, executor)
     plain, *parts, whole = (_shown(made[effects], observation) for effects in asked)
-    least = min(_distance(part, plain) for part in parts)
+    least = min(distance(part, plain) for part in parts)
     # What does nothing alone is undone by nothing.
-    return _distance(whole, plain) / max(least, _NOTHING)
+    return distance(whole, plain) / max(least, _NOTHING)
 
 
 def _shown(population: Population, observation: Observation) -> NDArray[np.float64]:
@@ -121,7 +121,7 @@ def _shown(population: Population, observation: Observation) -> NDArray[np.float
     return np.array([np.median(log_gain, axis=0), about + np.median(off, axis=0)])
 
 
-def _distance(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+def distance(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
     """Root mean square of how far two responses (2, rows) are apart."""
     off = one - other
     off[1] = np.angle(np.exp(1j * off[1]))

@@ -88,7 +88,7 @@ def compiled(name: str, sources: Sequence[Path], write: Callable[[], str]) -> An
         if program is None:
             program = _compile(write())
             _keep(file, program)
-        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target_machine())
+        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target_machine())
         engine.add_object_file(llvm.ObjectFileRef.from_data(program))
         engine.finalize_object()
         _ALIVE.append(engine)
@@ -99,10 +99,11 @@ def _compile(text: str) -> bytes:
     module = llvm.parse_assembly(text)
     module.verify()
     # The program has no loops over lanes and nothing to simplify: only registers are to be found.
-    return bytes(_target_machine().emit_object(module))
+    return bytes(target_machine().emit_object(module))
 
 
-def _target_machine() -> Any:
+def target_machine() -> Any:
+    """What machine code is made for: this processor, with the instructions that are used."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     target = llvm.Target.from_triple(llvm.get_process_triple())

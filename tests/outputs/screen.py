@@ -1,11 +1,9 @@
 """Driving the bench application without a terminal, and reading its screens as plain text."""
 
 import asyncio
-import io
 import time
 from contextlib import asynccontextmanager, suppress
 
-from rich.console import Console
 from textual.pilot import WaitForScreenTimeout
 
 from daq.store import Store
@@ -114,18 +112,8 @@ def nothing_found(post):
 
 def text_of(app) -> str:
     """The screen as it is seen, one line per row."""
-    width, height = app.size
-    console = Console(
-        width=width,
-        height=height,
-        file=io.StringIO(),
-        force_terminal=True,
-        record=True,
-        legacy_windows=False,
-    )
     # A private name of the framework; it is used here and nowhere else.
-    console.print(app.screen._compositor.render_update(full=True))
-    return "\n".join(line.rstrip() for line in console.export_text().splitlines())
+    return "\n".join(strip.text.rstrip() for strip in app.screen._compositor.render_strips())
 
 
 class Operator:
@@ -144,12 +132,14 @@ class Operator:
     async def sees(self, *words, within_s=20.0) -> str:
         """The screen, once all words stand on it."""
         end = time.monotonic() + within_s
-        while not all(word in self.screen for word in words):
-            assert time.monotonic() < end, f"{words} not on the screen:\n{self.screen}"
+        while True:
+            screen = self.screen
+            if all(word in screen for word in words):
+                return screen
+            assert time.monotonic() < end, f"{words} not on the screen:\n{screen}"
             # A machine that is busy with other things is no fault of the screen.
             with suppress(WaitForScreenTimeout):
                 await self.pilot.pause(0.03)
-        return self.screen
 
     async def types(self, selector, text):
         field = self.app.screen.query_one(selector)

@@ -69,7 +69,7 @@ def demo(
         console.note(f"{finished.state}: {finished.reason}")
         return INTERRUPTED
     response = _features(out, finished.measurement, tell)
-    guess = _guess(console) if surprise else None
+    guess = ask_guess(console) if surprise else None
     document = _judge(response, unit, hidden, out, finished.measurement, guess, tell, console)
     document |= {"seed": hidden.seed, "elapsed_s": time.perf_counter() - began}
     if json:
@@ -116,7 +116,7 @@ def _features(out: Path, measurement: int, tell: Callable[[str], None]) -> Frequ
     return response
 
 
-def _guess(console: Console) -> str | None:
+def ask_guess(console: Console) -> str | None:
     """What the person takes it for; None if there is nobody, or nobody who would."""
     from sim.catalogue import CATALOGUE, COMMON
 

@@ -53,7 +53,8 @@ def all_settings() -> Iterator[Setting]:
 
 
 @cache
-def _commands() -> tuple[CommandTree[Leaf], dict[str, Command]]:
+def command_tables() -> tuple[CommandTree[Leaf], dict[str, Command]]:
+    """Every command of the instrument by its path, and the common ones by their name."""
     tree: CommandTree[Leaf] = CommandTree()
     common = {}
     for setting in all_settings():
@@ -88,7 +89,7 @@ class Dispatcher:
 
     def __init__(self, instrument: InstrumentCore) -> None:
         self._instrument = instrument
-        self._tree, self._common = _commands()
+        self._tree, self._common = command_tables()
         self._path: Path[Leaf] = self._tree.root
 
     def new_message(self) -> None:

@@ -91,7 +91,7 @@ def test_each_level_is_predicted_when_held_out():
     ],
 )
 def test_folds_are_levels_sweeps_or_half_bands(levels, blocks, folds):
-    found = module._folds(swept(levels, blocks, ["up"] * len(blocks)))
+    found = module.split_folds(swept(levels, blocks, ["up"] * len(blocks)))
     assert [fold for fold, _ in found] == [slice(*ends) for ends in folds]
     for fold, rows in found:
         expected = np.ones(12, dtype=bool)
@@ -137,7 +137,7 @@ def swept(levels, blocks, directions):
 def test_two_way_sweeps_hold_out_both_folds(blocks, directions, rows):
     """Neither the level nor the direction of a fold was seen."""
     levels = [(0, 4), (4, 8), (8, 12)]
-    found = module._folds(swept(levels, blocks, directions))
+    found = module.split_folds(swept(levels, blocks, directions))
     assert [fold for fold, _ in found] == [slice(*ends) for ends in blocks]
     assert [{*np.flatnonzero(used)} for _, used in found] == rows
 

@@ -154,7 +154,7 @@ def test_nearest_runs_are_found_without_limit(far):
 @njit
 def nearest(far, most, guess, near):
     """Calls what only compiled code can call."""
-    return agreement._nearest(far, most, guess, near)
+    return agreement.find_nearest(far, most, guess, near)
 
 
 def looked_at(surface, place, leaning):

@@ -7,14 +7,14 @@ import pytest
 
 from analysis.ensemble.datasheet_spread import spread_of
 from analysis.estimate.design import RATIO, every_family, near_families, wide_families
-from analysis.estimate.estimate import _total_axis
+from analysis.estimate.estimate import total_axis
 from analysis.observation.observation import unread
 from daq.plan import SweepPlan
 from sim.unit import load_unit
 
 SEEN = unread(SweepPlan((120.0, 130.0), (1.5, 2.5, 4.0)), 5e-4)
 SPREAD = spread_of(load_unit("adss"))
-BOTH = (replace(RATIO, coarse=17, scale=0.12), _total_axis(load_unit("adss")))
+BOTH = (replace(RATIO, coarse=17, scale=0.12), total_axis(load_unit("adss")))
 
 
 def near(mean, std, seed=0, axes=(RATIO,)):

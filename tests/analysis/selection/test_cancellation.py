@@ -50,10 +50,10 @@ def test_smallest_of_three_ratios_counts():
 def test_phase_is_compared_around_the_circle():
     one, other = np.zeros((2, 4)), np.zeros((2, 4))
     one[1], other[1] = np.pi - 0.1, 0.1 - np.pi
-    assert second_thoughts._distance(one, other) == pytest.approx(0.2)
+    assert second_thoughts.distance(one, other) == pytest.approx(0.2)
     other[0] = 50.0
     # And no row is further off than it can be.
-    assert second_thoughts._distance(one, other) == pytest.approx(1.0)
+    assert second_thoughts.distance(one, other) == pytest.approx(1.0)
 
 
 def told(effects, word="explained"):

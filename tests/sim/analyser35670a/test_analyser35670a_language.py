@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim.analyser35670a import Analyser35670A, Choices, LinearPlant, TalkState
-from sim.analyser35670a.commands.dispatch import _commands, all_settings
+from sim.analyser35670a.commands.dispatch import all_settings, command_tables
 from sim.analyser35670a.kinds import Pick, Quoted, Switch, Text, Whole
 from sim.analyser35670a.settings import Setting
 
@@ -258,7 +258,7 @@ def test_setting_accepts_its_own_reply(bench):
             assert controller.ask(f"{header}?") == answer
 
 
-TREE, COMMON = _commands()
+TREE, COMMON = command_tables()
 WORDS = sorted(
     {piece for header, _setting in headers() for piece in header.split(":")}
     | set(COMMON)

@@ -45,7 +45,7 @@ def machine(expression, inputs, single, fused=None, branches=False):
     for v, vector in enumerate(result.vectors):
         emit.store(vector, at(function.args[1], v * width), align=4)
     emit.ret_void()
-    target = machine_code._target_machine()
+    target = machine_code.target_machine()
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(str(module)), target)
     engine.finalize_object()
     ALIVE.append(engine)

@@ -214,7 +214,7 @@ class Person:
 )
 def test_guess_is_number_or_effect_name(answers, guess):
     person = Person(*answers)
-    assert verb._guess(person) == guess
+    assert verb.ask_guess(person) == guess
     assert person.answers == []
     assert all(name in person.asked[0] for name in COMMON)
 
