@@ -242,8 +242,9 @@ def _wide_plan(unit: Unit) -> tuple[SweepPlan, tuple[str, ...]]:
     start, stop = max(low, limits.start_hz), min(high, limits.stop_hz)
     if start > marks.arf_hz or stop < marks.rf_hz:
         raise InputError(
-            f"unit {unit.name}: its limits allow {limits.start_hz:g} to {limits.stop_hz:g} Hz, and "
-            f"its features lie near {marks.arf_hz:.4g} and {marks.rf_hz:.4g} Hz; see [limits]"
+            f"unit {unit.name}: its limits, and the bench's, allow {limits.start_hz:g} to "
+            f"{limits.stop_hz:g} Hz, and its features lie near {marks.arf_hz:.4g} and "
+            f"{marks.rf_hz:.4g} Hz; see [limits]"
         )
     cut = []
     if start > low:

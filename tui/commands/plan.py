@@ -24,6 +24,7 @@ def plan(
     unit: UnitName,
     minutes: Real = 5.0,
     out: Path | None = None,
+    bench: str = "default",
     tolerance: Tolerance = None,
     cluster: Cluster = None,
     json: Json = False,
@@ -40,6 +41,8 @@ def plan(
         Time at the bench.
     out
         Recipe file (TOML) to write for ``measure --recipe``; one that exists is left alone.
+    bench
+        Bench file, by name or path: it limits levels and band as well as the unit.
     """
     from daq.formats.atomic import new_target, write_text
 
@@ -48,8 +51,20 @@ def plan(
     if out is not None:
         new_target(out)
     from analysis.planning import plan_sweep
+    from daq.limits import load_bench
 
+    place = load_bench(bench).bounds()
     subject = read_unit(unit, console, tolerance)
+    own = subject.limits
+    if place.source_vpk < own.source_vpk:
+        console.note(f"{place.set_by} allows {place.source_vpk:g} V of the unit's "
+                     f"{own.source_vpk:g} V; see --bench")  # fmt: skip
+    allowed = {
+        "source_vpk": min(own.source_vpk, place.source_vpk),
+        "start_hz": max(own.start_hz, place.start_hz),
+        "stop_hz": min(own.stop_hz, place.stop_hz),
+    }
+    subject = subject.model_copy(update={"limits": own.model_copy(update=allowed)})
     with executor_at(cluster, console.compute) as executor:
         found = plan_sweep(subject, minutes, executor=executor, progress=console.progress)
     if out is not None:

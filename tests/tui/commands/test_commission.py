@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from daq.configs import config_path
 from daq.formats import read_response, write_response
 from sim.unit import load_unit
 from tui import cli
@@ -78,3 +79,13 @@ def test_unusable_time_is_refused(words, said, tmp_path, capsys):
     assert cli.main(["plan", "--unit", "adss", *words, "--out", str(out)]) == 2
     assert said in capsys.readouterr().err
     assert not out.exists()
+
+
+def test_plan_stays_within_bench(tmp_path, capsys):
+    bench = tmp_path / "bench.toml"
+    text = config_path("benches", "default").read_text(encoding="utf-8")
+    bench.write_text(text.replace("stop_hz = 2000.0", "stop_hz = 50.0"), encoding="utf-8")
+    assert cli.main(["plan", "--unit", "adss", "--bench", str(bench)]) == 2
+    error = capsys.readouterr().err
+    assert "bench" in error
+    assert "50 Hz" in error
