@@ -99,6 +99,10 @@ async def judge(op, camera) -> None:
         await asyncio.sleep(0.5)
     if op.app.desk.results.diagnosis is None:
         await camera.take(op, "result-before")
+        await op.press("m")
+        await op.sees("simulated units", within_s=PATIENCE_S)
+        await camera.take(op, "result-datasheet")
+        await op.press("m")
         await op.press("6", "d")
         while not (op.app.analyses.progress.get("diagnosis", (0.0, ""))[0] > 0.3):
             await asyncio.sleep(0.2)
@@ -113,7 +117,7 @@ async def judge(op, camera) -> None:
     await camera.take(op, "result")
     await op.press("m")
     await camera.take(op, "result-plain-model")
-    await op.press("m", "v")
+    await op.press("m", "m", "v")
     await camera.take(op, "result-index")
     await op.press("v", "6")
     await op.sees("VERDICT", within_s=PATIENCE_S)

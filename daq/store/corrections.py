@@ -106,6 +106,7 @@ class CorrectionStore(StoreFile):
         exact: bool = False,
         since: str | None = None,
         state: MeasurementState | None = None,
+        search: str | None = None,
     ) -> list[HistoryLine]:
         """Measurements as a list shows them, oldest first: the gist, and what was said of each.
 
@@ -121,8 +122,12 @@ class CorrectionStore(StoreFile):
             Take the unit's name as it stands; else in any case.
         since, state
             Only those started then or later (ISO 8601, UTC), and those that stand so.
+        search
+            Only those that have each of its words, see `daq.store.listing.Choice`.
         """
-        choice = Choice(unit, serial, last, with_points, exact, since=since, state=state)
+        choice = Choice(
+            unit, serial, last, with_points, exact, since=since, state=state, search=search
+        )
         with self._reading() as connection:
             return list(read_lines(connection, choice))
 
@@ -137,12 +142,13 @@ class CorrectionStore(StoreFile):
         answered: bool = False,
         since: str | None = None,
         state: MeasurementState | None = None,
+        search: str | None = None,
     ) -> Iterator[HistoryLine]:
         """As `lines`, one after the other, so that any number takes the memory of one.
 
         With `answered` only those that were ever estimated or diagnosed.
         """
-        choice = Choice(unit, serial, last, with_points, exact, answered, since, state)
+        choice = Choice(unit, serial, last, with_points, exact, answered, since, state, search)
         with self._reading() as connection:
             yield from read_lines(connection, choice)
 
@@ -153,10 +159,13 @@ class CorrectionStore(StoreFile):
         *,
         since: str | None = None,
         state: MeasurementState | None = None,
+        search: str | None = None,
     ) -> int:
         """How many measurements there are of a unit (any case) and a serial number, see `lines`."""
         with self._reading() as connection:
-            return count_lines(connection, Choice(unit, serial, since=since, state=state))
+            return count_lines(
+                connection, Choice(unit, serial, since=since, state=state, search=search)
+            )
 
     def lacking(
         self,
@@ -167,6 +176,7 @@ class CorrectionStore(StoreFile):
         edition: str | None = None,
         since: str | None = None,
         state: MeasurementState | None = None,
+        search: str | None = None,
     ) -> list[int]:
         """Complete measurements, among the last of `lines`, without an estimate in force.
 
@@ -176,7 +186,7 @@ class CorrectionStore(StoreFile):
             Count what failed, or is of another edition than this, as none.
         """
         with self._reading() as connection:
-            choice = Choice(unit, serial, last, since=since, state=state)
+            choice = Choice(unit, serial, last, since=since, state=state, search=search)
             return read_lacking(connection, choice, edition)
 
     def unit_names(self) -> list[str]:

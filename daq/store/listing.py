@@ -6,6 +6,7 @@ plan, no whole document. What a row means is `daq.store_records.HistoryLine`.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -67,6 +68,19 @@ LEFT JOIN estimates AS e ON e.id = {ESTIMATE_IN_FORCE}
 WHERE m.state = 'complete'{{which}}
 ORDER BY m.id"""
 _ALL = (1 << 63) - 1
+_MOST_WORDS = 10
+_SEARCHED = ("m.operator", "m.notes", "m.state", "CAST(m.id AS TEXT)")
+_LIKE = "LIKE {word} ESCAPE '|'"
+_HAS_WORD = (
+    "("
+    + " OR ".join(f"lower({column}) {_LIKE}" for column in _SEARCHED)
+    + f" OR m.unit_id IN (SELECT id FROM units WHERE lower(name) {_LIKE}"
+    + f" OR lower(serial) {_LIKE}))"
+)
+"""Whether a measurement `m` has a word; a scan, as no index serves a part of a text."""
+_DAY = re.compile(r"\d-\d")
+_ON_DAY = f"({_HAS_WORD} OR m.started {_LIKE})"
+"""The same of a word that looks like a day; a bare 20 would be in the year of each."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +105,9 @@ class Choice:
         Only what was started then or later: ISO 8601, UTC, as the history keeps it.
     state
         Only what stands so: complete, interrupted or aborted.
+    search
+        Only what has each of these words, in any case, in its unit, serial number, operator, notes,
+        state or number; one that looks like a day, as 11-30, also in the start.
     """
 
     unit: str | None = None
@@ -101,6 +118,7 @@ class Choice:
     answered: bool = False
     since: str | None = None
     state: MeasurementState | None = None
+    search: str | None = None
 
     def asked(self, connection: sa.Connection, query: str, which: str = "") -> sa.CursorResult[Any]:
         """Ask a query that has a place for the conditions; they are such as an index serves."""
@@ -130,6 +148,10 @@ class Choice:
             if value is not None:
                 values[column] = value
                 conditions.append(f"m.{column} {condition} :{column}")
+        for place, word in enumerate((self.search or "").split()[:_MOST_WORDS]):
+            values[f"word{place}"] = f"%{_literal(word.lower())}%"
+            condition = _ON_DAY if _DAY.search(word) else _HAS_WORD
+            conditions.append(condition.format(word=f":word{place}"))
         where = f"WHERE {' AND '.join(conditions)}" if conditions else ""
         return connection.execute(sa.text(query.format(where=where, which=which)), values)
 
@@ -206,6 +228,11 @@ def unit_names(connection: sa.Connection) -> list[str]:
     """Names of the units that were measured, each once, by the alphabet."""
     query = f"SELECT DISTINCT name FROM units ORDER BY name LIMIT {_MOST_NAMES}"
     return [text(row.name, LONGEST_NAME) for row in connection.execute(sa.text(query))]
+
+
+def _literal(word: str) -> str:
+    """A word in which nothing stands for other text."""
+    return re.sub(r"([|%_])", r"|\1", word)
 
 
 def _levels(stored: object) -> tuple[float, ...]:

@@ -121,6 +121,19 @@ def test_lines_are_filtered_by_unit_and_serial(store):
     assert store.unit_names() == ["ADSS", "EDSS", "adss"]
 
 
+def test_search_finds_each_word_literally(store):
+    for serial, unit in (("SN-07", "ADSS"), ("sn_08", "EDSS"), ("100%", "ADSS")):
+        measured(store, serial, unit)
+    asked = {
+        "sn": [1, 2], "SN adss": [1], "0%": [3], "_": [2], "complete edss": [2], "nobody": [],
+        "20": [], "": [1, 2, 3], "|": [], "\\": [], "'; DROP TABLE units; --": [],
+    }  # fmt: skip
+    for words, numbers in asked.items():
+        assert [line.id for line in store.lines(search=words)] == numbers, words
+    day = store.measurement(1).started[:10]
+    assert (store.count(search="adss"), store.count(search=f"adss {day}")) == (2, 2)
+
+
 def test_correction_records_person_time_and_old_value(store):
     number, other = measured(store), measured(store)
     done = store.correct(number, "C. D.", {"serial": "SN-8", "notes": "cold", "operator": "A"})

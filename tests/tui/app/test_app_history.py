@@ -226,3 +226,33 @@ def test_log_has_trace_that_screen_omits(db, tmp_path, monkeypatch):
     assert "by design" in text
     handlers = logging.getLogger("lashbench").handlers
     assert not any(isinstance(handler, logging.FileHandler) for handler in handlers)
+
+
+def test_history_is_searched_and_sorted(tmp_path):
+    db = tmp_path / "bench.db"
+    words = ["measure", "--unit", "adss", "--db", str(db), "--instrument", "sim:?seed=1", "--level",
+             "2.5", "--start", "130", "--stop", "150", "--points", "3", "--serial"]  # fmt: skip
+    for serial in ("SN 20", "SN 7", "SN 3"):
+        assert main([*words, serial]) == 0
+
+    async def way():
+        async with operated(db) as op:
+
+            def order(screen):
+                lines = [line for line in screen.splitlines() if "11-" in line or "SN" in line]
+                return [line.split("SN")[1].split()[0] for line in lines if " SN " in line[:40]]
+
+            await op.press("7")
+            screen = await op.sees("SN 20", "SN 7", "SN 3")
+            assert order(screen)[:3] == ["3", "7", "20"]
+            await op.press("s", "s", "s", "s")
+            assert order(await op.sees("sorted by serial number"))[:3] == ["20", "3", "7"]
+            await op.press("s", "slash", *"sn 20", "enter")
+            await op.sees("found: 1")
+            assert "SN 7" not in op.screen
+            await op.press("slash", *"x", "enter")
+            await op.sees("no session has 'x'")
+            await op.press("slash", "delete", "enter")
+            await op.sees("SN 20", "SN 7", "SN 3")
+
+    run(way)

@@ -13,36 +13,32 @@ from typing import TYPE_CHECKING, Any
 
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Vertical
+from textual.containers import Horizontal, Vertical
 
-from daq.servers.place import HistoryPlace, is_there
 from tui.app.dialogs.correction import CorrectionDialog
 from tui.app.plot.bode import BodePlot
 from tui.app.plot.chart import Chart
 from tui.app.plot.curves import trend_drawing
 from tui.app.plot.traces import traces_of_response
-from tui.app.state.sessions import audit_trail, correct_session, responses_of
+from tui.app.screens.history_table import NARROW, ROOM, WIDE, narrow_cells, wide_cells
+from tui.app.state.sessions import (
+    audit_trail,
+    correct_session,
+    responses_of,
+    rows_of_history,
+)
 from tui.app.step_screen import StepScreen
-from tui.app.widgets.plain import Table, Words
-from tui.measurements.history_rows import Trends, answer_words, measurement_row, trend_lines
+from tui.app.widgets.plain import Caption, Field, Table, Words
+from tui.measurements.history_rows import answer_words
 
 if TYPE_CHECKING:
     from daq.frf import FrequencyResponse
 
 __all__ = ["HistoryScreen"]
 
-_SHOWN = 200
-_ANSWERS = {"r": 11, "b1/deg": 13, "b2/deg": 13}
-_WIDE = {"": 3, "#": 6, "started": 12, "unit": 26, "state": 12, "points": 10, **_ANSWERS}
-_NARROW = {"#": 7, "started": 12, "serial": 9, "points": 8, **_ANSWERS}
-"""Columns with their widths, a gap included."""
-
-_ROOM = sum(_WIDE.values()) + 2
-"""Columns that the wide table and its scroll bar take."""
-
-_SHORT = 8
-"""Characters of a serial number on a narrow screen; the words below have all of it."""
-
+_ORDERS = ("newest first", "r", "b1", "b2", "serial number")
+_SORTED_BY = ("id", "contribution_ratio", "b1_deg", "b2_deg", "serial")
+"""In the order of the key."""
 _TREND_WORDS = "contribution ratio of stage 1 by session, oldest first, one standard error"
 
 
@@ -58,13 +54,17 @@ diagnosis and report are about. Space marks a session; with two marked, O lays o
 other in a plot (the first marked is drawn as a line). T goes back to the trend: the
 contribution ratio of every session of which a model is accepted, with its error bar. Below it
 stands what was diagnosed of the session under the cursor, and every warning. U lists all units.
-C corrects serial number, operator or notes of the session under the cursor; what stood there
-before stays in its audit trail, which A shows.
+/ searches: type words that unit, serial number, operator, notes, state, day or number have;
+Enter lists what has all of them, an empty line lists all. S sorts: newest first, by r, b1, b2 or
+serial number. C corrects serial number, operator or notes of the session under the cursor; what
+stood there before stays in its audit trail, which A shows.
 """
     BINDINGS = [
         Binding("w", "write", "Write report", id="history.report"),
         Binding("space", "mark", "Mark", id="history.mark"),
         Binding("o", "overlay", "Overlay", id="history.overlay"),
+        Binding("slash", "search", "Search", id="history.search", key_display="/"),
+        Binding("s", "sort", "Sort", id="history.sort", show=False),
         Binding("t", "trend", "Trend", id="history.trend", show=False),
         Binding("u", "units", "All units", id="history.units", show=False),
         Binding("c", "correct", "Correct", id="history.correct", show=False),
@@ -72,6 +72,8 @@ before stays in its audit trail, which A shows.
     ]
     DEFAULT_CSS = """
     HistoryScreen #list { height: auto; }
+    HistoryScreen #finding { display: none; }
+    HistoryScreen.-finding #finding { display: block; }
     HistoryScreen #plots { height: 1fr; }
     HistoryScreen.-side #halves { layout: horizontal; }
     HistoryScreen.-side #list { width: 3fr; height: 100%; }
@@ -91,6 +93,7 @@ before stays in its audit trail, which A shows.
         self._marked: list[int] = []
         self._rows: list[dict[str, Any]] = []
         self._every_unit = self._audit = False
+        self._search, self._order = "", 0
         self._trends: list[str] = []
         self._trails: dict[int, list[str]] = {}
         self._columns: Mapping[str, int] = {}
@@ -99,6 +102,9 @@ before stays in its audit trail, which A shows.
         """Table, plot, words; the plot beside the others where there is room."""
         with Vertical(id="halves", classes="pane"):
             with Vertical(id="list"):
+                with Horizontal(classes="field", id="finding"):
+                    yield Caption("search")
+                    yield Field("", id="search", compact=True)
                 yield Table(id="sessions", cursor_type="row", zebra_stripes=True)
                 yield Words("", id="text")
             with Vertical(id="plots"):
@@ -125,7 +131,7 @@ before stays in its audit trail, which A shows.
 
     def _headings(self) -> Mapping[str, int]:
         room = self.query_one("#list").size.width or self.size.width
-        return _NARROW if room < _ROOM else _WIDE
+        return NARROW if room < ROOM else WIDE
 
     def _add_columns(self) -> None:
         self._columns = self._headings()
@@ -139,7 +145,7 @@ before stays in its audit trail, which A shows.
         """Sessions as they are now; those of before stay until they are read."""
         desk = self.desk
         unit = None if desk.unit is None or self._every_unit else desk.unit.name
-        read = partial(_read_rows, desk.db, unit)
+        read = partial(rows_of_history, desk.db, unit, self._search)
         self.bench.beside.do("history", read, self._take, "The history cannot be read")
 
     def _take(self, found: tuple[list[dict[str, Any]], list[str]]) -> None:
@@ -216,6 +222,40 @@ before stays in its audit trail, which A shows.
         self.remove_class("-overlay")
         self.show()
 
+    def action_search(self) -> None:
+        """Type what to search for."""
+        self.add_class("-finding")
+        self.query_one("#search", Field).focus()
+
+    def on_input_submitted(self, event: Field.Submitted) -> None:
+        """List what has the words."""
+        event.stop()
+        self._search = event.value.strip()
+        self.set_class(bool(self._search), "-finding")
+        self.query_one("#sessions", Table).focus()
+        self.arrive()
+
+    def action_sort(self) -> None:
+        """Another order."""
+        self._order = (self._order + 1) % len(_ORDERS)
+        self._fill()
+        self.show()
+
+    def _listed(self) -> list[dict[str, Any]]:
+        """The rows in the order in which they stand; what has no value comes last."""
+        key = _SORTED_BY[self._order]
+        newest = self._rows[::-1]
+
+        def value(row: dict[str, Any]) -> float | str | None:
+            found = row[key]
+            return found["value"] if isinstance(found, dict) else found
+
+        if not self._order:
+            return newest
+        known = [row for row in newest if value(row) not in (None, "")]
+        lacking = [row for row in newest if value(row) in (None, "")]
+        return [*sorted(known, key=value), *lacking]  # type: ignore[arg-type]
+
     def action_units(self) -> None:
         """Sessions of this unit, or all."""
         self._every_unit = not self._every_unit
@@ -278,42 +318,17 @@ before stays in its audit trail, which A shows.
         table = self.query_one("#sessions", Table)
         cursor = table.cursor_row
         table.clear()
-        narrow = self._columns == _NARROW
-        for row in reversed(self._rows):
-            cells = self._narrow_cells(row) if narrow else self._cells(row)
+        narrow = self._columns == NARROW
+        for row in self._listed():
+            cells = self._cells(row, narrow)
             table.add_row(*cells, key=str(row["id"]))
         table.move_cursor(row=min(cursor, max(0, len(self._rows) - 1)))
 
-    def _cells(self, row: dict[str, Any]) -> list[str]:
-        def shown(name: str, digits: int) -> str:
-            number = row[name]
-            if number:
-                return f"{number['value']:.{digits}f}+-{number['std'] or 0.0:.{digits}f}"
-            return row["answer"]["state"] if said and name == "contribution_ratio" else "-"
-
-        said = row["estimate"] is not None or row["diagnosis"] is not None
-        mark = "*" if row["id"] in self._marked else ""
-        view = ">" if row["id"] == self.desk.measurement else ""
-        unit = f"{row['unit']} {row['serial']}".strip() + (" SIM." if row["simulated"] else "")
-        return [
-            mark + view,
-            str(row["id"]),
-            row["started"][5:16].replace("T", " "),
-            unit,
-            row["state"],
-            f"{row['points']}/{row['planned']}",
-            shown("contribution_ratio", 2),
-            shown("b1_deg", 3),
-            shown("b2_deg", 3),
-        ]
-
-    def _narrow_cells(self, row: dict[str, Any]) -> list[str]:
-        """The same on 80 columns: nothing that was measured is cut."""
-        mark, number, started, unit, state, points, *answer = self._cells(row)
-        whole = f"{row['points']}" if row["state"] == "complete" else points
-        name = row["serial"] if row["serial"] and not self._every_unit else unit
-        simulated = "S" if row["simulated"] else ""
-        return [f"{mark}{simulated}{number}", started, _short(name), whole, *answer]
+    def _cells(self, row: dict[str, Any], narrow: bool = False) -> list[str]:
+        marked, in_view = row["id"] in self._marked, row["id"] == self.desk.measurement
+        if narrow:
+            return narrow_cells(row, marked, in_view, self._every_unit)
+        return wide_cells(row, marked, in_view)
 
     def _under_cursor(self) -> int | None:
         row = self._row_under_cursor()
@@ -321,10 +336,8 @@ before stays in its audit trail, which A shows.
 
     def _row_under_cursor(self) -> dict[str, Any] | None:
         table = self.query_one("#sessions", Table)
-        newest_first = self._rows[::-1]
-        if 0 <= table.cursor_row < len(newest_first):
-            return newest_first[table.cursor_row]
-        return None
+        listed = self._listed()
+        return listed[table.cursor_row] if 0 <= table.cursor_row < len(listed) else None
 
     def _draw_trend(self) -> None:
         chart = self.query_one("#trend", Chart)
@@ -342,11 +355,17 @@ before stays in its audit trail, which A shows.
         if row is not None and self._audit:
             return [*lines, *self._trail(row)]
         if row is not None:
-            if self._columns == _NARROW:
+            if self._columns == NARROW:
                 of = f"{row['unit']} {row['serial']}".strip()
                 state = row["state"] + (", SIMULATED" if row["simulated"] else "")
                 lines.append(f"#{row['id']}: {of}, {state}")
             lines += [f"#{row['id']}: {words}" for words in answer_words(row)]
+        if self._order:
+            lines.append(f"sorted by {_ORDERS[self._order]}")
+        if self._search and not self._rows:
+            return [*lines, f"no session has {self._search!r}; / and an empty line list all"]
+        if self._search:
+            lines.append(f"searched for {self._search!r}, found: {len(self._rows)}")
         if not self.has_class("-overlay"):
             lines.append(_TREND_WORDS)
         lines += self._trends
@@ -355,19 +374,3 @@ before stays in its audit trail, which A shows.
         elif not any(row["answer"]["state"] != "none" for row in self._rows):
             lines.append("no session is estimated yet: open one with Enter")
         return lines
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= _SHORT else f"{text[: _SHORT - 1]}\u2026"
-
-
-def _read_rows(db: HistoryPlace, unit: str | None) -> tuple[list[dict[str, Any]], list[str]]:
-    """The latest sessions with points as rows, of one unit or of all, and the trends in words."""
-    from daq.store import Store
-
-    if not is_there(db):
-        return [], []
-    with Store(db, read_only=True) as store:
-        lines = store.lines(unit, last=_SHOWN, with_points=True)
-    rows = [measurement_row(line) for line in lines]
-    return rows, [line for line in trend_lines(Trends(rows).rows()) if line]

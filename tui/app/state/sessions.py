@@ -7,7 +7,7 @@ nothing.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from daq.servers.place import HistoryPlace, is_there
 
@@ -22,9 +22,11 @@ __all__ = [
     "one_session",
     "recent_sessions",
     "responses_of",
+    "rows_of_history",
 ]
 
 _RECENT = 20
+_LISTED = 200
 
 
 def recent_sessions(db: HistoryPlace) -> list[HistoryLine]:
@@ -109,3 +111,24 @@ def correct_session(
 
     with Store(db) as store:
         return [one.field for one in store.correct(measurement, person, changes)]
+
+
+def rows_of_history(
+    db: HistoryPlace, unit: str | None, search: str
+) -> tuple[list[dict[str, Any]], list[str]]:
+    """The latest sessions with points as rows, of one unit or of all, and the trends in words.
+
+    Parameters
+    ----------
+    search
+        Words that each has (`daq.store.listing.Choice`); empty for all.
+    """
+    from daq.store import Store
+    from tui.measurements.history_rows import Trends, measurement_row, trend_lines
+
+    if not is_there(db):
+        return [], []
+    with Store(db, read_only=True) as store:
+        lines = store.lines(unit, last=_LISTED, with_points=True, search=search)
+    rows = [measurement_row(line) for line in lines]
+    return rows, [line for line in trend_lines(Trends(rows).rows()) if line]

@@ -58,6 +58,7 @@ def history(
     last: Whole | None = None,
     since: str | None = None,
     state: Literal["complete", "interrupted", "aborted"] | None = None,
+    search: str | None = None,
     estimate: Literal["none", "some", "all"] = "some",
     cluster: Cluster = None,
     judge: JudgeBy = None,
@@ -86,6 +87,9 @@ def history(
         Only measurements that were started on this day or later, such as 2026-11-01 (UTC).
     state
         Only measurements that are complete, interrupted or aborted.
+    search
+        Only measurements with each of these words in unit, serial number, operator, notes, state,
+        day or number.
     estimate
         Which missing estimates to make of those that are listed: none, all, those that failed
         or are of an earlier edition once more among them, or some, that is to begin no more of
@@ -96,7 +100,7 @@ def history(
 
     if last is not None and last < 1:
         raise InputError(f"--last {last}: give 1 or more")
-    which: dict[str, Any] = {"since": _moment(since), "state": state}
+    which: dict[str, Any] = {"since": _moment(since), "state": state, "search": search}
     limits = limits_to_judge_by(judge)
     db = history_path(db)
     shown = last if last is not None or json else _SHOWN
