@@ -164,4 +164,5 @@ def _update(
     slopes = prediction.slopes[:, seen]
     y = match.residual[seen] + match.deviations @ slopes
     covariance = np.linalg.inv((slopes * trust) @ slopes.T + np.diag(1.0 / prediction.sigmas**2))
-    return np.asarray(covariance @ ((slopes * trust) @ y)), np.asarray(covariance)
+    found = covariance @ ((slopes * trust) @ y)
+    return np.asarray(found, dtype=float), np.asarray(covariance, dtype=float)

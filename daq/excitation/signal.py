@@ -102,7 +102,8 @@ class Excitation:
 
     def phasors(self) -> NDArray[np.complex128]:
         """(lines,) of a periodic signal: u(t) = Im(sum_k phasor_k exp(2 pi i f_k t)), V peak."""
-        return np.asarray(self.amplitudes * np.exp(1j * np.radians(self.phase_deg)))
+        turned = self.amplitudes * np.exp(1j * np.radians(self.phase_deg))
+        return np.asarray(turned, dtype=complex)
 
     def drawn(
         self, rng: np.random.Generator, segments: int
