@@ -4,6 +4,7 @@ import json
 import os
 import pty
 import shlex
+import signal
 import subprocess
 import sys
 
@@ -145,21 +146,24 @@ def test_seed_requires_surprise(words, capsys):
     assert "--seed" in capsys.readouterr().err
 
 
+class Interrupting:
+    """A stream at whose end somebody presses Ctrl-C when the sweep is told."""
+
+    def __init__(self, stream):
+        self._stream = stream
+
+    def __getattr__(self, name):
+        return getattr(self._stream, name)
+
+    def write(self, text):
+        if "sweeping" in text:
+            os.kill(os.getpid(), signal.SIGINT)
+        return self._stream.write(text)
+
+
 def test_interrupted_sweep_ends_safe(quick, tmp_path, capsys, monkeypatch):
-    from daq.control import SessionControl
-
     _, demo = quick("load-inertia")
-    monkeypatch.setattr(
-        sweep.Picture, "add", lambda self, *point: CONTROLS[-1].interrupt("interrupted by SIGINT")
-    )
-    CONTROLS = []
-    begin = SessionControl.__init__
-
-    def kept(self):
-        begin(self)
-        CONTROLS.append(self)
-
-    monkeypatch.setattr(SessionControl, "__init__", kept)
+    monkeypatch.setattr(sys, "stderr", Interrupting(sys.stderr))
     assert demo(["demo", "--out", str(tmp_path)]) == 130
     out, err = capsys.readouterr()
     assert "source confirmed-off" in out
