@@ -30,10 +30,9 @@ def measured(tmp_path_factory):
     return path
 
 
-@pytest.mark.parametrize("size", [(80, 24), (140, 40)])
-def test_datasheet_band_is_shown_before_diagnosis(db, size):
+def test_datasheet_band_is_shown_before_diagnosis(db):
     async def way():
-        async with operated(db, size) as op:
+        async with operated(db) as op:
             await op.press("7")
             await op.sees("#2: ADSS")
             await op.press("enter")
