@@ -216,7 +216,8 @@ def _sentence(unit: Unit, known: Known, machines: int) -> str:
     if known.b_t_deg is not None:
         free.append(_told("b_t", known.b_t_deg, " deg"))
     elif unit.stages == 1:
-        free.append("any backlash")
+        (total,) = free_axes(unit)
+        free.append(f"b_t anywhere from {total.low:.3g} to {total.high:.3g} deg")
     shares = [share for share in unit.tolerances.values() if share > 0.0]
     ends = dict.fromkeys(
         f"{100 * share:.2g}" for share in sorted(shares)[:: max(len(shares) - 1, 1)]

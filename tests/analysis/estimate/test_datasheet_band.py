@@ -75,6 +75,14 @@ def test_band_words_say_assumptions(response):
     assert "r anywhere from 0 to 1" in datasheet_band(response, unit(0.03), machines=4).words
 
 
+def test_one_stage_has_free_backlash():
+    plan = SweepPlan((90.0, 100.0), (2.0,), settle_cycles=2, integrate_cycles=2)
+    axis = load_unit("feed-axis")
+    band = datasheet_band(simulate(axis, 1.0, plan), axis, machines=4)
+    assert band.name == "datasheet"
+    assert "b_t anywhere from 0.018 to 0.27 deg" in band.words
+
+
 def test_band_repeats_and_progress_may_end_it(response):
     one, two = (datasheet_band(response, unit(0.03), machines=4) for _ in range(2))
     np.testing.assert_array_equal(one.levels[0].gain_db, two.levels[0].gain_db)
