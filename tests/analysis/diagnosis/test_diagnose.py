@@ -113,7 +113,7 @@ def test_one_level_without_phase_gets_verdict(cache):
     json.dumps(document, allow_nan=False)
 
 
-# A quarter of an hour. `make long` diagnoses one response that hides a large effect
+# A quarter of an hour. Every day the verb diagnoses one response that hides a large effect
 # (`tests/tui/commands/test_diagnose.py`).
 @pytest.mark.study
 @pytest.mark.parametrize("number", [f"{i:02d}" for i in range(1, 13)])
