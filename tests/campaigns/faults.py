@@ -26,7 +26,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tests"))
 
-from fault_bench.fault_cases import BENCHES, DISTURBANCES, GATEWAY_BENCHES, Case, draw_cases  # noqa: E402
+from fault_bench.fault_cases import DISTURBANCES, Case, draw_cases  # noqa: E402
 from fault_bench.fault_runs import Campaign, Outcome  # noqa: E402
 
 from sim.models import models  # noqa: E402
@@ -111,24 +111,21 @@ def recorded(kept: Path) -> list[Outcome]:
 
 def table(outcomes: Sequence[Outcome], seed: int, repeated: int) -> list[str]:
     """What came of it, with a row for each fault and disturbance that broke a promise."""
-    benches = Counter((outcome.case.driver, outcome.case.wire) for outcome in outcomes)
-    shown = [
-        f"{driver or '35670a'} {wire} {benches[driver, wire]}"
-        for driver, wire in (*BENCHES, *GATEWAY_BENCHES)
-    ]
+    drivers = Counter(outcome.case.driver or "35670a" for outcome in outcomes)
+    wires = Counter(outcome.case.wire for outcome in outcomes)
+    shown = [", ".join(f"{name} {n}" for name, n in sorted(of.items())) for of in (drivers, wires)]
     broken = sum(bool(outcome.wrongs) for outcome in outcomes)
     stopped = [o.stopped_s for o in outcomes if o.stopped_s is not None]
     off = [o.off_after_s for o in outcomes if o.off_after_s is not None]
     lines = [
         f"{len(outcomes)} runs, seed {seed}; "
-        f"{', '.join(shown)}. "
-        f"Runs with a broken promise: {broken}; runs made again: {repeated}. Longest session: "
-        f"{max(o.elapsed_s for o in outcomes):.0f} s by the clock, "
-        f"{max(o.elapsed_s - o.starved_s for o in outcomes):.0f} s without the waiting for a "
-        f"processor. Longest time from the end of the program "
-        f"to the source off: {max(off, default=0.0):.1f} s, from its stop: "
-        f"{max(stopped, default=0.0):.1f} s. Measurements that one further session "
-        f"did not complete, two or three did: {sum(o.resumes > 1 for o in outcomes)}.",
+        f"{'; '.join(shown)}. "
+        f"Broken promises: {broken}; runs made again: {repeated}. Longest session: "
+        f"{max(o.elapsed_s for o in outcomes):.0f} s "
+        f"({max(o.elapsed_s - o.starved_s for o in outcomes):.0f} s with a free processor). "
+        f"Longest time to the source off: {max(off, default=0.0):.1f} s from the program's end, "
+        f"{max(stopped, default=0.0):.1f} s from its stop. More than one session to complete: "
+        f"{sum(o.resumes > 1 for o in outcomes)}.",
     ]
     faults = dict.fromkeys(name for model in models() for name in model.faults)
     rows = {}
