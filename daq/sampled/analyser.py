@@ -271,7 +271,15 @@ class SampledBench(DrivenAnalyser[Dialogue, _SetUp]):
         """Step to a frequency and record from there, shape (count, 2)."""
         dialogue = self._dialogue
         guard()
+        before = self._step()[0]
         dialogue.send(f"ACQ:STEP {frequency_hz:.12g},{count}")
+        # A command that was lost would leave the recording before it to be read as this one.
+        number, stepped_hz, frames = self._step()
+        if (number, frames) != (before + 1, count) or abs(stepped_hz / frequency_hz - 1.0) > 1e-9:
+            raise InstrumentError(
+                f"the step to {frequency_hz:g} Hz was not made: the converter is at step "
+                f"{number:g}, {stepped_hz:g} Hz; nothing was read"
+            )
         deadline = Deadline.after(count / self._rate_hz + _MARGIN_S)
         while dialogue.ask_integer("ACQ?") < count:
             self._check_events(f"recording at {frequency_hz:g} Hz")
@@ -291,6 +299,17 @@ class SampledBench(DrivenAnalyser[Dialogue, _SetUp]):
                 )
             parts.append(values.reshape(size, 2))
         return np.concatenate(parts)
+
+    def _step(self) -> tuple[float, float, float]:
+        """Number of the last step, its frequency in Hz and its frames."""
+
+        def read(text: str) -> tuple[float, float, float]:
+            parts = text.split(",")
+            if len(parts) != 3:
+                raise ProtocolError(f"three numbers were due, but {text!r} came")
+            return parse_number(parts[0]), parse_number(parts[1]), parse_number(parts[2])
+
+        return self._dialogue.parsed("ACQ:STEP?", read)
 
     def _confirm_drive(self, settings: PointSettings) -> None:
         """Raise `InstrumentError` if level or offset moved: another program's hand."""

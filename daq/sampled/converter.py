@@ -79,6 +79,7 @@ class Interpreter:
         self._errors: deque[str] = deque()
         self._events = _POWER_ON
         self._mark = 0
+        self._steps, self._stepped = 0, (0.0, 0)
 
     def run(self, message: bytes) -> bytes | None:
         """Execute one message of one command."""
@@ -142,6 +143,11 @@ class Interpreter:
                 frames = int(_number(arguments[1:], 1, MOST_FRAMES))
                 frequency = _number(arguments[:1], 1e-3, converter.rate_hz / 2)
                 converter.step(frequency, frames)
+                self._steps += 1
+                self._stepped = frequency, frames
+            case "ACQ:STEP?":
+                frequency, frames = self._stepped
+                return f"{self._steps:+d},{frequency:+.12E},{frames:+d}".encode()
             case "ACQ:HALT":
                 converter.halt()
             case "ACQ?":

@@ -194,6 +194,20 @@ def test_late_instrument_is_awaited(driver, fault):
 
 
 @every_driver
+@pytest.mark.parametrize("skip", range(1, 30, 4))
+def test_lost_command_gives_no_wrong_point(driver, skip):
+    """The message that meets the silence is lost; what follows is heard."""
+    instrument, analyser = prepared(
+        driver, [f"silence:point=2,phase=sweep,skip={skip},seconds=0.1"]
+    )
+    points = []
+    with suppress(LashbenchError):
+        points += analyser.sweep(GRID)
+    assert all(right(point) for point in points)
+    assert analyser.make_safe() is OFF
+
+
+@every_driver
 def test_unreadable_source_is_unknown_without_raising(driver):
     instrument, analyser = prepared(driver, ["dropped-connection:point=1"])
     points = analyser.sweep(GRID)
