@@ -95,6 +95,7 @@ first-day: $(READY)
 # documentation shows, of a new session: some minutes.
 pictures: $(READY)
 	@$(BIN)/python tests/screen_pictures.py docs/pictures --every build/pictures
+	@$(BIN)/python tests/screen_pictures.py docs/pictures --kept
 
 MACHINES ?= 200000
 
