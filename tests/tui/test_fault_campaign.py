@@ -54,15 +54,27 @@ def case(number, driver, wire, fault, disturbance):
     return Case(number, driver, wire, fault, disturbance, after=2, delay_s=0.0, seed=number)
 
 
+def was_struck(outcome):
+    return outcome.fault_struck if outcome.case.fault else outcome.disturbed
+
+
+def run_until_struck(campaign, planned):
+    """On a busy machine a program may end before it is disturbed; such a run tells nothing."""
+    for _ in range(3):
+        outcome = campaign.run(planned)
+        if outcome.wrongs or was_struck(outcome):
+            break
+    return outcome
+
+
 @pytest.fixture(scope="module")
 def outcomes():
     campaign = Campaign()
     with pytest.MonkeyPatch.context() as patch, ThreadPoolExecutor(4) as pool:
         # A hang is found all the same, and a busy machine is none.
         patch.setattr("fault_bench.fault_runs.END_S", 240.0)
-        return list(
-            pool.map(campaign.run, [case(number, *kind) for number, kind in enumerate(KINDS)])
-        )
+        planned = [case(number, *kind) for number, kind in enumerate(KINDS)]
+        return list(pool.map(lambda one: run_until_struck(campaign, one), planned))
 
 
 @pytest.mark.slow
@@ -72,8 +84,7 @@ def test_campaign_finds_no_broken_promise(outcomes):
 
 def test_every_planned_fault_occurred(outcomes):
     for outcome in outcomes:
-        struck = outcome.fault_struck if outcome.case.fault else outcome.disturbed
-        assert struck, outcome.case
+        assert was_struck(outcome), outcome.case
     by_kind = {
         (o.case.wire, o.case.fault_name, o.case.disturbance): o.code
         for o in outcomes
