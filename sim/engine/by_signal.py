@@ -8,8 +8,6 @@ estimator and no level.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,10 +16,9 @@ from numpy.typing import NDArray
 
 from daq.errors import AnalysisError
 from sim.engine.engine import Moving, program_of, times
-from sim.engine.kernel import FIRST_SWEEPS, MOST_VECTORS, Program
+from sim.engine.kernel import FIRST_SWEEPS, MOST_VECTORS, Program, program_by
 from sim.engine.lanes import VECTOR_BYTES, Lanes
-from sim.engine.layout import STEPS_SEEN, Layout, Structure
-from sim.engine.machine_code import architecture, compiled, multiplies_and_adds
+from sim.engine.layout import STEPS_SEEN, Layout
 from sim.engine.nonlinearity import Reading, held
 from sim.engine.propagator import build_propagator, find_modes
 from sim.engine.solving import law_parameters
@@ -210,7 +207,7 @@ class _Block:
             at = layout.lanes[name]
             self._block[at.start : at.stop] = known[:, of]
         self._coefficients = np.ascontiguousarray(coefficients, dtype=layout.dtype)
-        self._program = _program(layout.structure, of.size // layout.width)
+        self._program = program_by(_BySignal, __file__, layout.structure, of.size // layout.width)
         self._sweeps = FIRST_SWEEPS
 
     def step(self, table: NDArray[Any], samples: int) -> NDArray[Any]:
@@ -232,19 +229,6 @@ def _calls(layout: Layout, count: int) -> Iterator[NDArray[np.intp]]:
         taken = min(MOST_VECTORS, 1 << (vectors.bit_length() - 1)) * width
         yield np.resize(np.arange(at, min(at + taken, count)), taken)
         at += taken
-
-
-@cache
-def _program(structure: Structure, vectors: int) -> Any:
-    can = multiplies_and_adds(), architecture()
-    return compiled(
-        f"by signal {structure} {vectors} {can}",
-        [
-            Path(__file__).with_name(file)
-            for file in ("by_signal.py", "kernel.py", "layout.py", "laws.py", "lanes.py")
-        ],
-        lambda: _BySignal(Layout(structure), vectors, 1, *can).text(),
-    )
 
 
 class _BySignal(Program):

@@ -8,18 +8,16 @@ two stepped it. It schedules nothing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache, lru_cache
-from pathlib import Path
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from llvmlite import ir
 from numpy.typing import NDArray
 
-from sim.engine.kernel import Program
+from sim.engine.kernel import Program, program_by
 from sim.engine.lanes import VECTOR_BYTES, Lanes
-from sim.engine.layout import STEPS_SEEN, SUMS, Layout, Structure
-from sim.engine.machine_code import architecture, compiled, multiplies_and_adds
+from sim.engine.layout import STEPS_SEEN, SUMS, Layout
 
 __all__ = ["Block", "wave_table"]
 
@@ -75,7 +73,7 @@ class Block:
         self._scratch = layout.blank(1, SUMS)
         # What the addresses of each lane lead to; a lane without work goes round its last table.
         self._reached: list[tuple[NDArray, ...]] = [()] * self.count
-        self._step = _program(layout.structure, vectors)
+        self._step = program_by(_Independent, __file__, layout.structure, vectors)
 
     def load(
         self,
@@ -131,19 +129,6 @@ class Block:
         """Rows of a lane as it ended, as copies, by name."""
         column = self._lanes[:, lane].astype(float)
         return {name: column[rows] for name, rows in self._rows.items()}
-
-
-@cache
-def _program(structure: Structure, vectors: int) -> Any:
-    can = multiplies_and_adds(), architecture()
-    return compiled(
-        f"independent {structure} {vectors} {can}",
-        [
-            Path(__file__).with_name(file)
-            for file in ("independent.py", "kernel.py", "layout.py", "laws.py", "lanes.py")
-        ],
-        lambda: _Independent(Layout(structure), vectors, 1, *can).text(),
-    )
 
 
 class _Independent(Program):

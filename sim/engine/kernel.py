@@ -28,7 +28,7 @@ from sim.engine.layout import HELD, PAIR, STEPS_SEEN, STRIBECK, SUMS, Layout, St
 from sim.engine.machine_code import architecture, compiled, multiplies_and_adds
 from sim.engine.system import SAMPLED, Law
 
-__all__ = ["FIRST_SWEEPS", "MOST_VECTORS", "Program", "step_cycles"]
+__all__ = ["FIRST_SWEEPS", "MOST_VECTORS", "Program", "program_by", "step_cycles"]
 
 MOST_VECTORS = 4
 """Vectors that one call steps at most: registers suffice for no more."""
@@ -80,7 +80,7 @@ def step_cycles(
     table[:, : waves.shape[1]] = waves
     sums = layout.blank(kept_cycles, SUMS, count)
     own = np.ascontiguousarray(coefficients, dtype=layout.dtype)
-    _program(layout.structure, count // layout.width, len(own))(
+    program_by(Program, __file__, layout.structure, count // layout.width, len(own))(
         own.ctypes.data, lanes.ctypes.data, table.ctypes.data, steps, settle_cycles, kept_cycles,
         sums.ctypes.data,
     )  # fmt: skip
@@ -88,15 +88,16 @@ def step_cycles(
 
 
 @cache
-def _program(structure: Structure, vectors: int, systems: int) -> Any:
+def program_by(
+    writer: type[Program], file: str, structure: Structure, vectors: int, systems: int = 1
+) -> Any:
+    """The program that a class writes, in machine code; `file` is where that class is."""
     can = multiplies_and_adds(), architecture()
+    files = dict.fromkeys((Path(file).name, "kernel.py", "layout.py", "laws.py", "lanes.py"))
     return compiled(
-        f"{structure} {vectors} {systems} {can}",
-        [
-            Path(__file__).with_name(file)
-            for file in ("kernel.py", "layout.py", "laws.py", "lanes.py")
-        ],
-        lambda: Program(Layout(structure), vectors, systems, *can).text(),
+        f"{writer.__name__} {structure} {vectors} {systems} {can}",
+        [Path(__file__).with_name(name) for name in files],
+        lambda: writer(Layout(structure), vectors, systems, *can).text(),
     )
 
 
