@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.answer import accept_model
 from analysis.ensemble.batch import Family, read_families
 from analysis.ensemble.datasheet_spread import spread_of
 from analysis.ensemble.machine import Machine
@@ -83,8 +84,6 @@ class DatasheetBand:
 
 def known_of_estimate(estimate: Mapping[str, Any] | None) -> Known:
     """What the document of an estimate knows, whose model explains the response; else nothing."""
-    from analysis.answer import accept_model
-
     answer = accept_model(estimate, None)
     ratio = answer.contribution_ratio
     if ratio is None or estimate is None:

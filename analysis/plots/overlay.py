@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -22,11 +22,13 @@ from numpy.typing import NDArray
 
 from analysis.drawing.palette import LEVEL_COLOURS
 from analysis.drawing.picture import save_picture
-from analysis.estimate.datasheet_band import DatasheetBand, LevelBand
 from analysis.plots.traces import Trace, level_traces, on_one_branch
 from daq.errors import InputError
 from daq.frf import FrequencyResponse
 from daq.untrusted.visible_text import visible_line
+
+if TYPE_CHECKING:
+    from analysis.estimate.datasheet_band import DatasheetBand, LevelBand
 
 __all__ = ["MOST_CURVES", "Curve", "draw_overlay", "save_overlay"]
 
