@@ -100,6 +100,8 @@ def engine_of(path: Path, mode: str, older: int | None = None) -> sa.Engine:
         connection.execute("PRAGMA cell_size_check = ON")
         connection.execute("PRAGMA synchronous = NORMAL")
         connection.execute("PRAGMA foreign_keys = ON")
+        # SQLite's own leaves all but ASCII as it is.
+        connection.create_function("lower", 1, _lower, deterministic=True)
         if older is not None:
             lay_over(connection, older)
 
@@ -249,3 +251,12 @@ def _length_fault(connection: sa.Connection, path: Path) -> str:
     if not os.path.exists(log_of(path)) and path.stat().st_size < pages * size:
         return f"{path.stat().st_size} bytes of {pages * size}"
     return "ok"
+
+
+_Stored = str | bytes | int | float | None
+"""What SQLite keeps."""
+
+
+def _lower(value: _Stored) -> _Stored:
+    """Text in small letters; anything else, which a damaged file may hold, as it is."""
+    return value.lower() if isinstance(value, str) else value

@@ -69,6 +69,7 @@ WHERE m.state = 'complete'{{which}}
 ORDER BY m.id"""
 _ALL = (1 << 63) - 1
 _MOST_WORDS = 10
+"""The last of them holds the rest of the text as it stands."""
 _SEARCHED = ("m.operator", "m.notes", "m.state", "CAST(m.id AS TEXT)")
 _LIKE = "LIKE {word} ESCAPE '|'"
 _HAS_WORD = (
@@ -106,8 +107,9 @@ class Choice:
     state
         Only what stands so: complete, interrupted or aborted.
     search
-        Only what has each of these words, in any case, in its unit, serial number, operator, notes,
-        state or number; one that looks like a day, as 11-30, also in the start.
+        Only what has each of these words, in any case (on a server: of its locale), in its unit,
+        serial number, operator, notes, state or number; one that looks like a day, as 11-30, also
+        in the start.
     """
 
     unit: str | None = None
@@ -148,7 +150,7 @@ class Choice:
             if value is not None:
                 values[column] = value
                 conditions.append(f"m.{column} {condition} :{column}")
-        for place, word in enumerate((self.search or "").split()[:_MOST_WORDS]):
+        for place, word in enumerate((self.search or "").split(None, _MOST_WORDS - 1)):
             values[f"word{place}"] = f"%{_literal(word.lower())}%"
             condition = _ON_DAY if _DAY.search(word) else _HAS_WORD
             conditions.append(condition.format(word=f":word{place}"))

@@ -134,6 +134,21 @@ def test_search_finds_each_word_literally(store):
     assert (store.count(search="adss"), store.count(search=f"adss {day}")) == (2, 2)
 
 
+def test_search_reads_long_texts_whole(store):
+    """No word is left out, however many there are."""
+    measured(store, "a b")
+    assert [line.id for line in store.lines(search="adss " * 9 + "a b")] == [1]
+    assert store.lines(search="adss " * 12 + "nobody") == []
+
+
+def test_file_search_ignores_case_beyond_ascii(tmp_path):
+    """A server folds letters by its locale."""
+    with Store(tmp_path / "bench.db", create=True) as store:
+        measured(store, "MÜLLER-7")
+        for word in ("müller-7", "Müller", "MÜLLER"):
+            assert [line.id for line in store.lines(search=word)] == [1], word
+
+
 def test_correction_records_person_time_and_old_value(store):
     number, other = measured(store), measured(store)
     done = store.correct(number, "C. D.", {"serial": "SN-8", "notes": "cold", "operator": "A"})
