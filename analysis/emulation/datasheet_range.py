@@ -22,6 +22,10 @@ _WIDE = 2.0
 """Reach in standard deviations of what is left open: what is learned of a size from runs that lie
 closer together than that is too sure."""
 
+_DIGITS = 6
+"""Places of what is told, in standard deviations of the tolerance. Another compiler, or the same
+one another day, computes the ninth otherwise; motion with backlash would be another one by that."""
+
 _TRIES = 2
 """Random steps of a walk per coordinate and reach."""
 
@@ -43,4 +47,5 @@ def datasheet_range(candidate: FittedModel) -> DatasheetRange:
     across = share @ (found - share @ found) ** 2
     std = np.sqrt(np.diag(np.linalg.inv(precision)) + across)
     centre = np.clip(best.deviations[: len(sigmas)], -_FARTHEST * sigmas, _FARTHEST * sigmas)
-    return DatasheetRange(centre, np.minimum(_WIDE * std, sigmas))
+    reach = np.minimum(_WIDE * std, sigmas)
+    return DatasheetRange(*(np.round(v / sigmas, _DIGITS) * sigmas for v in (centre, reach)))

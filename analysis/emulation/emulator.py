@@ -271,7 +271,7 @@ class Emulator:
         # The tachometer's gain comes last.
         slopes = np.concatenate([self.slopes, gain]).reshape(len(self.sigmas) + 1, -1)
         return Readings(
-            np.isfinite(self.observation.values),
+            np.ascontiguousarray(np.isfinite(self.observation.values)),
             # Solved slopes lie column by column, and what is computed goes along rows.
             np.ascontiguousarray(slopes),
             np.append(self.sigmas, self.gain),
