@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TypeVar
 
 from daq.driving.replies import parse_integer, parse_number
@@ -136,6 +137,15 @@ class Conversation(ABC):
         except LashbenchError as failure:
             return type(error)(f"{error}; no recovery: {failure}; its state is unknown")
         return type(error)(f"{error}; after a device clear{found}; its state is unknown")
+
+    @contextmanager
+    def hurrying(self, reply_s: float) -> Iterator[None]:
+        """Give each ordinary reply at most so long inside the block."""
+        before_s, self.reply_s = self.reply_s, min(self.reply_s, reply_s)
+        try:
+            yield
+        finally:
+            self.reply_s = before_s
 
     def soon(self) -> Deadline:
         """Bound of one step of a recovery."""

@@ -25,6 +25,9 @@ Guard = Callable[[], None]
 _LOCK_PATIENCE_S = 6.0
 """How long going safe waits for an exchange of another thread to end before it goes on anyway."""
 
+_QUIET_REPLY_S = 1.0
+"""Bound of a reply while a sweep that failed is made quiet; the safe-off recipe follows."""
+
 _Talk = TypeVar("_Talk", bound=Conversation)
 _SetUp = TypeVar("_SetUp")
 
@@ -130,7 +133,8 @@ class DrivenAnalyser(ABC, Generic[_Talk, _SetUp]):
                 if not isinstance(error, LashbenchError):
                     # An interrupt may have come between question and answer.
                     self._resynchronise()
-                self._quiet()
+                with self._dialogue.hurrying(_QUIET_REPLY_S):
+                    self._quiet()
             self._dialogue.trusted = False
             raise
         self._quiet()

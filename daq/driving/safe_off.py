@@ -19,6 +19,9 @@ __all__ = ["Attempt", "SafeOff", "Step"]
 
 _REPLY_S = 1.0
 _LEAST_REPLY_S = 0.05
+_DEAF_S = 6.0
+"""Where nothing has answered for so long no further question is asked, and a command gets next to
+no time. What follows, a new connection and the watchdog, begins anew."""
 
 _Talk = TypeVar("_Talk", bound=Conversation)
 
@@ -67,6 +70,7 @@ class Attempt(Generic[_Talk]):
         self.steps: list[Step] = []
         self.answered = False
         self._budget = Deadline.after(budget_s)
+        self._deaf = Deadline.after(_DEAF_S)
 
     def act(self, what: str, action: Callable[[], str]) -> str | None:
         """Try one thing; its result, None if it failed."""
@@ -85,7 +89,10 @@ class Attempt(Generic[_Talk]):
 
     def bound(self, seconds: float) -> float:
         """At most so long, less where the budget is spent."""
-        return max(_LEAST_REPLY_S, min(seconds, self._budget.remaining_s))
+        left_s = self._budget.remaining_s
+        if not self.answered:
+            left_s = min(left_s, self._deaf.remaining_s)
+        return max(_LEAST_REPLY_S, min(seconds, left_s))
 
     def send(self, line: str) -> None:
         """Try to send a command."""
@@ -98,6 +105,10 @@ class Attempt(Generic[_Talk]):
 
     def ask(self, line: str) -> str | None:
         """Try to have a question answered."""
+        if not self.answered and self._deaf.expired:
+            result = f"not asked, as nothing was answered in {_DEAF_S:g} s"
+            self.steps.append(Step(line, result, failed=True))
+            return None
         reply = self.act(line, lambda: self.dialogue.ask(line))
         self.answered = self.answered or reply is not None
         return reply

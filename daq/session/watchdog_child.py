@@ -23,9 +23,9 @@ from daq.servers.place import HistoryPlace, HistoryServer, parse_place
 
 __all__ = ["load", "main", "make_safe", "write_down"]
 
-_TRIES, _TRYING_S = 5, 25.0
-"""How often the instrument is asked, and until when it is opened anew while nobody is there: an
-adapter that restarts comes back. The next session waits for this one."""
+_TRIES, _TRYING_S = 3, 25.0
+"""How often an instrument that says nothing is asked, and until when it is opened anew while
+nobody is there: an adapter that restarts comes back. The next session waits for this one."""
 _BETWEEN_S = 1.0
 _SLICE_S = 0.25
 """How long one wait for a word is; a longer one shows that this process itself stood still."""

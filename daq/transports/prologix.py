@@ -53,8 +53,8 @@ class PrologixTransport:
             # A command may still do good once the adapter comes back; the answer to a question
             # could not be told from an older one.
             raise self._adapter_silent()
-        lying = self._adapter.inbox.emptied().replace(b"\0", b"")
-        if lying.strip():
+        lying = self._adapter.lying()
+        if lying:
             raise ProtocolError(
                 f"{self.address}: {lying[:60]!r} came unasked for, after {self._waiting!r} and "
                 f"before {line!r}; nothing was sent"
@@ -67,7 +67,7 @@ class PrologixTransport:
         adapter = self._adapter
         self._fruitless = 0
         adapter.send(b"++read eoi", deadline)
-        while (line := adapter.inbox.taken_line()) is None:
+        while (line := adapter.taken_reply()) is None:
             self._wait_for_more(deadline)
         try:
             return line.replace(b"\0", b"").decode("ascii").strip()

@@ -97,6 +97,7 @@ class Adapter:
         self.gpib_address = gpib_address
         self.inbox = Inbox(link, "a GPIB adapter")
         self._versions_due = 0
+        self.version = ""
         self.version, self.dialect = self._find(deadline)
         self.set_up(deadline)
 
@@ -111,7 +112,30 @@ class Adapter:
     def ask(self, command: str, deadline: Deadline) -> str | None:
         """One line of answer to an adapter command, None if it stays silent."""
         self.send(command.encode("ascii"), deadline)
-        return self._next_line(deadline)
+        line = self._next_line(deadline)
+        while line is not None and self._is_late(line) and not command.startswith("++ver"):
+            line = self._next_line(deadline)
+        return line
+
+    def taken_reply(self) -> bytes | None:
+        """The next line of what the instrument said, None if none is whole yet.
+
+        An adapter that was held up by the instrument answers an older `resynchronise` after that
+        was given up. Its version is no reply of an instrument, and is dropped.
+        """
+        line = self.inbox.taken_line()
+        while line is not None and self._is_late(_text(line)):
+            line = self.inbox.taken_line()
+        return line
+
+    def lying(self) -> bytes:
+        """What came and was not asked for, dropped here; empty if there is nothing."""
+        lines = self.inbox.emptied().replace(b"\0", b"").split(b"\n")
+        lying = b"\n".join(line for line in lines if not self._is_late(_text(line)))
+        return lying if lying.strip() else b""
+
+    def _is_late(self, line: str) -> bool:
+        return bool(self.version) and line.endswith(self.version)
 
     def resynchronise(self, deadline: Deadline) -> bool:
         """Drop everything up to the adapter's own version text; False if it stays silent.

@@ -4,6 +4,7 @@ A driver that is added is tested here without a line of its own.
 """
 
 import math
+import time
 from contextlib import suppress
 
 import pytest
@@ -214,6 +215,18 @@ def test_unreadable_source_is_unknown_without_raising(driver):
     with pytest.raises(LashbenchError):
         next(points)
     assert analyser.make_safe() is SourceState.UNKNOWN
+
+
+@every_driver
+def test_instrument_silent_for_ever_is_given_up(driver):
+    """A session asks twice, its watchdog three times; all of it must take less than a minute."""
+    _, analyser = prepared(driver, ["silence:point=1,phase=sweep,seconds=1000000"])
+    with suppress(LashbenchError):
+        list(analyser.sweep(GRID))
+    began_s = time.monotonic()
+    assert analyser.make_safe() is SourceState.UNKNOWN
+    assert time.monotonic() - began_s < 10.0
+    assert any("not asked" in step.result for step in analyser.safe_off.steps)
 
 
 @every_driver

@@ -298,6 +298,20 @@ def test_stale_answer_is_never_taken_as_new():
     assert ask(transport, "3?", soon()) == "+3"
 
 
+def test_late_version_is_no_reply():
+    """An adapter that the instrument held up answers an old question of ours."""
+    late = TinyAdapter(echo_number).version.encode() + b"\r\n"
+    adapter = TinyAdapter(lambda message: late + b"+0" + late if b"CUT" in message else late)
+    transport = opened(adapter)
+    with pytest.raises(BenchTimeout, match=r"silent, 'OUTP\?' got no answer within [^;]*; is it"):
+        ask(transport, "OUTP?", soon())
+    with pytest.raises(BenchTimeout, match=r"silent, 'CUT\?' got no answer"):
+        ask(transport, "CUT?", soon())
+    adapter.instrument = lambda message: late + b"+5\n"
+    adapter.link.buffer = late
+    assert ask(transport, "SOUR:VOLT?", soon()) == "+5"
+
+
 def test_silent_adapter_gets_commands_but_no_queries():
     adapter = TinyAdapter(echo_number)
     transport = opened(adapter)
