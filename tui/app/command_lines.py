@@ -41,8 +41,11 @@ def commands_of(step: int, desk: Desk) -> list[str]:
         if step == 3:
             return [*lines, f"{measured} --dry-run", "# the checks come first in:", measured]
         return [*lines, measured]
+    place = ["--db", str(desk.db)]
+    if step == 7:
+        lines += _overlay(desk)
     if desk.measurement is None:
-        return ["# no measurement yet"]
+        return lines if step == 7 and desk.marked else ["# no measurement yet"]
     number, unit = str(desk.measurement), ["--unit", desk.unit_name]
     file = f"measurement-{number}.csv"
     export = _line("export", number, "--db", str(desk.db), "--out", file)
@@ -51,12 +54,19 @@ def commands_of(step: int, desk: Desk) -> list[str]:
         return [*lines, export, _line("extract", file), _line("estimate", file, *unit, *as_is)]
     if step == 6:
         return [*lines, export, _line("diagnose", file, *unit, *as_is)]
-    place = ["--db", str(desk.db)]
     return [
         *lines,
         _line("report", number, *place, *unit, "--out", f"report-{number}.html"),
         _line("history", *place, "--unit", _unit_name(desk)),
     ]
+
+
+def _overlay(desk: Desk) -> list[str]:
+    """The picture of the sessions that are marked, where an overlay is one."""
+    numbers = [str(number) for number in desk.marked]
+    out = f"overlay-{'-'.join(numbers)}.png"
+    line = _line("plot", *numbers, "--db", str(desk.db), "--out", out)
+    return [line] if len(numbers) > 1 else []
 
 
 def _line(*words: str) -> str:

@@ -1,11 +1,13 @@
 """The bench screen with sessions behind it: reference, trend, overlay, opening, the palette."""
 
 import logging
+import shlex
 
 import pytest
 from outputs.screen import ESTIMATE, operated, quick_analyses, run
 
 from daq.store import Store
+from tui.app.plot.traces import LEVEL_MARKS
 from tui.app.state.analyses import Analyses
 from tui.cli import main
 from tui.logs import logging_to_file
@@ -43,9 +45,9 @@ def test_trend_overlay_and_opening(db):
             screen = await op.sees("[7 Report]", "0.31+-0.05", "oldest first")
             assert "ADSS SN 7 SIM." in screen
             await op.press("o")
-            await op.sees("mark two sessions first")
+            await op.sees("mark two sessions or more first")
             await op.press("space", "down", "space", "o")
-            await op.sees("\u25cf 2.5 V", "line #2 2.5 V")
+            await op.sees("\u25cf #2  \u25a0 #1")
             await op.press("t")
             await op.sees("oldest first")
             await op.press("enter")
@@ -58,6 +60,49 @@ def test_trend_overlay_and_opening(db):
     run(way)
     with Store(db, read_only=True) as store:
         assert set(store.latest_estimates()) == {1, 2}
+
+
+def test_six_sessions_are_told_apart(tmp_path, monkeypatch):
+    """Each has a mark in table and legend, the cursor reads all, F2 prints the same picture."""
+    monkeypatch.chdir(tmp_path)
+    db = tmp_path / "bench.db"
+    words = ["measure", "--unit", "adss", "--db", str(db), "--level", "1.5", *BAND, *SHORT]
+    for seed in range(7):
+        assert main([*words, "--instrument", f"sim:?seed={seed}"]) == 0
+    lines = []
+
+    async def way():
+        async with operated(db, (200, 60)) as op:
+            await op.press("7")
+            await op.sees("[7 Report]", "complete")
+            await op.press(*["space", "down"] * 6, "space")
+            await op.sees("6 sessions can be told apart")
+            await op.press("o")
+            legend = "  ".join(
+                f"{mark} #{number}"
+                for mark, number in zip(LEVEL_MARKS, range(7, 1, -1), strict=True)
+            )
+            screen = await op.sees(legend)
+            table = [line[:4] for line in screen.splitlines() if "complete   " in line]
+            assert [row.strip() for row in table] == [*LEVEL_MARKS, ""]
+            plot = op.app.screen.query_one("#bode")
+            assert len({trace.colour for trace in plot.traces}) == 6
+            plot.focus()
+            await op.press("left")
+            await op.sees("cursor: 135.00 Hz #7 1.5 V:")
+            assert plot.reading.count(" dB ") == 12
+            op.app.screen.query_one("#sessions").focus()
+            await op.press("up", "space")
+            await op.sees("5 marked, O: overlay", "\u25bc #3\n")
+            await op.press("f2")
+            await op.sees("The same on the command line")
+            lines.extend(op.app.screen.text.splitlines())
+
+    run(way)
+    (line,) = [one for one in lines if " plot " in one]
+    assert line.startswith("lashbench plot 7 6 5 4 3 --db ")
+    assert main(shlex.split(line)[1:]) == 0
+    assert (tmp_path / "overlay-7-6-5-4-3.png").exists()
 
 
 def test_trend_omits_estimate_of_remeasured_points(db):

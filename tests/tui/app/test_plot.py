@@ -145,6 +145,16 @@ def test_plot_is_complete_without_known_colours():
     shown(steps, theme="ansi-dark")
 
 
+def test_crowded_traces_keep_their_marks():
+    async def steps(app, pilot):
+        rows = text_of(app).splitlines()[1:18]
+        for mark in "\u25cf\u25a0":
+            # Between too few to tell a trace by, and a mark for every point.
+            assert 3 <= sum(row.count(mark) for row in rows) <= 14
+
+    shown(steps, size=(60, 30))
+
+
 def test_axes_show_units_and_cursor_reads_values():
     async def steps(app, pilot):
         screen = text_of(app)

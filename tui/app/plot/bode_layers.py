@@ -5,6 +5,7 @@ Owns which layer lies above which, and when marks give way to dots. It draws not
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -12,12 +13,15 @@ from numpy.typing import NDArray
 
 from tui.app.plot.layers import Band, Bars, Curve, Layer, Marks
 from tui.app.plot.palette import Palette
-from tui.app.plot.traces import Prediction, Trace, continuous_phase
+from tui.app.plot.traces import LEVEL_MARKS, Prediction, Trace, continuous_phase
 
 __all__ = ["gain_layers", "phase_layers"]
 
 _CROWDED = 1.5
-"""Columns a point below which clean points are dots of the line and no marks."""
+"""Columns a point below which most clean points are dots of the line."""
+
+_MARKED = 8
+"""Columns from one mark to the next then: the shape tells a trace also without colour."""
 
 _LONGEST_BAR_DB = 20.0
 """Bars that are longer do not widen the axis."""
@@ -107,8 +111,12 @@ def _marks(
     signs = np.array(trace.marks, dtype="<U1")
     flagged = signs != trace.mark
     colour = palette.colour(trace.colour)
-    crowded = here.sum() * _CROWDED > columns
-    shown = flagged if crowded else np.ones(len(signs), dtype=bool)
+    # Sessions laid over each other crowd each other.
+    crowded = bool(trace.series) or here.sum() * _CROWDED > columns
+    # Traces of the same frequencies have their marks at different ones.
+    apart = max(1, math.ceil(_MARKED * here.sum() / max(1, columns))) if crowded else 1
+    first = apart * trace.colour // len(LEVEL_MARKS)
+    shown = flagged | (np.arange(len(signs)) % apart == first % apart)
     layers: list[Layer] = []
     if crowded:
         clean = np.where(flagged, np.nan, values)

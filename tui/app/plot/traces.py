@@ -5,8 +5,8 @@ Owns the record of a trace and how points become one. It draws nothing.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "FLAG_MARKS", "LEVEL_MARKS", "Prediction", "Trace", "continuous_phase", "legend",
-    "traces_of_points", "traces_of_response",
+    "traces_of_points", "traces_of_response", "traces_of_sessions",
 ]  # fmt: skip
 
 LEVEL_MARKS = "\u25cf\u25a0\u25b2\u25c6\u25bc\u2605"
@@ -52,6 +52,8 @@ class Trace:
         Character of a clean point, and the number of its colour.
     reference
         Drawn behind the others as a line without marks.
+    series
+        What the legend says once in place of the names; empty: it says the name.
     """
 
     name: str
@@ -63,6 +65,7 @@ class Trace:
     mark: str
     colour: int
     reference: bool = False
+    series: str = ""
 
     @property
     def marks(self) -> list[str]:
@@ -153,6 +156,21 @@ def traces_of_response(response: FrequencyResponse, reference: str = "") -> list
     return traces
 
 
+def traces_of_sessions(responses: Mapping[int, FrequencyResponse]) -> list[Trace]:
+    """Traces of several measurements, by number: a mark and a colour each, for all its levels.
+
+    As many can be told apart as there are `LEVEL_MARKS`.
+    """
+    return [
+        replace(
+            trace, name=f"#{number} {trace.name}", series=f"#{number}",
+            mark=LEVEL_MARKS[index % len(LEVEL_MARKS)], colour=index,
+        )
+        for index, (number, response) in enumerate(responses.items())
+        for trace in traces_of_response(response)
+    ]  # fmt: skip
+
+
 def traces_of_points(points: Iterable[StoredPoint], levels_vpk: Sequence[float]) -> list[Trace]:
     """A trace per source level of a plan, of the points that are there so far."""
     rows: dict[float, list[StoredPoint]] = {level: [] for level in sorted(levels_vpk)}
@@ -184,7 +202,8 @@ def _trace(index: int, level: float, stored: Sequence[StoredPoint]) -> Trace:
 
 def legend(traces: Sequence[Trace], predictions: Sequence[Prediction] = ()) -> str:
     """What the marks mean, in words; flags only where there are such points."""
-    parts = [f"{trace.mark} {trace.name}" for trace in traces if not trace.reference]
+    told = [f"{one.mark} {one.series or one.name}" for one in traces if not one.reference]
+    parts = list(dict.fromkeys(told))
     parts += [f"line {trace.name}" for trace in traces if trace.reference]
     parts += dict.fromkeys(f"band {one.name}" for one in predictions)
     seen = {mark for trace in traces if not trace.reference for mark in trace.marks}

@@ -1,4 +1,4 @@
-"""Step 7: the report, the trend of a unit over its sessions, two sessions overlaid.
+"""Step 7: the report, the trend of a unit over its sessions, several sessions overlaid.
 
 Owns the choice of sessions. Estimates that the history lacks are not made
 here: a session gets one when its result is opened.
@@ -19,7 +19,7 @@ from tui.app.dialogs.correction import CorrectionDialog
 from tui.app.plot.bode import BodePlot
 from tui.app.plot.chart import Chart
 from tui.app.plot.curves import trend_drawing
-from tui.app.plot.traces import traces_of_response
+from tui.app.plot.traces import LEVEL_MARKS, traces_of_sessions
 from tui.app.screens.history_table import NARROW, ROOM, WIDE, narrow_cells, wide_cells
 from tui.app.state.sessions import (
     audit_trail,
@@ -36,6 +36,9 @@ if TYPE_CHECKING:
 
 __all__ = ["HistoryScreen"]
 
+_FEWEST = 2
+"""Sessions of an overlay."""
+
 _ORDERS = ("newest first", "r", "b1", "b2", "serial number")
 _SORTED_BY = ("id", "contribution_ratio", "b1_deg", "b2_deg", "serial")
 """In the order of the key."""
@@ -50,8 +53,9 @@ class HistoryScreen(StepScreen):
 W writes the report of the measurement in view as one HTML file that prints.
 
 The table lists this unit's sessions. Enter opens one: it is then the one that result,
-diagnosis and report are about. Space marks a session; with two marked, O lays one over the
-other in a plot (the first marked is drawn as a line). T goes back to the trend: the
+diagnosis and report are about. Space marks a session, up to six of them; O lays those that are
+marked over each other in a plot, each with the mark that it has in the table and with a colour,
+and Tab leads into it: its cursor reads all of them. T goes back to the trend: the
 contribution ratio of every session of which a model is accepted, with its error bar. Below it
 stands what was diagnosed of the session under the cursor, and every warning. U lists all units.
 / searches: type words that unit, serial number, operator, notes, state, day or number have;
@@ -90,7 +94,6 @@ stood there before stays in its audit trail, which A shows.
 
     def __init__(self) -> None:
         super().__init__()
-        self._marked: list[int] = []
         self._rows: list[dict[str, Any]] = []
         self._every_unit = self._audit = False
         self._search, self._order = "", 0
@@ -164,8 +167,14 @@ stood there before stays in its audit trail, which A shows.
         if "report" in self.bench.analyses.progress:
             return "Writing the report"
         if self.desk.measurement is None:
-            return "Enter: open a session.  Space on two of them, then O: overlay"
-        return f"W: write the report of #{self.desk.measurement}.  Space on two, then O: overlay"
+            return f"Enter: open a session.  {self._overlay_words()}"
+        return f"W: write the report of #{self.desk.measurement}.  {self._overlay_words()}"
+
+    def _overlay_words(self) -> str:
+        count = len(self.desk.marked)
+        if count < _FEWEST:
+            return "Space marks two or more, O: overlay"
+        return f"{count} marked, O: overlay; T: trend"
 
     def copy_text(self) -> str:
         """The table and the trends."""
@@ -190,32 +199,47 @@ stood there before stays in its audit trail, which A shows.
         self.show()
 
     def action_mark(self) -> None:
-        """Mark or unmark the session under the cursor; two at most."""
-        measurement = self._under_cursor()
-        if measurement is None:
+        """Mark or unmark the session under the cursor; as many as there are marks."""
+        row, desk = self._row_under_cursor(), self.desk
+        if row is None:
             return
-        if measurement in self._marked:
-            self._marked.remove(measurement)
+        number = int(row["id"])
+        if number in desk.marked:
+            desk.marked = tuple(one for one in desk.marked if one != number)
+        elif len(desk.marked) == len(LEVEL_MARKS):
+            self.notify(
+                f"{len(LEVEL_MARKS)} sessions can be told apart; Space on one unmarks it",
+                severity="warning",
+            )
+            return
         else:
-            self._marked = [*self._marked, measurement][-2:]
+            desk.marked = (*desk.marked, number)
         self._fill()
+        if self.has_class("-overlay") and len(desk.marked) >= _FEWEST:
+            # The plot shows the marks that stand in the table.
+            self.action_overlay()
+        else:
+            self.action_trend()
 
     def action_overlay(self) -> None:
-        """Lay the two marked sessions over each other."""
-        if len(self._marked) != 2:
-            self.notify("mark two sessions first: Space", severity="warning")
+        """Lay the marked sessions over each other."""
+        marked = list(self.desk.marked)
+        if len(marked) < _FEWEST:
+            self.notify("mark two sessions or more first: Space", severity="warning")
             return
-        marked = list(self._marked)
 
         def draw(responses: list[FrequencyResponse]) -> None:
-            below, above = responses
-            traces = traces_of_response(below, f"#{marked[0]}") + traces_of_response(above)
+            traces = traces_of_sessions(dict(zip(marked, responses, strict=True)))
             self.add_class("-overlay")
             self.query_one(BodePlot).draw(traces)
             self.show()
 
         read = partial(responses_of, self.desk.db, marked)
         self.bench.beside.do("overlay", read, draw, "The sessions cannot be overlaid")
+
+    def on_bode_plot_cursor_moved(self) -> None:
+        """The reading follows the cursor."""
+        self.query_one("#text", Words).update("\n".join(self._lines()))
 
     def action_trend(self) -> None:
         """Back to the trend."""
@@ -325,14 +349,11 @@ stood there before stays in its audit trail, which A shows.
         table.move_cursor(row=min(cursor, max(0, len(self._rows) - 1)))
 
     def _cells(self, row: dict[str, Any], narrow: bool = False) -> list[str]:
-        marked, in_view = row["id"] in self._marked, row["id"] == self.desk.measurement
+        marked, in_view = self.desk.marked, row["id"] == self.desk.measurement
+        mark = LEVEL_MARKS[marked.index(row["id"])] if row["id"] in marked else ""
         if narrow:
-            return narrow_cells(row, marked, in_view, self._every_unit)
-        return wide_cells(row, marked, in_view)
-
-    def _under_cursor(self) -> int | None:
-        row = self._row_under_cursor()
-        return None if row is None else int(row["id"])
+            return narrow_cells(row, mark, in_view, self._every_unit)
+        return wide_cells(row, mark, in_view)
 
     def _row_under_cursor(self) -> dict[str, Any] | None:
         table = self.query_one("#sessions", Table)
@@ -347,6 +368,8 @@ stood there before stays in its audit trail, which A shows.
     def _lines(self) -> list[str]:
         results, lines = self.desk.results, []
         # What was just asked for comes first; small screens show the first lines only.
+        if self.has_class("-overlay") and (reading := self.query_one(BodePlot).reading):
+            lines.append(f"cursor: {reading}")
         if results.report is not None:
             lines.append(f"REPORT: {results.report.name} in {results.report.parent}")
         if "report" in results.faults:

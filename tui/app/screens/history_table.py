@@ -21,8 +21,8 @@ _SHORT = 8
 """Characters of a serial number on a narrow screen; the words below have all of it."""
 
 
-def wide_cells(row: dict[str, Any], marked: bool, in_view: bool) -> list[str]:
-    """A session as the wide table shows it."""
+def wide_cells(row: dict[str, Any], mark: str, in_view: bool) -> list[str]:
+    """A session as the wide table shows it; `mark` is that of its curves, empty for none."""
 
     def shown(name: str, digits: int) -> str:
         number = row[name]
@@ -32,7 +32,7 @@ def wide_cells(row: dict[str, Any], marked: bool, in_view: bool) -> list[str]:
 
     said = row["estimate"] is not None or row["diagnosis"] is not None
     return [
-        "*" * marked + ">" * in_view,
+        mark + ">" * in_view,
         str(row["id"]),
         row["started"][5:16].replace("T", " "),
         f"{row['unit']} {row['serial']}".strip() + (" SIM." if row["simulated"] else ""),
@@ -44,13 +44,13 @@ def wide_cells(row: dict[str, Any], marked: bool, in_view: bool) -> list[str]:
     ]
 
 
-def narrow_cells(row: dict[str, Any], marked: bool, in_view: bool, every_unit: bool) -> list[str]:
+def narrow_cells(row: dict[str, Any], mark: str, in_view: bool, every_unit: bool) -> list[str]:
     """The same on 80 columns: nothing that was measured is cut."""
-    mark, number, started, unit, state, points, *answer = wide_cells(row, marked, in_view)
+    signs, number, started, unit, state, points, *answer = wide_cells(row, mark, in_view)
     whole = f"{row['points']}" if row["state"] == "complete" else points
     name = row["serial"] if row["serial"] and not every_unit else unit
     simulated = "S" if row["simulated"] else ""
-    return [f"{mark}{simulated}{number}", started, _short(name), whole, *answer]
+    return [f"{signs}{simulated}{number}", started, _short(name), whole, *answer]
 
 
 def _short(text: str) -> str:

@@ -112,6 +112,8 @@ class Desk:
     reference: FrequencyResponse | None = None
     """Response of an earlier session, drawn behind the one in hand."""
     reference_name: str = ""
+    marked: tuple[int, ...] = ()
+    """Measurements that are laid over each other, in the order of their marks."""
 
     @property
     def remarks_of(self) -> int | None:
