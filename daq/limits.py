@@ -107,6 +107,8 @@ class Bench(Section):
     drive: BenchDrive
     instrument: BenchInstrument = BenchInstrument()
     report: BenchReport = BenchReport()
+    judge: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
+    """Limits that the screen judges by: a file, relative to the bench file, or a unit's name."""
 
     def bounds(self) -> Limits:
         """What this bench allows."""

@@ -69,6 +69,8 @@ class BenchApp(TerminalApp):
         Where the log goes, for messages that point to it.
     bench
         Name or path of the bench file.
+    judge
+        Name or path of the limits to judge by; empty for those of bench or unit.
     """
 
     TITLE = "lashbench"
@@ -92,9 +94,10 @@ class BenchApp(TerminalApp):
         find: Callable[[bench_owner.Post], None] = bench_owner.find_instruments,
         log: Path | None = None,
         bench: str = "default",
+        judge: str = "",
     ) -> None:
         super().__init__()
-        self.desk = Desk(db, bench=bench)
+        self.desk = Desk(db, bench=bench, judge_by=judge)
         self.undo = Undo(self.desk)
         self.keeper = SessionKeeper(self)
         self.analyses = AnalysisKeeper(self, analyses or Analyses())

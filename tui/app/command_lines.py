@@ -30,7 +30,8 @@ def commands_of(step: int, desk: Desk) -> list[str]:
     """
     lines = [] if desk.unit_text is None else [_NO_FILE]
     if step == 1:
-        return [*lines, _line("history", "--db", str(desk.db), "--unit", _unit_name(desk))]
+        place = ["--db", str(desk.db), "--unit", _unit_name(desk)]
+        return [*lines, _line("history", *place, *_judged(desk))]
     if step == 2:
         return ["# instruments of this machine:", _line("doctor")]
     if step in (3, 4):
@@ -41,7 +42,7 @@ def commands_of(step: int, desk: Desk) -> list[str]:
         if step == 3:
             return [*lines, f"{measured} --dry-run", "# the checks come first in:", measured]
         return [*lines, measured]
-    place = ["--db", str(desk.db)]
+    place, judged = ["--db", str(desk.db)], _judged(desk)
     if step == 7:
         lines += _overlay(desk)
     if desk.measurement is None:
@@ -51,14 +52,24 @@ def commands_of(step: int, desk: Desk) -> list[str]:
     export = _line("export", number, "--db", str(desk.db), "--out", file)
     as_is = ["--as-is"] if desk.results.as_is else []
     if step == 5:
-        return [*lines, export, _line("extract", file), _line("estimate", file, *unit, *as_is)]
+        estimate = _line("estimate", file, *unit, *as_is, *judged)
+        return [*lines, export, _line("extract", file), estimate]
     if step == 6:
-        return [*lines, export, _line("diagnose", file, *unit, *as_is)]
+        return [*lines, export, _line("diagnose", file, *unit, *as_is, *judged)]
     return [
         *lines,
         _line("report", number, *place, *unit, "--out", f"report-{number}.html"),
-        _line("history", *place, "--unit", _unit_name(desk)),
+        _line("history", *place, "--unit", _unit_name(desk), *judged),
     ]
+
+
+def _judged(desk: Desk) -> list[str]:
+    """The limits in force, as an option; none where no file can be named."""
+    try:
+        found = desk.limits_choice.read()
+    except LashbenchError:
+        return []
+    return ["--judge", found.named] if found is not None and found.named else []
 
 
 def _overlay(desk: Desk) -> list[str]:
@@ -80,6 +91,7 @@ def _unit_name(desk: Desk) -> str:
 def _measure(desk: Desk) -> str:
     words = ["measure", "--unit", desk.unit_name, "--instrument", desk.url, "--db", str(desk.db)]
     words += [] if desk.bench == "default" else ["--bench", desk.bench]
+    words += _judged(desk)
     if desk.resume is not None:
         return _line(*words, "--resume", str(desk.resume))
     plan, spacing = desk.plan(), desk.options.spacing

@@ -31,7 +31,7 @@ __all__ = [
     "WorkDone",
 ]
 
-Job = Literal["result", "band", "diagnosis", "stored diagnosis", "report"]
+Job = Literal["result", "band", "diagnosis", "stored diagnosis", "report", "judgement"]
 """What an analysis works on."""
 
 

@@ -20,8 +20,10 @@ from textual.style import Style
 from textual.widgets import Footer
 
 from daq.analyser import SourceState
+from daq.errors import LashbenchError
 from tui.app.command_lines import commands_of
 from tui.app.dialogs.dialogs import CommandDialog
+from tui.app.dialogs.limits import LimitsDialog
 from tui.app.widgets.plain import Caption, Field, Words
 
 if TYPE_CHECKING:
@@ -59,7 +61,15 @@ class StepScreen(Screen[None]):
             "Undo",
             id="step.undo",
             show=False,
-            tooltip="Undo the last entry: unit, remarks, bench, address, plan",
+            tooltip="Undo the last entry: unit, remarks, bench, limits, address, plan",
+        ),
+        Binding(
+            "j",
+            "judge",
+            "Judge by",
+            id="step.judge",
+            show=False,
+            tooltip="Choose the limits that decide PASS, FAIL or UNDECIDED",
         ),
         Binding(
             "f2",
@@ -183,6 +193,29 @@ class StepScreen(Screen[None]):
         self.notify(f"undone: {', '.join(undone)}")
         self.arrive()
         self.show()
+
+    def action_judge(self) -> None:
+        """Choose the limits to judge by; a wrong file keeps the dialog open."""
+
+        def read(dialog: LimitsDialog, named: str) -> None:
+            choice = replace(self.desk.limits_choice, asked=named)
+
+            def refuse(error: LashbenchError) -> None:
+                dialog.refuse(str(error))
+
+            def accept(_found: object) -> None:
+                dialog.accept(named)
+
+            self.bench.beside.do("limits", choice.read, accept, "Not judged by it", refuse)
+
+        def take(named: str | None) -> None:
+            if named is not None:
+                self.desk.judge_by = named
+                self.bench.analyses.judge()
+                self.arrive()
+                self.show()
+
+        self.app.push_screen(LimitsDialog(self.desk.judge_by, read), take)
 
     def action_command(self) -> None:
         """Show the commands of a shell that do what this step does."""

@@ -8,14 +8,21 @@ from __future__ import annotations
 import sys
 
 from daq.errors import InputError
-from tui.options import HistoryOption
+from tui.judging import limits_to_judge_by
+from tui.options import HistoryOption, JudgeBy
 from tui.places import history_path, look_at_caches
 from tui.text.output import Injected
 
 __all__ = ["bench", "is_terminal", "require_terminal"]
 
 
-def bench(*, db: HistoryOption = None, bench: str = "default", console: Injected) -> int:
+def bench(
+    *,
+    db: HistoryOption = None,
+    bench: str = "default",
+    judge: JudgeBy = None,
+    console: Injected,
+) -> int:
     """Open the bench screen: from a unit to a report, guided, by keyboard or mouse.
 
     Parameters
@@ -28,6 +35,7 @@ def bench(*, db: HistoryOption = None, bench: str = "default", console: Injected
     from daq.limits import load_bench
 
     load_bench(bench)
+    limits_to_judge_by(judge)
     require_terminal("bench")
     from tui.app.application import BenchApp
     from tui.logs import logging_to_file
@@ -36,7 +44,7 @@ def bench(*, db: HistoryOption = None, bench: str = "default", console: Injected
         if log is None:
             console.note("the log file cannot be written; going on without")
         look_at_caches()
-        app = BenchApp(history_path(db, create=True), log=log, bench=bench)
+        app = BenchApp(history_path(db, create=True), log=log, bench=bench, judge=judge or "")
         code = app.run()
     return code if code is not None else app.return_code or 0
 

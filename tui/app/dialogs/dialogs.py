@@ -19,8 +19,9 @@ __all__ = ["KEYS", "CommandDialog", "Dialog", "ErrorDialog", "HelpDialog", "Ques
 
 KEYS = """Everywhere: Ctrl+X stops the source at once (a software stop, no emergency stop).
 Ctrl+N next step, Esc back, 1 to 7 go to a step, Ctrl+P all commands, Ctrl+Y copies what is
-shown, Z undoes the last entry (Ctrl+Z in a field), F2 shows the lashbench commands that do the
-same, Ctrl+Q quits. Tab moves between fields, Enter chooses."""
+shown, Z undoes the last entry (Ctrl+Z in a field), J chooses the limits that are judged by, F2
+shows the lashbench commands that do the same, Ctrl+Q quits. Tab moves between fields, Enter
+chooses."""
 """The keys that hold on every screen, for its help."""
 
 

@@ -21,6 +21,7 @@ from daq.errors import LashbenchError
 from daq.untrusted.visible_text import visible
 from tui.app.diagnosis_words import diagnosis_lines
 from tui.app.dialogs.dialogs import HelpDialog
+from tui.app.judged_words import headline, item_lines, progress_lines
 from tui.app.plot.chart import Chart
 from tui.app.plot.predictions import ratio_drawing, residual_drawing
 from tui.app.screens.result_screen import answer_lines
@@ -55,6 +56,8 @@ ratio before and after.
 N starts the measurement that would tell rivals apart: checks first, as always, then the
 sweep itself. D then diagnoses both measurements together. A response that looks like a mistake
 is not diagnosed; A takes it as it stands.
+
+J chooses limits: each is decided by the model that is accepted, causes that are not tolerated, too.
 
 H tells what a simulated bench hid, where the measurement is of one that hides something.
 """
@@ -99,6 +102,10 @@ H tells what a simulated bench hid, where the measurement is of one that hides s
         """The words have the focus, to be scrolled."""
         super().on_mount()
         self.query_one("#scroll").focus()
+
+    def arrive(self) -> None:
+        """Judge: limits may be others by now."""
+        self.bench.analyses.judge()
 
     def on_resize(self) -> None:
         """Plots are drawn for a size."""
@@ -216,6 +223,13 @@ H tells what a simulated bench hid, where the measurement is of one that hides s
         number = desk.measurement
         self.bench.beside.do("reveal", work, tell, "It cannot be told")
 
+    def _judged(self) -> list[str]:
+        """What is judged without a diagnosis."""
+        results = self.desk.results
+        said = progress_lines(results, self.bench.analyses.progress.get("judgement"))
+        said += [*headline(results.judgement), *item_lines(results.judgement)]
+        return ["", *said] if said else []
+
     def _next_plan(self) -> Mapping[str, Any] | None:
         diagnosis = self.desk.results.diagnosis
         if diagnosis is None:
@@ -230,16 +244,20 @@ H tells what a simulated bench hid, where the measurement is of one that hides s
             return _plain(f"{head}: the diagnosis runs beside the screen")
         if "diagnosis" in results.faults:
             return _plain(
-                f"{head}: NO DIAGNOSIS", results.faults["diagnosis"], "", "D: try once more"
-            )
+                f"{head}: NO DIAGNOSIS", results.faults["diagnosis"], "", "D: try once more",
+                *self._judged(),
+            )  # fmt: skip
         if results.diagnosis is None:
             return _plain(f"{head}: not diagnosed yet", "", "D compares it with the model: which"
-                          " physical cause explains what the model misses?")  # fmt: skip
+                          " physical cause explains what the model misses?",
+                          *self._judged())  # fmt: skip
         document = results.diagnosis.to_json()
         origin = getattr(results.diagnosis, "origin", "")
         lines = _plain(f"{head}, {origin}; D makes it anew" if origin else head)
         unit = desk.unit
-        answer = [] if unit is None else answer_lines(None, document, unit, results.doubt)
+        answer = progress_lines(results, self.bench.analyses.progress.get("judgement"))
+        if unit is not None:
+            answer += answer_lines(None, document, unit, results.doubt, results.judgement)
         chart = self.query_one("#ratios", Chart)
         width = max(40, self.query_one("#scroll").size.width - 4)
         lines += diagnosis_lines(document, chart.palette, width, answer)

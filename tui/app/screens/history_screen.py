@@ -16,36 +16,31 @@ from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
 
 from tui.app.dialogs.correction import CorrectionDialog
+from tui.app.judged_words import headline, item_lines
 from tui.app.plot.bode import BodePlot
 from tui.app.plot.chart import Chart
 from tui.app.plot.curves import trend_drawing
-from tui.app.plot.traces import LEVEL_MARKS, traces_of_sessions
 from tui.app.screens.history_table import NARROW, ROOM, WIDE, narrow_cells, wide_cells
+from tui.app.screens.session_overlay import SessionOverlay
+from tui.app.state.listing import Listed, Listing
 from tui.app.state.sessions import (
     audit_trail,
     correct_session,
-    responses_of,
+    judge_sessions,
     rows_of_history,
 )
-from tui.app.step_screen import StepScreen
 from tui.app.widgets.plain import Caption, Field, Table, Words
 from tui.measurements.history_rows import answer_words
 
 if TYPE_CHECKING:
-    from daq.frf import FrequencyResponse
+    from analysis.acceptance import Judgement
 
 __all__ = ["HistoryScreen"]
 
-_FEWEST = 2
-"""Sessions of an overlay."""
-
-_ORDERS = ("newest first", "r", "b1", "b2", "serial number")
-_SORTED_BY = ("id", "contribution_ratio", "b1_deg", "b2_deg", "serial")
-"""In the order of the key."""
 _TREND_WORDS = "contribution ratio of stage 1 by session, oldest first, one standard error"
 
 
-class HistoryScreen(StepScreen):
+class HistoryScreen(SessionOverlay):
     """Report, trend, overlay."""
 
     STEP = 7
@@ -60,7 +55,9 @@ contribution ratio of every session of which a model is accepted, with its error
 stands what was diagnosed of the session under the cursor, and every warning. U lists all units.
 / searches: type words that unit, serial number, operator, notes, state, day or number have;
 Enter lists what has all of them, an empty line lists all. S sorts: newest first, by r, b1, b2 or
-serial number. C corrects serial number, operator or notes of the session under the cursor; what
+serial number. J chooses limits: each session is judged by them, and below the table stands why.
+
+C corrects serial number, operator or notes of the session under the cursor; what
 stood there before stays in its audit trail, which A shows.
 """
     BINDINGS = [
@@ -94,10 +91,9 @@ stood there before stays in its audit trail, which A shows.
 
     def __init__(self) -> None:
         super().__init__()
-        self._rows: list[dict[str, Any]] = []
+        self._listing = Listing()
         self._every_unit = self._audit = False
-        self._search, self._order = "", 0
-        self._trends: list[str] = []
+        self._search = ""
         self._trails: dict[int, list[str]] = {}
         self._columns: Mapping[str, int] = {}
 
@@ -129,7 +125,7 @@ stood there before stays in its audit trail, which A shows.
         if self._columns != self._headings():
             self.query_one("#sessions", Table).clear(columns=True)
             self._add_columns()
-            self._fill()
+            self.fill()
         self.show()
 
     def _headings(self) -> Mapping[str, int]:
@@ -148,14 +144,31 @@ stood there before stays in its audit trail, which A shows.
         """Sessions as they are now; those of before stay until they are read."""
         desk = self.desk
         unit = None if desk.unit is None or self._every_unit else desk.unit.name
-        read = partial(rows_of_history, desk.db, unit, self._search)
+        read = partial(rows_of_history, desk.db, unit, self._search, desk.limits_choice)
         self.bench.beside.do("history", read, self._take, "The history cannot be read")
 
-    def _take(self, found: tuple[list[dict[str, Any]], list[str]]) -> None:
-        self._rows, self._trends = found
+    def _take(self, found: Listed) -> None:
+        self._listing.found = found
         self._trails.clear()
-        self._fill()
+        self.fill()
         self.show()
+        self._judge()
+
+    def _judge(self) -> None:
+        """Judge what is listed, some sessions at a time, beside the screen."""
+        found, waiting = self._listing.found, self._listing.waiting()
+        if found.limits is None or not waiting:
+            return
+
+        def take(judged: dict[int, Judgement]) -> None:
+            if self._listing.found is found:
+                self._listing.take(judged)
+                self.fill()
+                self.show()
+                self._judge()
+
+        work = partial(judge_sessions, self.desk.db, waiting, found.limits.limits)
+        self.bench.beside.do("judging", work, take, "The sessions cannot be judged")
 
     def show_body(self) -> None:
         """Trend and words."""
@@ -167,18 +180,12 @@ stood there before stays in its audit trail, which A shows.
         if "report" in self.bench.analyses.progress:
             return "Writing the report"
         if self.desk.measurement is None:
-            return f"Enter: open a session.  {self._overlay_words()}"
-        return f"W: write the report of #{self.desk.measurement}.  {self._overlay_words()}"
-
-    def _overlay_words(self) -> str:
-        count = len(self.desk.marked)
-        if count < _FEWEST:
-            return "Space marks two or more, O: overlay"
-        return f"{count} marked, O: overlay; T: trend"
+            return f"Enter: open a session.  {self.overlay_words()}"
+        return f"W: write the report of #{self.desk.measurement}.  {self.overlay_words()}"
 
     def copy_text(self) -> str:
         """The table and the trends."""
-        rows = ["\t".join(cells) for cells in map(self._cells, self._rows)]
+        rows = ["\t".join(cells) for cells in map(self._cells, self._listing.found.rows)]
         return "\n".join([*rows, *self._lines()])
 
     # ------------------------------------------------------------ keys
@@ -198,53 +205,9 @@ stood there before stays in its audit trail, which A shows.
         self.bench.analyses.begin("report", path)
         self.show()
 
-    def action_mark(self) -> None:
-        """Mark or unmark the session under the cursor; as many as there are marks."""
-        row, desk = self._row_under_cursor(), self.desk
-        if row is None:
-            return
-        number = int(row["id"])
-        if number in desk.marked:
-            desk.marked = tuple(one for one in desk.marked if one != number)
-        elif len(desk.marked) == len(LEVEL_MARKS):
-            self.notify(
-                f"{len(LEVEL_MARKS)} sessions can be told apart; Space on one unmarks it",
-                severity="warning",
-            )
-            return
-        else:
-            desk.marked = (*desk.marked, number)
-        self._fill()
-        if self.has_class("-overlay") and len(desk.marked) >= _FEWEST:
-            # The plot shows the marks that stand in the table.
-            self.action_overlay()
-        else:
-            self.action_trend()
-
-    def action_overlay(self) -> None:
-        """Lay the marked sessions over each other."""
-        marked = list(self.desk.marked)
-        if len(marked) < _FEWEST:
-            self.notify("mark two sessions or more first: Space", severity="warning")
-            return
-
-        def draw(responses: list[FrequencyResponse]) -> None:
-            traces = traces_of_sessions(dict(zip(marked, responses, strict=True)))
-            self.add_class("-overlay")
-            self.query_one(BodePlot).draw(traces)
-            self.show()
-
-        read = partial(responses_of, self.desk.db, marked)
-        self.bench.beside.do("overlay", read, draw, "The sessions cannot be overlaid")
-
     def on_bode_plot_cursor_moved(self) -> None:
         """The reading follows the cursor."""
         self.query_one("#text", Words).update("\n".join(self._lines()))
-
-    def action_trend(self) -> None:
-        """Back to the trend."""
-        self.remove_class("-overlay")
-        self.show()
 
     def action_search(self) -> None:
         """Type what to search for."""
@@ -261,24 +224,9 @@ stood there before stays in its audit trail, which A shows.
 
     def action_sort(self) -> None:
         """Another order."""
-        self._order = (self._order + 1) % len(_ORDERS)
-        self._fill()
+        self._listing.turn()
+        self.fill()
         self.show()
-
-    def _listed(self) -> list[dict[str, Any]]:
-        """The rows in the order in which they stand; what has no value comes last."""
-        key = _SORTED_BY[self._order]
-        newest = self._rows[::-1]
-
-        def value(row: dict[str, Any]) -> float | str | None:
-            found = row[key]
-            return found["value"] if isinstance(found, dict) else found
-
-        if not self._order:
-            return newest
-        known = [row for row in newest if value(row) not in (None, "")]
-        lacking = [row for row in newest if value(row) in (None, "")]
-        return [*sorted(known, key=value), *lacking]  # type: ignore[arg-type]
 
     def action_units(self) -> None:
         """Sessions of this unit, or all."""
@@ -287,7 +235,7 @@ stood there before stays in its audit trail, which A shows.
 
     def action_correct(self) -> None:
         """Ask what is wrong of the session under the cursor."""
-        row = self._row_under_cursor()
+        row = self.row_under_cursor()
         if row is None:
             return
         dialog = CorrectionDialog(row["id"], row, self.desk.operator)
@@ -338,32 +286,35 @@ stood there before stays in its audit trail, which A shows.
             self.bench.beside.do(f"audit trail {number}", read, take, "It cannot be read")
         return self._trails[number]
 
-    def _fill(self) -> None:
+    def fill(self) -> None:
+        """Write the table anew."""
         table = self.query_one("#sessions", Table)
         cursor = table.cursor_row
         table.clear()
         narrow = self._columns == NARROW
-        for row in self._listed():
+        for row in self._listing.ordered():
             cells = self._cells(row, narrow)
             table.add_row(*cells, key=str(row["id"]))
-        table.move_cursor(row=min(cursor, max(0, len(self._rows) - 1)))
+        table.move_cursor(row=min(cursor, max(0, table.row_count - 1)))
 
     def _cells(self, row: dict[str, Any], narrow: bool = False) -> list[str]:
-        marked, in_view = self.desk.marked, row["id"] == self.desk.measurement
-        mark = LEVEL_MARKS[marked.index(row["id"])] if row["id"] in marked else ""
+        mark, in_view = self.mark_of(row["id"]), row["id"] == self.desk.measurement
+        judgement = self._listing.judgement(row["id"])
+        verdict = "" if judgement is None else judgement.verdict
         if narrow:
-            return narrow_cells(row, mark, in_view, self._every_unit)
-        return wide_cells(row, mark, in_view)
+            return narrow_cells(row, mark, in_view, verdict, self._every_unit)
+        return wide_cells(row, mark, in_view, verdict)
 
-    def _row_under_cursor(self) -> dict[str, Any] | None:
+    def row_under_cursor(self) -> dict[str, Any] | None:
+        """The session that keys are about."""
         table = self.query_one("#sessions", Table)
-        listed = self._listed()
+        listed = self._listing.ordered()
         return listed[table.cursor_row] if 0 <= table.cursor_row < len(listed) else None
 
     def _draw_trend(self) -> None:
         chart = self.query_one("#trend", Chart)
-        ratios = [row["contribution_ratio"] for row in self._rows if row["contribution_ratio"]]
-        chart.show(trend_drawing(chart, ratios))
+        ratios = [row["contribution_ratio"] for row in self._listing.found.rows]
+        chart.show(trend_drawing(chart, list(filter(None, ratios))))
 
     def _lines(self) -> list[str]:
         results, lines = self.desk.results, []
@@ -374,26 +325,41 @@ stood there before stays in its audit trail, which A shows.
             lines.append(f"REPORT: {results.report.name} in {results.report.parent}")
         if "report" in results.faults:
             lines.append(f"NO REPORT: {results.faults['report']}")
-        row = self._row_under_cursor()
+        row = self.row_under_cursor()
         if row is not None and self._audit:
             return [*lines, *self._trail(row)]
         if row is not None:
-            if self._columns == NARROW:
-                of = f"{row['unit']} {row['serial']}".strip()
-                state = row["state"] + (", SIMULATED" if row["simulated"] else "")
-                lines.append(f"#{row['id']}: {of}, {state}")
-            lines += [f"#{row['id']}: {words}" for words in answer_words(row)]
-        if self._order:
-            lines.append(f"sorted by {_ORDERS[self._order]}")
-        if self._search and not self._rows:
+            lines += self._row_lines(row)
+        return [*lines, *self._list_lines()]
+
+    def _row_lines(self, row: dict[str, Any]) -> list[str]:
+        """What was said of a session: verdict and why, diagnosis, warnings."""
+        told = []
+        if self._columns == NARROW:
+            state = f"{row['state']}, {row['points']} points"
+            state += ", SIMULATED" if row["simulated"] else ""
+            told.append(f"{row['unit']} {row['serial']}".strip() + f", {state}")
+        judgement = self._listing.judgement(row["id"])
+        told += headline(judgement)
+        told += [line for line in item_lines(judgement) if not line.startswith("PASS")]
+        return [f"#{row['id']}: {words}" for words in [*told, *answer_words(row)]]
+
+    def _list_lines(self) -> list[str]:
+        """What is listed, and how."""
+        found, lines = self._listing.found, []
+        if found.fault:
+            lines.append(f"NOT JUDGED: {found.fault}")
+        if self._listing.order:
+            lines.append(f"sorted by {self._listing.order}")
+        if self._search and not found.rows:
             return [*lines, f"no session has {self._search!r}; / and an empty line list all"]
         if self._search:
-            lines.append(f"searched for {self._search!r}, found: {len(self._rows)}")
+            lines.append(f"searched for {self._search!r}, found: {len(found.rows)}")
         if not self.has_class("-overlay"):
             lines.append(_TREND_WORDS)
-        lines += self._trends
-        if self.bench.beside.is_under_way("history") and not self._rows:
+        lines += found.trends
+        if self.bench.beside.is_under_way("history") and not found.rows:
             lines.append(f"reading {self.desk.db}")
-        elif not any(row["answer"]["state"] != "none" for row in self._rows):
+        elif not any(row["answer"]["state"] != "none" for row in found.rows):
             lines.append("no session is estimated yet: open one with Enter")
         return lines

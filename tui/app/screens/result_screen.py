@@ -14,6 +14,7 @@ from textual.binding import Binding
 from textual.containers import Vertical, VerticalScroll
 
 from analysis.execution.pace import Pace, duration
+from tui.app.judged_words import STAGES, headline, item_lines, progress_lines
 from tui.app.plot.bode import BodePlot
 from tui.app.plot.chart import Chart
 from tui.app.plot.curves import index_drawing
@@ -23,6 +24,7 @@ from tui.app.screens.earlier_sweep import EarlierSweep
 from tui.app.widgets.plain import Words
 
 if TYPE_CHECKING:
+    from analysis.acceptance import Judgement
     from analysis.resonance.records import LevelFeatures
     from sim.unit import Unit
 
@@ -54,6 +56,10 @@ ratio of the estimate (any ratio, before it), and the band holds the middle 68 %
 some seconds beside the screen; M again ends it. After a diagnosis there are also the model with
 the cause that was named and the one without, in the band of one standard deviation. Each level is
 predicted from the others then.
+
+J chooses limits. Each of them is then decided, PASS, FAIL or UNDECIDED, with its reason: limits of
+r, b1, b2 and b_t by the estimate or the diagnosis, those of ARF, RF and damping at once, and
+causes that are not tolerated by the diagnosis.
 
 L puts the latest complete session of this unit behind the points.
 V changes between the Bode plot and the error index, the paper's measure over the ratio: the
@@ -115,8 +121,9 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
         self.call_after_refresh(self.show)
 
     def arrive(self) -> None:
-        """Begin what is not there yet."""
+        """Begin what is not there yet, and judge: limits may be others by now."""
         results = self.desk.results
+        self.bench.analyses.judge()
         if results.estimate is None and "result" not in results.faults:
             self.bench.analyses.begin("result")
 
@@ -235,9 +242,12 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
         desk, results = self.desk, self.desk.results
         lines = self._band_lines()
         below: list[str] = []
+        lines += progress_lines(results, self.bench.analyses.progress.get("judgement"))
         if results.estimate is not None and desk.unit is not None:
             diagnosis = None if results.diagnosis is None else results.diagnosis.to_json()
-            lines += answer_lines(results.estimate, diagnosis, desk.unit, results.doubt)
+            lines += answer_lines(
+                results.estimate, diagnosis, desk.unit, results.doubt, results.judgement
+            )
             if diagnosis is None:
                 below += [f"warning: {text}" for text in results.estimate.get("warnings", ())]
             below += believed_lines(results.estimate)
@@ -248,6 +258,8 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
             lines.append(f"estimating {100 * fraction:3.0f} %{left}  {text}")
         elif "result" in results.faults:
             lines.append(f"NO ESTIMATE: {results.faults['result']}")
+        if results.estimate is None:
+            lines += [*headline(results.judgement), *item_lines(results.judgement)]
         head = f"measurement {desk.measurement}" + (", SIMULATED" if desk.simulated else "")
         if results.features:
             wide = not self.has_class("-narrow") and not self.has_class("-side")
@@ -278,18 +290,20 @@ def answer_lines(
     diagnosis: Mapping[str, Any] | None,
     unit: Unit,
     doubt: str = "",
+    judgement: Judgement | None = None,
 ) -> list[str]:
-    """Advice, whose numbers they are, the contribution ratio, and each stage beside its limit."""
+    """The verdict, advice, whose numbers they are, the contribution ratio, and each limit."""
     from analysis.advice import advise
     from analysis.answer import accept_model
 
     answer = accept_model(estimate, diagnosis)
-    advice = advise(answer, unit, doubt=doubt)
+    advice = advise(answer, unit, judgement=judgement, doubt=doubt)
     ratio = answer.contribution_ratio
     told = [] if ratio is None else [f"{ratio_words(ratio)}; {answer.source}"]
     stages = [stage.line for stage in advice.stages] if answer.models else []
     before = [advice.before] if advice.before else []
-    return [*before, advice.headline, *told, *stages]
+    limits = item_lines(judgement, STAGES if stages else ())
+    return [*headline(judgement), *before, advice.headline, *told, *stages, *limits]
 
 
 def ratio_words(ratio: Mapping[str, Any]) -> str:

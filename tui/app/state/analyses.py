@@ -40,6 +40,15 @@ def _estimate(response: FrequencyResponse, unit: Unit, progress: Progress) -> Ma
     return estimate_response(response, unit, cache=cache_folder(), progress=progress).to_json()
 
 
+def _total(response: FrequencyResponse, unit: Unit, progress: Progress) -> Mapping[str, Any]:
+    from analysis.estimate import estimate_response
+    from tui.places import cache_folder
+
+    return estimate_response(
+        response, unit, unit.stages > 1, cache=cache_folder(), progress=progress
+    ).to_json()
+
+
 def _diagnose(responses: Sequence[FrequencyResponse], unit: Unit, progress: Progress) -> Any:
     from analysis.diagnosis import diagnose_response
     from tui.places import cache_folder
@@ -82,6 +91,8 @@ class Analyses:
     band
         Gives what units of the datasheet read in the sweep of a response, by what its estimate
         knows, which may be None.
+    total
+        As `estimate`, with the total backlash unknown.
     report
         Writes a file about a task's measurement, with its diagnosis or None.
     """
@@ -90,6 +101,7 @@ class Analyses:
     diagnose: Callable[[Sequence[FrequencyResponse], Unit, Progress], Any] = _diagnose
     report: Callable[[Task, Any, Path], None] = _report
     band: Callable[[FrequencyResponse, Unit, Any, Progress], DatasheetBand] = _band
+    total: Callable[[FrequencyResponse, Unit, Progress], Mapping[str, Any]] = _total
 
 
 class _GivenUp(Exception):

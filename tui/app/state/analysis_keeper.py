@@ -16,6 +16,7 @@ from daq.errors import LashbenchError
 from tui.app.state.analyses import Analyses, Task, diagnose, draw_band, read_result, write_report
 from tui.app.state.desk import Results
 from tui.app.state.host import Host
+from tui.app.state.judgement import Asked, Judged, judge_result
 
 if TYPE_CHECKING:
     from tui.app import messages
@@ -38,6 +39,7 @@ class AnalysisKeeper:
         self._app = app
         self._analyses = analyses
         self._given_up: dict[str, threading.Event] = {}
+        self._judged: Judged | None = None
         self.progress: dict[str, tuple[float, str]] = {}
         """How far each is and what it does, by job; none that is over."""
 
@@ -53,6 +55,7 @@ class AnalysisKeeper:
             "result": partial(read_result, task, self._analyses),
             "diagnosis": partial(diagnose, task, self._analyses),
             "band": partial(draw_band, task, self._analyses, desk.results.estimate),
+            "judgement": partial(judge_result, task, self._analyses, Asked.of(desk)),
             "report": partial(
                 write_report, task, self._analyses,
                 desk.results.diagnosis, path or Path("report.html"),
@@ -67,6 +70,15 @@ class AnalysisKeeper:
         self.give_up()
         self.progress.clear()
         self._app.desk.measurement, self._app.desk.results = measurement, Results()
+
+    def judge(self) -> None:
+        """Judge by what is known so far; again where more is known, or other limits are chosen."""
+        results = self._app.desk.results
+        if results.response is None:
+            return
+        if self._judged is None or not self._judged.asked.holds(self._app.desk):
+            results.judgement = None
+        self.begin("judgement")
 
     def give_up(self) -> None:
         """End what runs, at its next word."""
@@ -93,23 +105,34 @@ class AnalysisKeeper:
         if message.job == "result" and isinstance(message.result, tuple):
             # The first part of two: features come before the estimate.
             desk.results.response, desk.results.features = message.result
+            self.judge()
             return
         if message.job == "stored diagnosis":
             # One that is made meanwhile, or was made, goes before it.
             if desk.results.diagnosis is None and "diagnosis" not in self.progress:
                 desk.results.diagnosis = message.result
+                self.judge()
             return
         self.progress.pop(message.job, None)
         if message.job == "result":
             desk.results.estimate = message.result
+            self.judge()
             if desk.results.band is not None:
                 self.begin("band")  # anew, by what the estimate knows
         elif message.job == "band":
             desk.results.band, by = message.result
             if by is not desk.results.estimate:
                 self.begin("band")
+        elif message.job == "judgement":
+            judged = message.result
+            self._judged, desk.results.total = judged, judged.total
+            if judged.asked.holds(desk):
+                desk.results.judgement = judged.judgement
+            else:
+                self.judge()
         elif message.job == "diagnosis":
             desk.results.diagnosis = message.result
+            self.judge()
             self._app.notify("diagnosis done: step 6")
         elif message.job == "report":
             desk.results.report = message.result

@@ -17,10 +17,12 @@ from daq.servers.place import HistoryPlace
 from daq.untrusted.visible_text import visible_line
 from tui.app.run_view import RunView
 from tui.app.state.proposed_sweep import propose
+from tui.judging import LimitsChoice
 from tui.measure_options import PlanOptions
 from tui.measurements.follow_up import following
 
 if TYPE_CHECKING:
+    from analysis.acceptance import Judgement
     from analysis.estimate.datasheet_band import DatasheetBand
     from analysis.resonance.records import LevelFeatures
     from daq.analyser import Identity
@@ -47,6 +49,10 @@ class Results:
     features: tuple[LevelFeatures, ...] = ()
     estimate: Mapping[str, Any] | None = None
     """The document of ``estimate --json``."""
+    total: Mapping[str, Any] | None = None
+    """The same with the total backlash unknown, where a limit is of it."""
+    judgement: Judgement | None = None
+    """By the limits in force and what is known so far."""
     band: DatasheetBand | None = None
     """What units of the datasheet read in this sweep."""
     diagnosis: Any = None
@@ -91,6 +97,8 @@ class Desk:
     notes: str = ""
     bench: str = "default"
     """Name or path of the bench file: limits, slew, input ranges."""
+    judge_by: str = ""
+    """Name or path of the limits to judge by; empty: those of the bench file, else the unit's."""
     recipe_asked: str | None = None
     """Name or path of the recipe, or `NO_RECIPE`; None: the unit's own, if there is one."""
     url: str = SIMULATED_URL
@@ -114,6 +122,12 @@ class Desk:
     reference_name: str = ""
     marked: tuple[int, ...] = ()
     """Measurements that are laid over each other, in the order of their marks."""
+
+    @property
+    def limits_choice(self) -> LimitsChoice:
+        """What the measurement in view is judged by."""
+        name = self.unit_name if self.unit_text is None else ""
+        return LimitsChoice(self.judge_by, self.bench, self.unit, name)
 
     @property
     def remarks_of(self) -> int | None:

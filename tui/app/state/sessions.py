@@ -6,18 +6,23 @@ nothing.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
+from daq.errors import LashbenchError
 from daq.servers.place import HistoryPlace, is_there
+from tui.app.state.listing import Listed
 
 if TYPE_CHECKING:
+    from analysis.acceptance import Judgement, LimitSet
     from daq.frf import FrequencyResponse
     from daq.store_records import HistoryLine, Measurement
+    from tui.judging import LimitsChoice
 
 __all__ = [
     "audit_trail",
     "correct_session",
+    "judge_sessions",
     "latest_complete",
     "one_session",
     "recent_sessions",
@@ -114,21 +119,43 @@ def correct_session(
 
 
 def rows_of_history(
-    db: HistoryPlace, unit: str | None, search: str
-) -> tuple[list[dict[str, Any]], list[str]]:
-    """The latest sessions with points as rows, of one unit or of all, and the trends in words.
+    db: HistoryPlace, unit: str | None, search: str, choice: LimitsChoice
+) -> Listed:
+    """The latest sessions with points, of one unit or of all, and the trends in words.
 
     Parameters
     ----------
     search
         Words that each has (`daq.store.listing.Choice`); empty for all.
+    choice
+        What they are judged by, and what alarms of a trend are about.
     """
     from daq.store import Store
     from tui.measurements.history_rows import Trends, measurement_row, trend_lines
 
     if not is_there(db):
-        return [], []
+        return Listed()
     with Store(db, read_only=True) as store:
         lines = store.lines(unit, last=_LISTED, with_points=True, search=search)
     rows = [measurement_row(line) for line in lines]
-    return rows, [line for line in trend_lines(Trends(rows).rows()) if line]
+    limits, fault = None, ""
+    try:
+        limits = choice.read()
+    except LashbenchError as error:
+        fault = str(error)
+    # A unit's own limits are not those of another.
+    is_for_all = limits is not None and (not limits.unit or limits.unit == unit)
+    trends = Trends(rows, limits.limits if limits is not None and is_for_all else None)
+    told = [line for line in trend_lines(trends.rows()) if line]
+    return Listed(lines, rows, told, limits, fault)
+
+
+def judge_sessions(
+    db: HistoryPlace, lines: Sequence[HistoryLine], limits: LimitSet
+) -> dict[int, Judgement]:
+    """Judge sessions by what the history holds, by number; raises as `daq.store.Store`."""
+    from daq.store import Store
+    from tui.measurements.judging import judge_line
+
+    with Store(db, read_only=True) as store:
+        return {line.id: judge_line(store, line, limits) for line in lines}

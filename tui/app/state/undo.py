@@ -1,7 +1,7 @@
 """Undoing the last entry: choices of the desk as they were before it.
 
-Owns which entries can be undone: unit, remarks, bench, address, recipe and plan. Nothing that was
-measured, stored or driven is ever taken back.
+Owns which entries can be undone: unit, remarks, bench, limits, address, recipe and plan. Nothing
+that was measured, stored or driven is ever taken back.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ _NAMES = {
     "operator": "operator",
     "notes": "notes",
     "bench": "bench file",
+    "judge_by": "limits to judge by",
     "recipe_asked": "recipe",
     "url": "address",
     "options": "plan",
@@ -44,6 +45,7 @@ class _Choices:
     operator: str
     notes: str
     bench: str
+    judge_by: str
     recipe_asked: str | None
     url: str
     options: Any
