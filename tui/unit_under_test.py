@@ -1,6 +1,7 @@
-"""The unit that ``--unit`` names, as every verb reads it.
+"""The unit that ``--unit`` names, as every verb reads it, and how far a bench lets it be driven.
 
-Owns that what is unusual in a unit file is told once, before the work. It judges nothing itself.
+Owns that what is unusual in a unit file is told once, before the work, and which time a plan for a
+unit may take. It judges nothing itself.
 """
 
 from __future__ import annotations
@@ -13,11 +14,16 @@ from daq.errors import InputError
 from tui.options import tolerance_shares
 
 if TYPE_CHECKING:
+    from daq.limits import Limits
     from sim.unit import Unit
     from tui.text.output import Console
 
-__all__ = ["read_unit", "unit_title"]
+__all__ = ["USUAL_MIN", "checked_minutes", "read_unit", "unit_title", "within_bench"]
 
+USUAL_MIN = 5.0
+"""Time at the bench, where none is given."""
+
+_LONGEST_MIN = 24.0 * 60.0
 _LONGEST_TITLE = 64
 
 
@@ -70,3 +76,27 @@ def read_unit(
     for text in find_impossible(unit) or find_unusual(unit):
         console.note(f"warning: unit {unit.name}: {text}")
     return unit
+
+
+def checked_minutes(minutes: float, named: str = "minutes") -> float:
+    """A time at the bench, minutes.
+
+    Raises
+    ------
+    InputError
+        If it is none, or longer than a day; it begins with what `named` calls it.
+    """
+    if not 0.0 < minutes <= _LONGEST_MIN:
+        raise InputError(f"{named} {minutes:g}: give more than 0 and at most {_LONGEST_MIN:g}")
+    return minutes
+
+
+def within_bench(unit: Unit, bench: Limits) -> Unit:
+    """A unit that may be driven as far as both it and a bench allow."""
+    own = unit.limits
+    allowed = {
+        "source_vpk": min(own.source_vpk, bench.source_vpk),
+        "start_hz": max(own.start_hz, bench.start_hz),
+        "stop_hz": min(own.stop_hz, bench.stop_hz),
+    }
+    return unit.model_copy(update={"limits": own.model_copy(update=allowed)})

@@ -196,6 +196,7 @@ class BenchApp(TerminalApp):
 
     def _leave(self) -> None:
         self.analyses.give_up()
+        self.analyses.search.stop()
         run, code, line = self.desk.run, INTERRUPTED if self._told_to_end else 0, None
         if run.source not in (None, SourceState.CONFIRMED_OFF):
             code, line = LashbenchError.exit_code, f"error: {run.source_text}"

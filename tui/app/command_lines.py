@@ -40,6 +40,7 @@ def commands_of(step: int, desk: Desk) -> list[str]:
         except LashbenchError as error:
             return [*lines, f"# {error}"]
         if step == 3:
+            lines += _best(desk)
             return [*lines, f"{measured} --dry-run", "# the checks come first in:", measured]
         return [*lines, measured]
     place, judged = ["--db", str(desk.db)], _judged(desk)
@@ -61,6 +62,14 @@ def commands_of(step: int, desk: Desk) -> list[str]:
         _line("report", number, *place, *unit, "--out", f"report-{number}.html"),
         _line("history", *place, "--unit", _unit_name(desk), *judged),
     ]
+
+
+def _best(desk: Desk) -> list[str]:
+    """How the sweep that tells most is found, where that was asked for."""
+    if desk.plan_minutes is None:
+        return []
+    bench = [] if desk.bench == "default" else ["--bench", desk.bench]
+    return [_line("plan", "--unit", desk.unit_name, "--minutes", f"{desk.plan_minutes:g}", *bench)]
 
 
 def _judged(desk: Desk) -> list[str]:

@@ -7,22 +7,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from daq.errors import InputError
 from tui.executors import executor_at
 from tui.options import Cluster, Json, Real, Tolerance, UnitName
 from tui.text.output import Injected
 from tui.text.shell_quote import pasted
-from tui.unit_under_test import read_unit
+from tui.unit_under_test import USUAL_MIN, checked_minutes, read_unit, within_bench
 
 __all__ = ["plan"]
-
-_LONGEST_MIN = 24.0 * 60.0
 
 
 def plan(
     *,
     unit: UnitName,
-    minutes: Real = 5.0,
+    minutes: Real = USUAL_MIN,
     out: Path | None = None,
     bench: str = "default",
     tolerance: Tolerance = None,
@@ -46,8 +43,7 @@ def plan(
     """
     from daq.formats.atomic import new_target, write_text
 
-    if not 0.0 < minutes <= _LONGEST_MIN:
-        raise InputError(f"--minutes {minutes:g}: give more than 0 and at most {_LONGEST_MIN:g}")
+    checked_minutes(minutes, "--minutes")
     if out is not None:
         new_target(out)
     from analysis.planning import plan_sweep
@@ -59,12 +55,7 @@ def plan(
     if place.source_vpk < own.source_vpk:
         console.note(f"{place.set_by} allows {place.source_vpk:g} V of the unit's "
                      f"{own.source_vpk:g} V; see --bench")  # fmt: skip
-    allowed = {
-        "source_vpk": min(own.source_vpk, place.source_vpk),
-        "start_hz": max(own.start_hz, place.start_hz),
-        "stop_hz": min(own.stop_hz, place.stop_hz),
-    }
-    subject = subject.model_copy(update={"limits": own.model_copy(update=allowed)})
+    subject = within_bench(subject, place)
     with executor_at(cluster, console.compute) as executor:
         found = plan_sweep(subject, minutes, executor=executor, progress=console.progress)
     if out is not None:

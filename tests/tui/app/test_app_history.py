@@ -159,7 +159,7 @@ def test_correction_is_stored_with_its_trail(db):
             await op.sees("say who corrects it")
             await op.types("#correct-person", "Ada")
             await op.press("enter")
-            await op.sees("ADSS SN 8, complete, SIMULATED")
+            await op.sees("ADSS SN 8, complete, 9 points, SIMULATED")
             await op.press("down", "a")
             await op.sees("#1: serial 'SN 7' corrected to 'SN 8' by Ada")
 
@@ -241,7 +241,7 @@ def test_palette_reaches_every_step_and_copies(db):
         async with operated(db) as op:
             await op.press("ctrl+p", *"report", "enter")
             await op.press("ctrl+p", *"go to history", "enter")
-            await op.sees("[7 Report]")
+            await op.sees("[7 Report]", "complete")
             await op.press("ctrl+y")
             await op.sees("copied")
             assert "ADSS SN 7 SIM." in op.app.clipboard

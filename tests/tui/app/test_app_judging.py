@@ -2,6 +2,7 @@
 
 import shlex
 import shutil
+import threading
 
 import pytest
 from outputs.screen import ESTIMATE, operated, quick_analyses, run
@@ -161,17 +162,20 @@ def test_limits_of_unit_judge_by_themselves(tmp_path):
 
 def test_total_backlash_is_estimated_for_its_limit(db, tmp_path):
     limits(tmp_path, "b_t_deg = { upper = 0.08 }\n")
-    asked = []
+    asked, going_on = [], threading.Event()
 
     def total(response, unit, progress):
         asked.append(unit.name)
         progress(0.5, "")
+        assert going_on.wait(20.0)
         return ESTIMATE | {"b_t_deg": {"value": 0.066, "std": 0.004}}
 
     async def way():
         analyses = quick_analyses(total=total)
         async with operated(db, analyses=analyses, judge="limits.toml") as op:
             await opens(op, 1)
+            await op.sees("UNDECIDED by limits outgoing", "estimating the total backlash, too, 50")
+            going_on.set()
             await op.sees("PASS by limits outgoing.")
             assert "PASS  b_t: 0.0660 \u00b1 0.0040 deg" in op.app.screen.copy_text()
             await op.press("6", "5")

@@ -34,10 +34,7 @@ class LimitsDialog(ModalScreen[str | None]):
         Called with each choice; closes the dialog by `accept`, or has it say why by `refuse`.
     """
 
-    BINDINGS = [
-        Binding("escape", "leave", "Leave it", priority=True),
-        Binding("enter", "take", "Judge by it", priority=True),
-    ]
+    BINDINGS = [Binding("escape", "leave", "Leave it", priority=True)]
 
     DEFAULT_CSS = """
     LimitsDialog { align: center middle; }
@@ -71,10 +68,11 @@ class LimitsDialog(ModalScreen[str | None]):
         """Close without a change."""
         self.dismiss(None)
 
-    def action_take(self) -> None:
+    def on_input_submitted(self, event: Field.Submitted) -> None:
         """Have it read; stay where it is wrong."""
+        event.stop()
         self.query_one("#fault", Words).update("")
-        self._read(self, self.query_one("#limits-file", Field).value.strip())
+        self._read(self, event.value.strip())
 
     def refuse(self, why: str) -> None:
         """Stay open, with what was typed, and say why."""

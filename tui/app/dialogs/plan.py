@@ -55,6 +55,8 @@ class PlanDialog(ModalScreen[PlanChoice | None]):
         What the operator said of it.
     recipe
         The recipe in force, or `NO_RECIPE`.
+    heading
+        What it is, where it is not the sweep that stands.
     judge
         Called with each choice; closes the dialog by `accept`, or has it say why by `refuse`.
     """
@@ -82,15 +84,17 @@ class PlanDialog(ModalScreen[PlanChoice | None]):
         options: PlanOptions,
         recipe: str,
         judge: Callable[[PlanDialog, PlanChoice], None],
+        heading: str = "The sweep",
     ) -> None:
         super().__init__()
+        self._heading = heading
         self._values = _texts(plan, options) | {"recipe": recipe}
         self._judge = judge
 
     def compose(self) -> ComposeResult:
         """A line per field."""
         with Vertical(id="dialog"):
-            yield Words("The sweep", classes="heading")
+            yield Words(self._heading, classes="heading")
             for name, label, unit in _FIELDS:
                 with Horizontal(classes="field"):
                     yield Caption(label)

@@ -14,7 +14,9 @@ from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical, VerticalScroll
 
+from analysis.execution.pace import Pace, duration
 from daq.errors import LashbenchError
+from tui.app.dialogs.best_plan import BestPlanDialog
 from tui.app.dialogs.dialogs import QuestionDialog
 from tui.app.dialogs.plan import PlanChoice, PlanDialog
 from tui.app.run_view import RunView
@@ -23,11 +25,17 @@ from tui.app.state.proposed_sweep import LEVELS
 from tui.app.step_screen import StepScreen
 from tui.app.widgets.plain import Words
 from tui.app.words import plan_words
+from tui.measure_options import PlanOptions
+from tui.unit_under_test import USUAL_MIN
 
 if TYPE_CHECKING:
     from daq.plan import SweepPlan
+    from tui.app.state.plan_search import PlanSearch
 
 __all__ = ["CheckScreen"]
+
+_LOOK_S = 0.5
+"""How often the progress of a search is drawn."""
 
 _MARKS = {"pass": "[ ok ]", "note": "[note]", "fail": "[FAIL]"}
 
@@ -42,10 +50,22 @@ a trial point, which drives the unit gently at the plan's lowest level for a few
 have passed the session holds with the source off, and the sweep is started in step 4.
 
 P changes the plan: levels, band, points, cycles. The checks are then run again.
+
+B finds the sweep that tells the contribution ratio best in so many minutes: units as the
+datasheet allows are simulated beside the screen, and B again gives that up. Below the plan stands
+what was found: where ARF and RF will be, levels, band, and the error that is expected of the
+ratio. P then opens the plan filled with it. It is refused where bench or unit forbid it.
 """
     BINDINGS = [
         Binding("c", "check", "Check", id="check.run", tooltip="Run the checks"),
         Binding("p", "plan", "Plan", id="check.plan", tooltip="Change the plan"),
+        Binding(
+            "b",
+            "best",
+            "Best plan",
+            id="check.best",
+            tooltip="Find the sweep that tells most in so many minutes, or give that up",
+        ),
     ]
     DEFAULT_CSS = """
     CheckScreen #halves { height: 1fr; }
@@ -61,6 +81,12 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
         self._planned: SweepPlan | LashbenchError | None = None
         self._planned_for: Desk | None = None
         self._is_fresh = False
+        self._pace = Pace()
+
+    def on_mount(self) -> None:
+        """How far a search is changes by itself."""
+        super().on_mount()
+        self.set_interval(_LOOK_S, self._show_search)
 
     def arrive(self) -> None:
         """The files that a plan is of may be others by now."""
@@ -72,7 +98,7 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
             with Vertical(id="planned", classes="pane"):
                 yield Words("Plan", classes="heading")
                 yield Words("", id="plan")
-                yield Words("")
+                yield Words("", id="best")
             with Vertical(id="checked", classes="pane"):
                 yield Words("Checks", classes="heading")
                 with VerticalScroll(id="lines"):
@@ -82,6 +108,7 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
         """The plan, and every check told so far."""
         self._work_out()
         self.query_one("#plan", Words).update(self._plan_text())
+        self._show_best()
         self.query_one("#checks", Words).update("\n".join(self._lines()))
         self.query_one("#lines", VerticalScroll).scroll_end(animate=False)
 
@@ -96,11 +123,15 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
             return "The sweep is under way.  Ctrl+N: watch it"
         if any(line.verdict == "fail" for line in run.checks) or run.fault is not None:
             return "Mend what failed, then C: check again.  P: change the plan"
-        return "C: run the checks (ends with a gentle trial point).  P: change the plan"
+        if self._search.is_running:
+            return "Finding the best plan beside the screen.  B: give it up"
+        if self._search.found(self.desk) is not None:
+            return "P: the plan, filled with what was found.  C: check the plan that stands"
+        return "C: run the checks, a gentle trial point last.  P: the plan.  B: the best one"
 
     def copy_text(self) -> str:
         """Plan and checks."""
-        return "\n".join([self._plan_text(), "", *self._lines()])
+        return "\n".join([self._plan_text(), *self._best_lines(), "", *self._lines()])
 
     def action_check(self) -> None:
         """Run the checks; on hardware only after a word, since the trial point drives."""
@@ -149,8 +180,67 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
             return
         plan = None if isinstance(self._planned, LashbenchError) else self._planned
         recipe = NO_RECIPE if desk.recipe is None else desk.recipe
-        dialog = PlanDialog(plan, desk.options, recipe, self._judge_plan)
+        found = self._search.found(desk)
+        if found is None:
+            dialog = PlanDialog(plan, desk.options, recipe, self._judge_plan)
+        else:
+            # It was found within the limits of bench and unit, whatever a recipe says.
+            name, unit = ("r", "") if found.quantity == "contribution_ratio" else ("b_t", " deg")
+            heading = f"Found; expected error of {name} {found.expected_std:.2g}{unit}"
+            options = PlanOptions(spacing="log")
+            dialog = PlanDialog(found.plan, options, NO_RECIPE, self._judge_plan, heading)
         self.app.push_screen(dialog, self._take_plan)
+
+    @property
+    def _search(self) -> PlanSearch:
+        return self.bench.analyses.search
+
+    def action_best(self) -> None:
+        """Find the sweep that tells most, or give that up."""
+        desk = self.desk
+        if self._search.is_running:
+            self._search.stop()
+            self.notify("the search was given up")
+            self.show()
+            return
+        if desk.unit is None:
+            return
+
+        def begin(minutes: float | None) -> None:
+            if minutes is not None:
+                desk.plan_minutes = minutes
+                self._search.begin(self.bench.beside, desk, minutes, self._found)
+                self.show()
+
+        minutes = desk.plan_minutes or USUAL_MIN
+        self.app.push_screen(BestPlanDialog(desk.unit.name, minutes), begin)
+
+    def _found(self) -> None:
+        if self.is_current:
+            self.show()
+        elif self._search.found(self.desk) is not None:
+            self.notify("the best plan was found: step 3")
+
+    def _show_search(self) -> None:
+        if self.is_current and self._search.is_running:
+            self._show_best()
+
+    def _show_best(self) -> None:
+        self.query_one("#best", Words).update("\n".join([*self._best_lines(), ""]))
+
+    def _best_lines(self) -> list[str]:
+        """How far the search is, or what it found."""
+        search = self._search
+        if search.is_running:
+            left_s = self._pace.remaining_s(search.share)
+            left = "" if left_s is None else f", {duration(left_s)} left"
+            words = f"finding the best plan of {search.minutes:g} min"
+            return [f"{words}: {100 * search.share:.0f} %{left}; B gives it up"]
+        if search.fault:
+            return [f"NO BEST PLAN: {search.fault}"]
+        found = search.found(self.desk)
+        return [] if found is None else [f"BEST of {search.minutes:g} min, {found.summary()[0]}",
+                                         *found.summary()[1:]]  # fmt: skip
 
     def _judge_plan(self, dialog: PlanDialog, choice: PlanChoice) -> None:
         """Ask the limits beside the screen; the dialog stays open where they forbid it."""
@@ -179,6 +269,7 @@ P changes the plan: levels, band, points, cycles. The checks are then run again.
             self.notify("a session is under way; its plan stays", severity="warning")
             return
         _with_choice(self.desk, choice)
+        self._search.put_away()
         self.show()
 
     def _work_out(self) -> None:

@@ -87,6 +87,7 @@ stood there before stays in its audit trail, which A shows.
     HistoryScreen.-overlay #trend { display: none; }
     HistoryScreen #trend { height: 1fr; }
     HistoryScreen #text { height: auto; max-height: 5; }
+    HistoryScreen.-side #text { max-height: 16; }
     """
 
     def __init__(self) -> None:
@@ -156,7 +157,7 @@ stood there before stays in its audit trail, which A shows.
 
     def _judge(self) -> None:
         """Judge what is listed, some sessions at a time, beside the screen."""
-        found, waiting = self._listing.found, self._listing.waiting()
+        found, waiting = self._listing.found, self._listing.next_to_judge()
         if found.limits is None or not waiting:
             return
 
@@ -349,6 +350,8 @@ stood there before stays in its audit trail, which A shows.
         found, lines = self._listing.found, []
         if found.fault:
             lines.append(f"NOT JUDGED: {found.fault}")
+        if waiting := self._listing.waiting():
+            lines.append(f"judging beside the screen, {len(waiting)} to go")
         if self._listing.order:
             lines.append(f"sorted by {self._listing.order}")
         if self._search and not found.rows:

@@ -19,6 +19,7 @@ from textual.message import Message
 from daq.errors import LashbenchError
 from daq.servers.place import HistoryPlace
 from tui.app.messages import AnalysisDone, AnalysisFailed, AnalysisProgressed, Job
+from tui.app.state.plan_search import Planner, find_plan
 
 if TYPE_CHECKING:
     from analysis.estimate.datasheet_band import DatasheetBand
@@ -93,6 +94,8 @@ class Analyses:
         knows, which may be None.
     total
         As `estimate`, with the total backlash unknown.
+    planner
+        Gives the sweep that tells most of a unit in so many minutes.
     report
         Writes a file about a task's measurement, with its diagnosis or None.
     """
@@ -102,6 +105,7 @@ class Analyses:
     report: Callable[[Task, Any, Path], None] = _report
     band: Callable[[FrequencyResponse, Unit, Any, Progress], DatasheetBand] = _band
     total: Callable[[FrequencyResponse, Unit, Progress], Mapping[str, Any]] = _total
+    planner: Planner = find_plan
 
 
 class _GivenUp(Exception):

@@ -17,6 +17,7 @@ from tui.app.state.analyses import Analyses, Task, diagnose, draw_band, read_res
 from tui.app.state.desk import Results
 from tui.app.state.host import Host
 from tui.app.state.judgement import Asked, Judged, judge_result
+from tui.app.state.plan_search import PlanSearch
 
 if TYPE_CHECKING:
     from tui.app import messages
@@ -40,6 +41,7 @@ class AnalysisKeeper:
         self._analyses = analyses
         self._given_up: dict[str, threading.Event] = {}
         self._judged: Judged | None = None
+        self.search = PlanSearch(analyses.planner)
         self.progress: dict[str, tuple[float, str]] = {}
         """How far each is and what it does, by job; none that is over."""
 
@@ -112,6 +114,10 @@ class AnalysisKeeper:
             if desk.results.diagnosis is None and "diagnosis" not in self.progress:
                 desk.results.diagnosis = message.result
                 self.judge()
+            return
+        if message.job == "judgement" and not message.result.is_whole:
+            if message.result.asked.holds(desk):
+                desk.results.judgement = message.result.judgement
             return
         self.progress.pop(message.job, None)
         if message.job == "result":

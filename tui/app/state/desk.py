@@ -108,6 +108,8 @@ class Desk:
     """Why nobody did."""
     options: PlanOptions = PlanOptions()
     """What the operator says of the sweep; the rest is the recipe's."""
+    plan_minutes: float | None = None
+    """What was asked for when the sweep that tells most was found last."""
     given_plan: SweepPlan | None = None
     """A plan that came whole, from a diagnosis; it goes before `options`."""
     follows: int | None = None

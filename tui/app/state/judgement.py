@@ -7,13 +7,14 @@ it; what is missing leaves its limits undecided.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from daq.errors import AnalysisError, InputError
+from tui.app.messages import AnalysisDone
 
 if TYPE_CHECKING:
-    from analysis.acceptance import Judgement
+    from analysis.acceptance import Judgement, LimitSet
     from daq.frf import FrequencyResponse
     from tui.app.state.analyses import Analyses, Task
     from tui.app.state.desk import Desk
@@ -61,45 +62,59 @@ class Asked:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Judged:
-    """A judgement, None where there are no limits; what it is by, and what was estimated for it."""
+    """A judgement, None where there are no limits; what it is by, and what was estimated for it.
+
+    `is_whole`: not so while something is still estimated for it.
+    """
 
     asked: Asked
     judgement: Judgement | None
     total: Mapping[str, Any] | None
+    is_whole: bool = True
 
 
 def judge_result(task: Task, analyses: Analyses, asked: Asked) -> None:
     """Judge by what is known; the total backlash is estimated where a limit is of it."""
 
     def work() -> Judged:
-        from analysis.acceptance import judge
-        from analysis.observation.incomplete import state_doubt
-        from analysis.observation.input_check import check_inputs
-        from analysis.resonance import to_json
-
         found, response = asked.choice.read(), asked.response
         if found is None or response is None:
             return Judged(asked, None, asked.total)
-        limits = found.limits
-        doubts = check_inputs([response], task.unit, as_is=True)
-        doubts += filter(None, [state_doubt(response.provenance.get("state"))])
-        told = None if asked.diagnosis is None else asked.diagnosis.to_json()
-        estimate, total = asked.estimate, asked.total
-        if limits.limits_total:
-            is_due = estimate is not None and told is None and not doubts
-            if total is None and is_due:
-                total = _with_total(task, analyses, response)
-            estimate = total
-        judgement = judge(
-            limits,
-            features=to_json(asked.features) if limits.needs_features else None,
-            estimate=estimate,
-            diagnosis=told,
-            doubt="; ".join(doubts),
-        )
-        return Judged(asked, judgement, total)
+        doubts = _doubts(task, response)
+        first = Judged(asked, _decide(found.limits, asked, asked.total, doubts), asked.total)
+        known = asked.total is not None or asked.diagnosis is not None or asked.estimate is None
+        if known or doubts or not found.limits.limits_total:
+            return first
+        task.post(AnalysisDone("judgement", task.measurement, replace(first, is_whole=False)))
+        total = _with_total(task, analyses, response)
+        return Judged(asked, _decide(found.limits, asked, total, doubts), total)
 
     task.run("judgement", work)
+
+
+def _doubts(task: Task, response: FrequencyResponse) -> str:
+    """Why nothing passes or fails by this response; empty where nothing is known."""
+    from analysis.observation.incomplete import state_doubt
+    from analysis.observation.input_check import check_inputs
+
+    said = check_inputs([response], task.unit, as_is=True)
+    return "; ".join(filter(None, [*said, state_doubt(response.provenance.get("state"))]))
+
+
+def _decide(
+    limits: LimitSet, asked: Asked, total: Mapping[str, Any] | None, doubts: str
+) -> Judgement:
+    from analysis.acceptance import judge
+    from analysis.resonance import to_json
+
+    return judge(
+        limits,
+        features=to_json(asked.features) if limits.needs_features else None,
+        # The usual estimate takes the total backlash as known.
+        estimate=(total or asked.estimate) if limits.limits_total else asked.estimate,
+        diagnosis=None if asked.diagnosis is None else asked.diagnosis.to_json(),
+        doubt=doubts,
+    )
 
 
 def _with_total(task: Task, analyses: Analyses, response: FrequencyResponse) -> Mapping[str, Any]:

@@ -20,9 +20,9 @@ _ORDERS = ("newest first", "r", "b1", "b2", "serial number")
 _SORTED_BY = ("id", "contribution_ratio", "b1_deg", "b2_deg", "serial")
 """In the order of the key."""
 
-_AT_ONCE = 20
-"""Sessions judged in one go, so that the first are told while others wait: a limit of ARF or RF
-reads their points."""
+_AT_ONCE = 3
+"""Sessions judged in one go: the first are told while others wait, since a limit of ARF or RF
+takes the points of each, half a second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,13 +86,17 @@ class Listing:
         return None if line is None else self._judged.get(self._key(line))
 
     def waiting(self) -> list[HistoryLine]:
-        """Sessions to be judged next, the newest first."""
+        """Sessions that are not judged yet, the newest first."""
         limits = self.found.limits
         if limits is None:
             return []
         # A unit's own limits are not those of another.
         due = (line for line in self.found.lines[::-1] if limits.unit in ("", line.unit))
-        return [line for line in due if self._key(line) not in self._judged][:_AT_ONCE]
+        return [line for line in due if self._key(line) not in self._judged]
+
+    def next_to_judge(self) -> list[HistoryLine]:
+        """As many of them as are judged in one go."""
+        return self.waiting()[:_AT_ONCE]
 
     def take(self, judged: Mapping[int, Judgement]) -> None:
         """Remember judgements, by the number of the session."""
