@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from analysis.emulation.emulator import Emulator
 from analysis.emulation.fitted_model import FittedModel
-from analysis.observation.observation import Observation, estimate_noise
+from analysis.observation.observation import Observation
+from analysis.observation.reading_noise import estimate_noise
 
 __all__ = ["FEWEST_RUNS", "MOST_RUNS", "Replicate", "replicates_of"]
 
@@ -84,13 +85,14 @@ def _reading_errors(
 ) -> NDArray[np.float64]:
     """What a bench adds (3, rows) to the channels of a run with a relative variance (rows,).
 
-    Its noise is such that its quietest points show that of the observation: a standard error of few
-    cycles scatters itself, and the least of many is less than the noise.
+    Its noise is such that it shows that of the observation, where only its quietest points do: a
+    standard error of few cycles scatters itself, and the least of many is less than the noise.
     """
     sampling = observation.scatter_sampling
     scatter = np.exp(sampling * rng.standard_normal(len(observation)))
     volts = observation.noise_v / np.where(observation.noise > 0.0, observation.noise, np.inf)
-    shown = estimate_noise(np.sqrt(variance + 2.0 * observation.noise**2) * scatter * volts)
+    heard = np.sqrt(variance + 2.0 * observation.noise**2) * scatter * volts
+    shown = estimate_noise(heard, sampling)
     noise = observation.noise * np.clip(observation.noise_v / shown, 1.0, _LOUDEST)
     total = variance + 2.0 * noise**2
     share = 2.0 * noise**2 / total

@@ -24,12 +24,8 @@ from analysis.ensemble.datasheet_spread import spread_of
 from analysis.ensemble.runs import Group, Population, simulate_groups
 from analysis.execution.executor import Executor
 from analysis.inference.run_design import runs_along_ridge
-from analysis.observation.observation import (
-    Observation,
-    channels_of_readings,
-    noise_and_floor,
-    unread,
-)
+from analysis.observation.observation import Observation, channels_of_readings, unread
+from analysis.observation.reading_noise import noise_and_floor
 from daq.configs import config_names
 from daq.plan import SweepPlan, spaced_frequencies
 from sim.unit import Unit

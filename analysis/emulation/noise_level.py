@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from analysis.emulation.likelihood import TEMPERATURE
 from analysis.execution.executor import side_by_side
-from analysis.observation.observation import USUAL_NOISE_V, Observation
+from analysis.observation.observation import Observation
+from analysis.observation.reading_noise import USUAL_NOISE_V
 
 __all__ = ["draw_noises", "likeliest_noise", "possible_noises"]
 

@@ -21,7 +21,7 @@ from analysis.inference.plans import Landmarks, landmarks, reference_response
 from analysis.inference.prior import COUNTS, Prior
 from analysis.inference.runs import Batch
 from analysis.inference.sets import CauseSets
-from analysis.observation.observation import QUIET_SHARE, USUAL_NOISE_V, scatter_sampling
+from analysis.observation.reading_noise import QUIET_SHARE, USUAL_NOISE_V, scatter_sampling
 from sim.catalogue import not_of_unit
 from sim.unit import Unit
 

@@ -240,7 +240,8 @@ def swept_levels(observation: Observation, values: NDArray[np.float64]) -> list[
                 levels,
                 gain,
                 scatter,
-                np.full(count, observation.noise_v, dtype=np.float32),
+                # The noise that it has learned with is that of the quietest points.
+                np.full(count, observation.noise_v * observation.quietest, dtype=np.float32),
                 known,
                 plan.direction == "down",
                 plan.settle_cycles,

@@ -16,6 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.observation.excitation import excitation_doubt, signal_of
+from analysis.observation.reading_noise import (
+    estimate_noise,
+    noise_and_floor,
+    scatter_sampling,
+    shown_noise,
+)
 from analysis.observation.rounding import settled
 from analysis.observation.stated_error import stated_error
 from daq.errors import AnalysisError, InputError
@@ -25,14 +31,10 @@ from daq.plan import SweepPlan
 
 __all__ = [
     "CHANNELS",
-    "USUAL_NOISE_V",
     "Observation",
     "channels_of_readings",
-    "estimate_noise",
-    "noise_and_floor",
     "observe",
     "readings_of_cycles",
-    "scatter_sampling",
     "unread",
 ]
 
@@ -41,16 +43,6 @@ CHANNELS = ("gain", "phase", "scatter")
 
 SETTLE_CYCLES, INTEGRATE_CYCLES = 20, 30
 """Assumed where a file does not say."""
-
-QUIET_SHARE = 0.02
-
-USUAL_NOISE_V = 5e-4
-"""What a bench adds to each component of a reading, where nothing else is known, V."""
-
-_DROWNED, _FLOOR = 0.25, 2.0
-"""Noise per component, as a share of the response, from which on a point has drowned: its phase is
-chance, and its gain that of noise, which is compared above so many times the noise alone. There a
-servo that friction holds, whose simulation moves by nothing, reads as what it is."""
 
 LEAST_NOISE = 3e-5
 """What any analyser adds, as a share of the largest voltage that it reads: 90 dB below its range.
@@ -75,7 +67,8 @@ class Observation:
     relative to the response. `loudest_v`: what the quietest points show, V; it
     can be no more. `floor` (rows,): gain below which a point that drowned says nothing, 0
     elsewhere. `plans`: the sweep that a simulation must take, one for each
-    set of levels that share their frequencies, with their rows.
+    set of levels that share their frequencies, with their rows. `quietest`: what the quietest
+    points show, as a share of the noise.
     """
 
     values: NDArray[np.float64]
@@ -86,6 +79,7 @@ class Observation:
     loudest_v: float
     floor: NDArray[np.float64]
     plans: tuple[tuple[SweepPlan, NDArray[np.int64]], ...]
+    quietest: float = 1.0
 
     @property
     def blocks(self) -> tuple[slice, ...]:
@@ -119,7 +113,7 @@ class Observation:
     @property
     def scatter_sampling(self) -> float:
         """Relative standard deviation of a standard error along one component, by its cycles."""
-        return scatter_sampling(min(plan.integrate_cycles for plan, _ in self.plans))
+        return _sampling(self.plans)
 
     def with_noise(self, noise_v: float) -> Observation:
         """The same reading with another noise of its own, V."""
@@ -177,7 +171,8 @@ def observe(*responses: FrequencyResponse) -> Observation:
     scatter = np.concatenate([one.scatter for one in swept])
     volts = np.abs(gain) * level
     _refuse_unbelievable(level, volts)
-    noise_v = estimate_noise(scatter * volts)
+    plans = _plans(swept)
+    noise_v = estimate_noise(scatter * volts, _sampling(plans))
     noise, floor = noise_and_floor(np.abs(gain), level, noise_v)
     drowned = floor > 0.0
     log_gain = np.log(gain)
@@ -194,7 +189,8 @@ def observe(*responses: FrequencyResponse) -> Observation:
         noise=noise,
         loudest_v=noise_v,
         floor=floor,
-        plans=_plans(swept),
+        plans=plans,
+        quietest=shown_noise(scatter * volts) / noise_v,
     )
 
 
@@ -269,21 +265,8 @@ def _refuse_repeated(frequency_hz: NDArray[np.float64], source_vpk: float) -> No
         )
 
 
-def scatter_sampling(cycles: int) -> float:
-    """Relative standard deviation of a standard error along one component, of so many cycles."""
-    return float(1.0 / np.sqrt(2.0 * max(cycles - 1, 1)))
-
-
-def estimate_noise(volts: NDArray[np.float64]) -> float:
-    """Noise of each component, V: what the quietest points show, as there the motion repeats.
-
-    Where it repeats nowhere that is too much (see `analysis.emulation.noise_level`). `volts`
-    counts both components, as the scatter of a reading does.
-    """
-    known = volts[np.isfinite(volts) & (volts > 0)]
-    if known.size == 0:
-        return USUAL_NOISE_V
-    return float(np.quantile(known, QUIET_SHARE) / np.sqrt(2.0))
+def _sampling(plans: Sequence[tuple[SweepPlan, NDArray[np.int64]]]) -> float:
+    return scatter_sampling(min(plan.integrate_cycles for plan, _ in plans))
 
 
 def _plans(swept: Sequence[_Level]) -> tuple[tuple[SweepPlan, NDArray[np.int64]], ...]:
@@ -349,19 +332,6 @@ def _stretches(*columns: NDArray[np.float64]) -> tuple[slice, ...]:
     starts = np.flatnonzero(changes)
     ends = [*starts[1:], len(changes)]
     return tuple(slice(int(a), int(b)) for a, b in zip(starts, ends, strict=True))
-
-
-def noise_and_floor(
-    gain: NDArray[np.float64], source_vpk: NDArray[np.float64] | float, noise_v: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Relative noise (rows,) of gains at source levels, V, and their floors: 0 where none drowned.
-
-    `noise_v` is that of each component of the reading, V.
-    """
-    volts = gain * source_vpk
-    drowned = volts < noise_v / _DROWNED
-    share = np.where(drowned, _DROWNED, noise_v / np.maximum(volts, 1e-300))
-    return share, np.where(drowned, _FLOOR * noise_v / source_vpk, 0.0)
 
 
 def readings_of_cycles(

@@ -25,7 +25,8 @@ from analysis.execution.blas import on_one_core
 from analysis.execution.executor import Executor
 from analysis.execution.progress import Progress, part_of
 from analysis.inference.plans import landmarks
-from analysis.observation.observation import USUAL_NOISE_V, Observation, unread
+from analysis.observation.observation import Observation, unread
+from analysis.observation.reading_noise import USUAL_NOISE_V
 from daq.errors import InputError
 from daq.plan import SweepPlan, spaced_frequencies
 from daq.recipe import Recipe

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from analysis.emulation.noise_level import draw_noises, likeliest_noise, possible_noises
-from analysis.observation.observation import USUAL_NOISE_V, channels_of_readings, unread
+from analysis.observation.observation import channels_of_readings, unread
+from analysis.observation.reading_noise import USUAL_NOISE_V
 from daq.plan import SweepPlan
 
 ROWS = 40

@@ -7,7 +7,8 @@ import pytest
 
 from analysis.emulation.parameter_posterior import calibrate
 from analysis.ensemble.runs import Population
-from analysis.observation.observation import USUAL_NOISE_V, observe, unread
+from analysis.observation.observation import observe, unread
+from analysis.observation.reading_noise import USUAL_NOISE_V
 from daq.frf import FrequencyResponse
 from daq.plan import SweepPlan
 

@@ -5,7 +5,8 @@ from analysis.ensemble.batch import Family, read_family
 from analysis.ensemble.machine import Machine
 from analysis.inference.inputs import SweptLevels
 from analysis.inference.nominal import RUNS, compare, expected, nominal_of, nominal_runs, relative
-from analysis.observation.observation import USUAL_NOISE_V, unread
+from analysis.observation.observation import unread
+from analysis.observation.reading_noise import USUAL_NOISE_V
 from daq.plan import SweepPlan, spaced_frequencies
 from sim.unit import load_unit
 

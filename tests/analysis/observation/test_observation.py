@@ -12,7 +12,7 @@ from analysis.observation.observation import (
     readings_of_cycles,
 )
 from daq.errors import AnalysisError, InputError
-from daq.frf import DB_PER_NEPER, FrequencyResponse, PointFlag
+from daq.frf import DB_PER_NEPER, GAIN_STD_COMPONENTS, FrequencyResponse, PointFlag
 
 
 def response(levels=(1.5, 2.5), frequencies=(100.0, 110.0, 120.0), **changes):
@@ -204,6 +204,27 @@ def test_noise_is_taken_from_quietest_points():
         f, 2.5, gain, unit="ADSS", gain_std_db=DB_PER_NEPER * scatter
     )
     assert observe(one).noise_v == pytest.approx(5e-4, rel=0.1)
+
+
+@pytest.mark.parametrize("cycles", [12, 30])
+def test_motion_that_repeats_shows_median_noise(cycles):
+    """The quietest of 75 points are so by chance: by 40 % with 12 cycles, by 25 % with 30."""
+    found = []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        shown = np.sqrt(rng.chisquare(cycles - 1, 75) / (cycles - 1)) * 2e-4 / (2.5 * 0.1)
+        shown[rng.random(75) < 0.1] *= 10.0
+        one = FrequencyResponse.from_arrays(
+            np.linspace(10.0, 30.0, 75), 2.5, np.full(75, 0.1), unit="FEED-AXIS",
+            gain_std_db=DB_PER_NEPER * shown, integrate_cycles=cycles,
+            provenance={GAIN_STD_COMPONENTS: 1},
+        )  # fmt: skip
+        seen = observe(one)
+        found.append((seen.noise_v, seen.noise_v * seen.quietest))
+    noise_v, quietest_v = np.median(found, axis=0)
+    assert noise_v == pytest.approx(2e-4, rel=0.06)
+    # What a network has learned with.
+    assert quietest_v < 1.7e-4
 
 
 def test_noise_free_reading_takes_analyser_floor():

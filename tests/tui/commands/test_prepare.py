@@ -9,7 +9,8 @@ from instruments.measuring import QUICK, SHORT, measuring
 from analysis.estimate import estimate_response
 from analysis.inference.checkpoint import posterior_name, read_checkpoint
 from analysis.inference.nominal import nominal_of
-from analysis.observation.observation import USUAL_NOISE_V, observe, unread
+from analysis.observation.observation import observe, unread
+from analysis.observation.reading_noise import USUAL_NOISE_V
 from analysis.precompute import prepare_sweep
 from daq.configs import config_path
 from daq.formats import read_response
