@@ -1,14 +1,19 @@
 """Published drives, measured by the independent plant and judged, with no cause or one hidden.
 
-    python tests/studies/drives.py UNIT [CAUSE=FACTOR] [--points N] [--seed N]
+    python tests/studies/drives.py UNIT [CAUSE=FACTOR] [--points N] [--seed N] [--out FILE]
+    python tests/studies/drives.py --every FILE
+    python tests/studies/drives.py --table FILE
 
 CAUSE is a number of the plant (J_L, k_s1, B_m, k_a ...) and is multiplied by FACTOR. Prints a line
 of JSON: the verdict, what is named, ratio and total backlash with their errors, and what is true.
-Takes a minute or more of a processor; it is no test.
+`--every` adds what a file of such lines lacks of all published drives, each in a process of its
+own, nothing hidden first; `--table` counts it. One takes minutes of a processor; it is no test.
 """
 
 import argparse
 import json
+import math
+import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -21,7 +26,7 @@ from oracle import drive_plant
 
 from analysis.diagnosis import diagnose_response
 from analysis.estimate import estimate_response
-from daq.configs import config_path
+from daq.configs import config_names, config_path
 from daq.frf import (
     DB_PER_NEPER,
     GAIN_STD_COMPONENTS,
@@ -33,6 +38,7 @@ from sim.datasheet import natural_frequencies
 from sim.unit import load_unit
 
 CYCLES = 12, 12
+PAPER = ("adss", "edss")
 NOISE_V = 2e-4
 """Of the bench, per component of a reading."""
 
@@ -69,37 +75,124 @@ def measured(name, ratio, points, seed, changed):
     )
 
 
-def main():
-    """Measure, estimate, diagnose, and say what came of it."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("unit")
-    parser.add_argument("cause", nargs="?", default="")
-    parser.add_argument("--ratio", type=float, default=0.3)
-    parser.add_argument("--points", type=int, default=25)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--tolerance", type=float)
-    told = parser.parse_args()
-    unit = load_unit(told.unit)
-    ratio = 1.0 if unit.stages == 1 else told.ratio
-    symbol, _, factor = told.cause.partition("=")
+EFFECTS = {
+    "J_L": "load-inertia",
+    "k_s1": "shaft-stiffness",
+    "B_m": "motor-viscous-friction",
+    "T_f_m": "motor-coulomb-friction",
+    "k_a": "amplifier-gain",
+}
+"""What the catalogue calls a change of each number."""
+
+
+def answered(name, cause, ratio, points, seed, tolerance=None):
+    """What estimate and diagnosis say of one measured drive, and what is true."""
+    unit = load_unit(name)
+    ratio = 1.0 if unit.stages == 1 else ratio
+    symbol, _, factor = cause.partition("=")
     changed = {symbol: float(factor) * unit.parameters[symbol]} if symbol else {}
-    unit, response = measured(told.unit, ratio, told.points, told.seed, changed)
-    if told.tolerance is not None:
-        unit = unit.with_tolerance({"default": told.tolerance})
+    unit, response = measured(name, ratio, points, seed, changed)
+    if tolerance is not None:
+        unit = unit.with_tolerance({"default": tolerance})
     estimate = estimate_response(response, unit).to_json()
     found = diagnose_response(response, unit).to_json()
-    line = {
-        "unit": told.unit,
-        "hidden": told.cause,
-        "seed": told.seed,
+    return {
+        "unit": name,
+        "hidden": cause,
+        "seed": seed,
         "true": {"ratio": ratio, "b_t_deg": unit.backlash.b_t_deg},
         "estimate": {name: estimate[name] for name in ("contribution_ratio", "b_t_deg")},
         "verdict": found["verdict"],
         "causes": {c["effect"]: c["parameters"] for c in found["causes"]},
         "rivals": [[r["causes"], round(r["probability"], 3)] for r in found["rivals"][:4]],
         "ratio": found["contribution_ratio"],
+        "datasheet": found.get("datasheet"),
+        "elapsed_s": round(found["elapsed_s"]),
+        "simulated_s": round(found["simulated_s"]),
     }
-    print(json.dumps(line))  # noqa: T201
+
+
+def cases():
+    """Unit, cause, ratio and seed of each line of the study, what is needed first at the start."""
+    units = {name: load_unit(name) for name in config_names("units") if name not in PAPER}
+    plain = [(name, "", ratio, seed) for seed, ratio in ((1, 0.3), (2, 0.6)) for name in units]
+    hidden = []
+    for symbol, factor in (("J_L", 1.4), ("k_s1", 0.7), ("T_f_m", 2.5), ("B_m", 2.5)):
+        for name, unit in units.items():
+            if unit.parameters[symbol] and (symbol != "B_m" or not unit.parameters["T_f_m"]):
+                hidden.append((name, f"{symbol}={factor}", 0.3, 1))
+    return [*plain[: len(units)], *hidden, *plain[len(units) :]]
+
+
+def every(path, points):
+    """Add to a file the lines that it lacks."""
+    path.touch()
+    for name, cause, ratio, seed in cases():
+        known = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+        if any((k["unit"], k["hidden"], k["seed"]) == (name, cause, seed) for k in known):
+            continue
+        own = [sys.executable, __file__, name, *([cause] if cause else []), "--seed", str(seed)]
+        own += ["--ratio", str(ratio), "--points", str(points), "--out", str(path)]
+        subprocess.run(own, check=False)
+
+
+def interval(hits, count):
+    """A share with its 95 % interval (Wilson), in words."""
+    z, share = 1.96, hits / count
+    middle = (share + z**2 / (2 * count)) / (1 + z**2 / count)
+    half = z * math.sqrt(share * (1 - share) / count + z**2 / (4 * count**2)) / (1 + z**2 / count)
+    return f"{hits} of {count} ({100 * (middle - half):.0f} to {100 * (middle + half):.0f} %)"
+
+
+def table(path):
+    """Lines of text: how often each answer is right."""
+    lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    counted = {}
+    for one in lines:
+        named = list(one["causes"])
+        if not one["hidden"]:
+            counted.setdefault("nothing hidden: consistent", []).append(
+                one["verdict"] == "consistent"
+            )
+        else:
+            true = EFFECTS[one["hidden"].partition("=")[0]]
+            counted.setdefault("hidden: named first", []).append(named[:1] == [true])
+            counted.setdefault("hidden: named alone", []).append(named == [true])
+        if one["true"]["ratio"] < 1.0:
+            told = one["ratio"]["extended"]
+            off = abs(told["value"] - one["true"]["ratio"])
+            low, high = told.get("interval95", (0.0, 0.0))
+            inside = low <= one["true"]["ratio"] <= high or off <= 1.96 * told["std"]
+            counted.setdefault("ratio within its 95 % interval", []).append(inside)
+    return [f"{what}: {interval(sum(hits), len(hits))}" for what, hits in counted.items()]
+
+
+def main():
+    """Measure, estimate, diagnose, and say what came of it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("unit", nargs="?")
+    parser.add_argument("cause", nargs="?", default="")
+    parser.add_argument("--ratio", type=float, default=0.3)
+    parser.add_argument("--points", type=int, default=25)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--tolerance", type=float)
+    parser.add_argument("--out", type=Path)
+    parser.add_argument("--every", type=Path)
+    parser.add_argument("--table", type=Path)
+    told = parser.parse_args()
+    if told.table:
+        print("\n".join(table(told.table)))  # noqa: T201
+        return
+    if told.every:
+        every(told.every, told.points)
+        return
+    line = json.dumps(
+        answered(told.unit, told.cause, told.ratio, told.points, told.seed, told.tolerance)
+    )
+    print(line)  # noqa: T201
+    if told.out:
+        with told.out.open("a", encoding="utf-8") as file:
+            file.write(line + "\n")
 
 
 if __name__ == "__main__":
