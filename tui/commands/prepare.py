@@ -172,7 +172,8 @@ def _observation(
 ) -> Observation:
     """The sweep that is meant: that of a response, or one that will be measured."""
     if file is None:
-        from analysis.observation.observation import USUAL_NOISE_V, unread
+        from analysis.observation.observation import unread
+        from analysis.observation.reading_noise import USUAL_NOISE_V
         from daq.recipe import load_recipe
 
         if layout != NO_LAYOUT:
