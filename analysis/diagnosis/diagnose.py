@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from analysis.diagnosis.datasheet import learn_datasheet
 from analysis.diagnosis.experiment_design import NextMeasurement, propose_measurement
 from analysis.diagnosis.harmonics import compare_harmonics
 from analysis.diagnosis.refinement import refine_parameters
@@ -207,6 +208,7 @@ def _diagnose(
         )
     if progress is not None:
         progress(1.0, "done")
+    accepted = verdict.word in ("consistent", "explained")
     return Diagnosis(
         unit=unit.name,
         verdict=verdict,
@@ -222,6 +224,7 @@ def _diagnose(
         unseen=unseen,
         models=models,
         believed=believed_document(unit),
+        datasheet=learn_datasheet(verdict.best.candidate, best) if accepted else (),
         lent_by=posterior.lent_by,
         stages=tuple(record.stages),
     )

@@ -18,6 +18,7 @@ from analysis.diagnosis.remaining_models import Model, backlash_document, backla
 from analysis.diagnosis.residuals import Residual
 from analysis.diagnosis.stages import Stage
 from analysis.ensemble.datasheet_belief import believed_lines
+from analysis.estimate.datasheet_posterior import DatasheetValue, datasheet_lines
 from analysis.inference.exclusion import ExclusionLimit, head_unseen, list_unseen
 from analysis.observation.joint import sweep_document, sweep_lines
 from analysis.observation.observation import Observation
@@ -62,7 +63,8 @@ class Diagnosis:
     first. `unseen`: how large each cause may be all the same where nothing is missing, or each
     other one beside what is named. `models`: every model that may be true with its backlash, the
     accepted or likeliest first. `believed`: what was believed of the datasheet
-    (`analysis.ensemble.datasheet_belief`). `lent_by`: the unit whose posterior was used, where this
+    (`analysis.ensemble.datasheet_belief`); `datasheet`: what the accepted model says of each value.
+    `lent_by`: the unit whose posterior was used, where this
     one has none. `stages`: what each stage cost and led to. `simulated_s`: seconds of motion that
     were simulated for it.
     """
@@ -82,6 +84,7 @@ class Diagnosis:
     unseen: tuple[ExclusionLimit, ...] = ()
     models: tuple[Model, ...] = ()
     believed: Mapping[str, Any] = field(default_factory=dict)
+    datasheet: tuple[DatasheetValue, ...] = ()
     lent_by: str = ""
     stages: tuple[Stage, ...] = ()
     warnings: tuple[str, ...] = ()
@@ -200,6 +203,7 @@ class Diagnosis:
                 self.observation, self.verdict.baseline, self.extended if self.causes else None
             ),
             **self.believed,
+            "datasheet": {one.symbol: one.to_json() for one in self.datasheet},
             "misfit_sigma": {
                 "baseline": self.verdict.baseline.misfit,
                 "extended": self.extended.misfit,
@@ -234,6 +238,7 @@ class Diagnosis:
             lines.append(f"    To make sure: {effect.check}.")
         lines += [f"  {text}" for text in sweep_lines(self._swept())]
         lines += [f"  {text}" for text in believed_lines(self.believed)]
+        lines += [f"  {text}" for text in datasheet_lines(self.to_json())]
         lines += [f"  {text}" for text in backlash_lines(self.models, self.verdict.word)]
         sigma, db = self.held_out_sigma, self.held_out_db
         lines.append(

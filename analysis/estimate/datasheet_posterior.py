@@ -22,7 +22,17 @@ from analysis.observation.observation import Observation
 from sim.tolerance import RESPONSE_SCALES
 from sim.unit import Unit
 
-__all__ = ["DatasheetValue", "datasheet_lines", "datasheet_values"]
+__all__ = [
+    "DatasheetValue",
+    "Departures",
+    "datasheet_lines",
+    "datasheet_values",
+    "find_departures",
+    "predicted_departures",
+]
+
+Departures = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Mean (k + 1,) and covariance of departures along the ways of a unit, and of the gain, last."""
 
 _DETERMINED = 0.9
 """Standard deviation over the tolerance above which a sweep says nothing of a value."""
@@ -67,7 +77,7 @@ def datasheet_values(
     observation: Observation,
     spread: Spread,
     used: NDArray[np.bool_],
-    places: Sequence[Prediction],
+    places: Sequence[Departures],
 ) -> tuple[DatasheetValue, ...]:
     """Every value with a tolerance, as the measurement leaves it.
 
@@ -76,9 +86,9 @@ def datasheet_values(
     used
         (k,): ways along which machines were simulated; of others nothing is known.
     places
-        What machines show at places that the answer leaves open, each as likely.
+        What is learned at places that the answer leaves open, each as likely.
     """
-    means, inner = zip(*(_update(observation, one) for one in places), strict=True)
+    means, inner = zip(*places, strict=True)
     mean = np.mean(means, axis=0)
     covariance = np.mean(inner, axis=0) + np.cov(np.array(means).T, ddof=0)
     tolerances, known = unit.tolerances, unit.parameters
@@ -149,20 +159,39 @@ def _value(
     )
 
 
-def _update(
-    observation: Observation, prediction: Prediction
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Mean (k + 1,) and covariance of departures along the ways and of the gain, last.
-
-    Gauss-Newton at the best fit of `match_prediction`, its likelihood to the power
-    1 / `TEMPERATURE`: neighbouring points err together.
-    """
+def predicted_departures(observation: Observation, prediction: Prediction) -> Departures:
+    """What is learned where machines show what was predicted, at the best fit of that."""
     match = match_prediction(observation, prediction)
-    seen = np.isfinite(match.std) & np.isfinite(match.residual)
-    z = match.residual[seen] / match.std[seen]
-    trust = (TAIL_FREEDOM + 1.0) / (TAIL_FREEDOM + z**2) / match.std[seen] ** 2 / TEMPERATURE
-    slopes = prediction.slopes[:, seen]
-    y = match.residual[seen] + match.deviations @ slopes
-    covariance = np.linalg.inv((slopes * trust) @ slopes.T + np.diag(1.0 / prediction.sigmas**2))
-    found = covariance @ ((slopes * trust) @ y)
+    return find_departures(
+        match.residual, match.std, match.deviations, prediction.slopes, prediction.sigmas
+    )
+
+
+def find_departures(
+    residual: NDArray[np.float64],
+    std: NDArray[np.float64],
+    deviations: NDArray[np.float64],
+    slopes: NDArray[np.float64],
+    sigmas: NDArray[np.float64],
+) -> Departures:
+    """What is learned by Gauss-Newton about a best fit.
+
+    The likelihood counts to the power 1 / `TEMPERATURE`: neighbouring points err together.
+
+    Parameters
+    ----------
+    residual, std
+        (3, rows): observed minus expected at the best deviations, and its standard deviation.
+    deviations, sigmas
+        (k + 1,): the best ones, the gain last, and their prior standard deviations.
+    slopes
+        (k + 1, 3, rows): change of the channels per unit of each.
+    """
+    seen = np.isfinite(std) & np.isfinite(residual)
+    z = residual[seen] / std[seen]
+    trust = (TAIL_FREEDOM + 1.0) / (TAIL_FREEDOM + z**2) / std[seen] ** 2 / TEMPERATURE
+    along = slopes[:, seen]
+    y = residual[seen] + deviations @ along
+    covariance = np.linalg.inv((along * trust) @ along.T + np.diag(1.0 / sigmas**2))
+    found = covariance @ ((along * trust) @ y)
     return np.asarray(found, dtype=float), np.asarray(covariance, dtype=float)

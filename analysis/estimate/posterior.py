@@ -24,7 +24,11 @@ from analysis.ensemble.datasheet_spread import Spread, spread_of
 from analysis.ensemble.machine import Draws, Machine
 from analysis.ensemble.run_cache import run_families
 from analysis.ensemble.runs import Population
-from analysis.estimate.datasheet_posterior import DatasheetValue, datasheet_values
+from analysis.estimate.datasheet_posterior import (
+    DatasheetValue,
+    datasheet_values,
+    predicted_departures,
+)
 from analysis.estimate.design import RATIO, Axis, Families, near_families, wide_families
 from analysis.execution.executor import Executor
 from analysis.execution.progress import Progress
@@ -131,9 +135,8 @@ def _datasheet(
     steps = ways * np.sqrt(len(sizes) * np.maximum(sizes, 0.0))
     places = np.clip(found.mean + np.concatenate([steps.T, -steps.T]), low, high)
     used = np.any(population.deviations != 0.0, axis=0)
-    return datasheet_values(
-        unit, observation, spread, used, [emulator.predict(place) for place in places]
-    )
+    learned = [predicted_departures(observation, emulator.predict(place)) for place in places]
+    return datasheet_values(unit, observation, spread, used, learned)
 
 
 def match_runs(

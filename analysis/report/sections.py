@@ -12,6 +12,7 @@ from typing import Any
 from analysis.advice import Advice
 from analysis.answer import Answer, model_name
 from analysis.ensemble.datasheet_belief import believed_lines
+from analysis.estimate.datasheet_posterior import datasheet_lines
 from analysis.inference.exclusion import describe_unseen, head_unseen
 from analysis.observation.joint import sweep_lines
 from analysis.report.certificate import head_rows, issued
@@ -144,7 +145,7 @@ def backlash_section(data: Data, answer: Answer, advice: Advice, picture: Markup
             caption = f"{bar} {caption}" if estimate and estimate.get("error_index") else bar
         parts.append(element("figure", picture, element("figcaption", caption)))
     if estimate is not None and diagnosis is None:
-        parts.append(_list(believed_lines(estimate)))
+        parts.append(_list([*believed_lines(estimate), *datasheet_lines(estimate)]))
         parts.append(_notes(estimate.get("warnings", [])))
     return _section("Backlash", *parts)
 
@@ -190,7 +191,7 @@ def diagnosis_section(data: Data, pictures: Sequence[tuple[Markup, str]]) -> Mar
         element("p", element("b", f"{word.capitalize()}. "), " ".join(verdict_words(diagnosis))),
         _causes(diagnosis),
         [element("p", f"Taken together: {'; '.join(swept)}.")] if swept else Markup(""),
-        _list(believed_lines(diagnosis)),
+        _list([*believed_lines(diagnosis), *datasheet_lines(diagnosis)]),
         _gain(diagnosis),
         [
             element("figure", svg, element("figcaption", caption), class_="half")

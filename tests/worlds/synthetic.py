@@ -54,7 +54,7 @@ def read(effects, place, rng, deviations=None, scatter=1.0):
     deviations = np.zeros(len(SPREAD)) if deviations is None else deviations
     size = place[1] if len(place) > 1 else 0.0
     value = BASE + RATIO_SLOPE * (place[0] - 0.5) + effect_slope(effects) * size
-    value = value + np.tensordot(deviations, DEVIATION_SLOPES, axes=1)
+    value = value + np.tensordot(deviations, DEVIATION_SLOPES[: len(deviations)], axes=1)
     return value + scatter * SCATTER * rng.standard_normal((3, ROWS))
 
 
@@ -110,15 +110,17 @@ def candidate(
     seed: int = 0,
     groups: int = 10,
     scatter: float = 1.0,
+    unit=ADSS,
 ):
     """A candidate with runs all over of what was seen, its deviations known."""
     rng = np.random.default_rng(seed)
     rows = np.isin(np.tile(FREQUENCIES, len(LEVELS)), seen.frequency_hz)
-    slopes = DEVIATION_SLOPES[..., rows]
-    hypothesis = Hypothesis(ADSS, effects)
+    spread = spread_of(unit)
+    slopes = DEVIATION_SLOPES[: len(spread), :, rows]
+    hypothesis = Hypothesis(unit, effects)
     places, deviations, runs = [], [], []
     for _ in range(groups):
-        off = rng.normal(0.0, SIGMAS)
+        off = rng.normal(0.0, spread.sigmas)
         sizes = rng.uniform(0.0, 1.0, hypothesis.d - 1)
         for ratio in rng.uniform(0.0, 1.0, 10):
             place = np.array([ratio, *sizes])
@@ -129,7 +131,9 @@ def candidate(
     difference = runs - seen.values - np.tensordot(deviations, slopes, axes=1)
     width = np.array([0.4] + [0.4] * (hypothesis.d - 1))
     motions = Regimes.unknown(*difference.shape[::2])
-    surface = Emulator(seen, places, difference, width, slopes, SIGMAS, motions, SPREAD.gain, 9.0)
+    surface = Emulator(
+        seen, places, difference, width, slopes, spread.sigmas, motions, spread.gain, 9.0
+    )
     mean, variance = np.exp(runs[:, 0] + 1j * runs[:, 1]), np.exp(2.0 * runs[:, 2])
     population = Population(places, deviations, mean, variance, np.repeat(np.arange(groups), 10))
     return FittedModel(hypothesis, population, surface, surface.climb(places.mean(axis=0)))
