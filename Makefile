@@ -12,7 +12,7 @@ LOWEST := .venv/lowest
 # Tests start some hundred programs; each would compile all that it imports.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help demo line test tests long check pyright lowest clients first-day pictures train training bench blind faults fuzz soak docs audit lock clean
+.PHONY: help demo line test tests long check pyright lowest clients first-day pictures notebook train training bench blind faults fuzz soak docs audit lock clean
 
 help:
 	@echo "make demo    the whole job without hardware; results in demo/"
@@ -23,6 +23,7 @@ help:
 	@echo "make lowest  some tests with the lowest versions that are allowed; two minutes"
 	@echo "make clients programs of others against the simulated analysers; a minute"
 	@echo "make first-day INSTRUMENT=URL  guided checks of a real analyser, with a report; half an hour"
+	@echo "make pictures, make notebook  take the pictures, execute the notebook of docs; minutes"
 	@echo "make train   train the posteriors further, MACHINES=200000 each; some hours"
 	@echo "make bench   benchmarks"
 	@echo "make blind   hide effects and have the diagnosis find them; some hours"
@@ -96,6 +97,14 @@ first-day: $(READY)
 pictures: $(READY)
 	@$(BIN)/python tests/screen_pictures.py docs/pictures --every build/pictures
 	@$(BIN)/python tests/screen_pictures.py docs/pictures --kept
+
+# The example notebook of the documentation, executed; a few minutes.
+NOTEBOOK := nbclient==0.10.2 nbformat==5.10.4 ipykernel==6.30.1
+
+notebook: $(READY)
+	@$(BIN)/python -c "import nbclient, ipykernel" 2> /dev/null || \
+	  $(BIN)/python -m pip install -qq --disable-pip-version-check $(NOTEBOOK)
+	@$(BIN)/python tests/outputs/executed_notebook.py
 
 MACHINES ?= 200000
 

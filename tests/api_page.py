@@ -27,7 +27,8 @@ They change only after a version that says so in the [CHANGELOG](../CHANGELOG.md
 shapes and errors are in the docstrings (`python -m pydoc sim.response`). Examples:
 [headless](examples/headless.py), [replay](examples/replay.py),
 [own unit](examples/own_unit.py), [own effect](examples/own_effect.py),
-[fleet](examples/fleet.py). `python tests/api_page.py` makes this page.
+[fleet](examples/fleet.py),
+[notebook](examples/notebook.ipynb). `python tests/api_page.py` makes this page.
 """
 
 

@@ -1,5 +1,6 @@
 """The names for a notebook: what they load, how results show themselves, and the example."""
 
+import json
 import re
 import subprocess
 import sys
@@ -7,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from instruments.bench_server import linear_analyser, served
+from outputs.executed_notebook import MOST_BYTES, NOTEBOOK, SCRIPT, parts
 
 import lashbench as lb
 from daq.analyser import SourceState
@@ -82,6 +84,30 @@ def test_fault_states_stored_points_and_source_off(tmp_path):
         pytest.raises(LashbenchError, match=r"\d points? kept, source confirmed off"),
     ):
         lb.measure(plan, "adss", address, db=tmp_path / "lab.db", yes=True)
+
+
+def test_notebook_is_the_script_with_outputs():
+    """Where this fails, ``make notebook`` executes it anew."""
+    text = NOTEBOOK.read_text(encoding="utf-8")
+    assert len(text.encode()) <= MOST_BYTES
+    document = json.loads(text)
+    cells = [cell for cell in document["cells"] if cell["cell_type"] == "code"]
+    _, sections = parts(SCRIPT.read_text(encoding="utf-8"))
+    assert ["".join(cell["source"]) for cell in cells] == [code for _, code in sections]
+    words = [one["source"] for one in document["cells"] if one["cell_type"] == "markdown"]
+    headings = ["".join(one) for one in words]
+    assert headings[1:] == [heading for heading, _ in sections]
+    pictures = 0
+    for cell in cells:
+        assert cell["outputs"], cell["source"]
+        assert all(one["output_type"] != "error" for one in cell["outputs"])
+        pictures += sum("image/png" in one.get("data", ()) for one in cell["outputs"])
+    assert pictures == 2
+    said = "".join(
+        line for cell in cells for one in cell["outputs"] for line in one.get("text", ())
+    )
+    assert "183 points, 100 to 180 Hz" in said
+    assert "contribution ratio" in said
 
 
 def test_ratio_without_unit_is_refused():
