@@ -168,7 +168,11 @@ def test_total_backlash_is_estimated_for_its_limit(db, tmp_path):
         asked.append(unit.name)
         progress(0.5, "")
         assert going_on.wait(20.0)
-        return ESTIMATE | {"b_t_deg": {"value": 0.066, "std": 0.004}}
+        changed = {
+            "b_t_deg": {"value": 0.066, "std": 0.004},
+            "b1_deg": {"value": 0.22, "std": 0.05},
+        }
+        return ESTIMATE | changed
 
     async def way():
         analyses = quick_analyses(total=total)
@@ -177,7 +181,10 @@ def test_total_backlash_is_estimated_for_its_limit(db, tmp_path):
             await op.sees("UNDECIDED by limits outgoing", "estimating the total backlash, too, 50")
             going_on.set()
             await op.sees("PASS by limits outgoing.")
-            assert "PASS  b_t: 0.0660 \u00b1 0.0040 deg" in op.app.screen.copy_text()
+            said = op.app.screen.copy_text()
+            assert "PASS  b_t: 0.0660 \u00b1 0.0040 deg" in said
+            # The numbers told are those that are judged.
+            assert "b1 = 0.2200" in said
             await op.press("6", "5")
             await op.sees("PASS by limits outgoing.")
             assert asked == ["ADSS"]

@@ -246,7 +246,7 @@ is not estimated; A takes it as it stands. Ctrl+Y copies everything.
         if results.estimate is not None and desk.unit is not None:
             diagnosis = None if results.diagnosis is None else results.diagnosis.to_json()
             lines += answer_lines(
-                results.estimate, diagnosis, desk.unit, results.doubt, results.judgement
+                results.estimate_told, diagnosis, desk.unit, results.doubt, results.judgement
             )
             if diagnosis is None:
                 below += [f"warning: {text}" for text in results.estimate.get("warnings", ())]

@@ -65,6 +65,13 @@ class Results:
     """Whether it is taken as it stands, also if it looks like a mistake."""
 
     @property
+    def estimate_told(self) -> Mapping[str, Any] | None:
+        """The estimate that is told: the one that is judged, where the total is limited."""
+        by_total = self.judgement is not None and self.judgement.limits.limits_total
+        found = self.total if by_total else None
+        return self.estimate if found is None or found.get("failed") else found
+
+    @property
     def doubt(self) -> str:
         """Why no limit is passed or failed by this measurement; empty if nothing is known."""
         from analysis.observation.incomplete import state_doubt
