@@ -59,6 +59,8 @@ def refine_parameters(
 ) -> ParameterPosterior:
     """Mean (d,) and covariance (d, d) of the coordinates, after runs about where they lie.
 
+    The ratio of a drive with one stage is 1 wherever they lie: its plain model gets no runs.
+
     Raises
     ------
     AnalysisError
@@ -67,18 +69,23 @@ def refine_parameters(
     key = candidate.hypothesis.effects
     about = {key: datasheet_range(candidate)}
     found = estimate_parameters(candidate, observation, rng, _ENOUGH)
+    one_stage = unit.stages == 1
+    free = slice(1, None) if one_stage else slice(None)
     widest: list[float] = []
     most_s = max(_SWEEPS * sum(plan.duration_s for plan, _ in observation.plans), _LEAST_S)
     with counting() as effort:
         while len(widest) < _ROUNDS and effort.worth_s <= most_s:
-            std = np.sqrt(np.diag(found.covariance))
+            std = np.sqrt(np.diag(found.covariance))[free]
+            if not std.size:
+                break
             widest.append(std.max())
-            if std[0] > _BLUNT:
+            if not one_stage and std[0] > _BLUNT:
                 learned = len(candidate.population) >= _ENOUGH
             else:
                 stalled = len(widest) > _BACK and widest[-1] > _WORTHWHILE * widest[-1 - _BACK]
                 learned = widest[-1] <= _SHARP or stalled
-            if learned and np.all(candidate.population.places.std(axis=0) > _APART * std):
+            apart = candidate.population.places.std(axis=0)[free]
+            if learned and np.all(apart > _APART * std):
                 break
             groups = list(runs_around_estimate(candidate.hypothesis, found, _GROUPS, rng))
             made = simulate_groups(unit, groups, observation, rng, executor, about=about)[key]

@@ -11,6 +11,7 @@ from analysis.emulation.model_parameters import estimate_parameters
 from analysis.ensemble.model import Hypothesis
 from analysis.ensemble.runs import Group, simulate_groups
 from sim.engine.effort import counting, spend
+from sim.unit import load_unit
 
 TRUE = ("load-inertia",)
 HIDDEN = np.array([0.5, 0.5])
@@ -45,6 +46,20 @@ class Looking:
             self.world,
             progress,
         )
+
+
+def test_ratio_of_one_stage_is_not_refined():
+    """Plain there is nothing to size, and beside a cause the ratio asks for no rounds."""
+    one_stage = load_unit("feed-axis")
+    looking, rounds = Looking(scatter=0.6), {}
+    plain = synthetic.candidate(looking.seen, (), scatter=0.6)
+    for name, candidate in (("plain", plain), ("cause", looking.candidate)):
+        world = synthetic_runs.World(0.6)
+        arguments = candidate, looking.seen, np.random.default_rng(0), world
+        refine_parameters(one_stage, *arguments)
+        rounds[name] = len(world.rounds)
+    assert rounds["plain"] == 0
+    assert rounds["cause"] <= 1
 
 
 def stds(posterior):
