@@ -27,7 +27,7 @@ def test_heavier_load_is_found_on_one_stage(asked, tmp_path):
     )
     hidden = EffectSetting("load-inertia", {"J_L": GROWN * unit.load.J_L})
     words = []
-    for seed in (77, 79):
+    for seed in (77,) if asked == FEW else (77, 79):
         response = simulate(unit, 1.0, plan, effects=[hidden], seed=seed)
         found = diagnose_response(
             response, unit, without=set(CATALOGUE) - asked, cache=tmp_path

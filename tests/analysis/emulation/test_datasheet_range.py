@@ -43,7 +43,7 @@ def test_sharp_resonance_off_datasheet_is_found(seed):
     off = spread.sigmas * rng.choice([-0.6, 0.6], len(spread))
     made = unit.with_parameters(**{s: known[s] * (1.0 + d) for s, d in spread.deviations(off)})
     frequencies = tuple(np.linspace(15.0, 60.0, 31))
-    plan = SweepPlan(frequencies, (2.0, 4.5))
+    plan = SweepPlan(frequencies, (2.0, 4.5), settle_cycles=6, integrate_cycles=8)
     seen = observe(simulate(made, 1.0, plan, seed=seed))
     pool = ModelPool(unit, seen, rng, None, None)
     place = {(): (PLACE, (0.3, np.empty(0)))}

@@ -14,7 +14,7 @@ from sim.unit import load_unit
 from tui.cli import main
 
 PLAN = SweepPlan(
-    spaced_frequencies(100.0, 180.0, 21), (1.5, 4.0), settle_cycles=6, integrate_cycles=8
+    spaced_frequencies(100.0, 180.0, 15), (1.5, 4.0), settle_cycles=4, integrate_cycles=6
 )
 
 

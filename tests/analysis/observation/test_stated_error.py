@@ -128,8 +128,11 @@ def test_written_file_states_meaning_of_its_errors(swept, suffix, tmp_path):
     assert error_doubts([back]) == []
 
 
-def test_estimate_states_which_error_it_used(swept, tmp_path, capsys):
-    answers = {}
+def test_estimate_states_which_error_it_used(tmp_path, capsys):
+    few = replace(
+        PLAN, frequencies_hz=PLAN.frequencies_hz[::3], settle_cycles=5, integrate_cycles=6
+    )
+    swept, answers = simulate(load_unit("adss"), 0.5, few), {}
     for name, errors in (("constant", 0.05), ("none", np.nan)):
         path = tmp_path / f"{name}.csv"
         write_response(foreign(swept, errors), path)
