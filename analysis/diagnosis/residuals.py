@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import stdtr
 
 from analysis.emulation.fitted_model import FittedModel
 from analysis.observation.observation import Observation
@@ -82,12 +82,20 @@ def find_residuals(candidate: FittedModel, observation: Observation) -> tuple[Re
                         _sweep_of(int(band[0]), observation),
                     )
                 )
-                chance.append(2.0 * stats.t.sf(abs(sigma), len(runs) - 1))
+                chance.append(2.0 * float(stdtr(len(runs) - 1, -abs(sigma))))
     if not found:
         return ()
-    kept = stats.false_discovery_control(chance) <= _FALSE_DISCOVERIES
+    kept = np.array(chance) <= _largest_discovery(np.array(chance))
     real = [one for one, keep in zip(found, kept, strict=True) if keep]
     return tuple(sorted(real, key=lambda one: -abs(one.sigma)))
+
+
+def _largest_discovery(chance: NDArray[np.float64]) -> float:
+    """The largest chance that counts by the rule of Benjamini and Hochberg; -1.0 for none."""
+    ranked = np.sort(chance)
+    share = np.arange(1, len(ranked) + 1) / len(ranked)
+    (counts,) = np.nonzero(ranked <= _FALSE_DISCOVERIES * share)
+    return float(ranked[counts[-1]]) if counts.size else -1.0
 
 
 def _sweep_of(row: int, observation: Observation) -> int | None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from analysis.time_records.points import Points
 from daq.errors import AnalysisError
@@ -97,6 +97,6 @@ def _solved(
     # Mean square of one component of the noise of a line, of neighbouring groups together.
     variance = np.sum(np.abs(left) ** 2, axis=1) / (2 * dof)
     gain = theta[:, 0] / scale
-    variance *= (student.ppf(0.975, 2 * dof) / 1.96) ** 2
+    variance *= (stdtrit(2 * dof, 0.975) / 1.96) ** 2
     error = np.sqrt(variance * np.sum(np.abs(inverse[:, 0]) ** 2, axis=1)) / scale
     return gain, np.asarray(error / np.maximum(np.abs(gain), 1e-300))

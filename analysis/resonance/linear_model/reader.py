@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaincc
-from scipy.stats import t as student
+from scipy.special import gammaincc, stdtrit
 
 from analysis.resonance.linear_model.choice import Choice, choose
 from analysis.resonance.linear_model.extrema import Extremum, find_extrema, zeta_position
@@ -152,7 +151,7 @@ def _inflation(fit: Fit, samples: Samples, used: NDArray[np.intp]) -> float | st
     inflation = max(1.0, fit.scale) if known else fit.scale
     if not known or fit.scale > 1.0:
         # A scatter learned from few readings is itself uncertain.
-        inflation *= float(student.ppf(0.975, max(fit.dof, 1)) / 1.96)
+        inflation *= float(stdtrit(max(fit.dof, 1), 0.975) / 1.96)
     if not white:
         c = min(correlation, _GREATEST_CORRELATION)
         inflation *= math.sqrt((1.0 + c) / (1.0 - c))
