@@ -5,6 +5,7 @@ and how long an example takes says nothing. Without kept bytecode each of the so
 that they start compiles its imports, which doubles its processor time.
 """
 
+import gc
 import os
 import signal
 import subprocess
@@ -34,6 +35,17 @@ def pytest_collection_modifyitems(items):
     """Files with slow tests go first: at the end a core would wait for one of them alone."""
     slow = {item.path for item in items if item.get_closest_marker("slow")}
     items.sort(key=lambda item: item.path not in slow)
+
+
+def pytest_collection_finish():
+    """What collecting has made stays to the end: no search for garbage goes through it again.
+
+    And searches are rarer. Of 8.7 s of some tests, most of them of the screen, they took 2.3 s;
+    of 6.9 s they take 0.5 s.
+    """
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(10_000)
 
 
 @pytest.fixture

@@ -10,6 +10,7 @@ from daq.store import Store
 from tui.app.application import BenchApp
 from tui.app.messages import InstrumentsListed
 from tui.app.state.analyses import Analyses
+from tui.measure_options import PlanOptions
 
 SIZES = [(80, 24), (120, 40), (200, 60)]
 
@@ -131,7 +132,7 @@ class Operator:
 
     async def sees(self, *words, within_s=20.0) -> str:
         """The screen, once all words stand on it."""
-        end = time.monotonic() + within_s
+        end, wait_s = time.monotonic() + within_s, 0.03
         while True:
             screen = self.screen
             if all(word in screen for word in words):
@@ -139,7 +140,9 @@ class Operator:
             assert time.monotonic() < end, f"{words} not on the screen:\n{screen}"
             # A machine that is busy with other things is no fault of the screen.
             with suppress(WaitForScreenTimeout):
-                await self.pilot.pause(0.03)
+                await self.pilot.pause(wait_s)
+            # Each look draws all of the screen: what takes long is looked for less often.
+            wait_s = min(1.3 * wait_s, 0.3)
 
     async def types(self, selector, text):
         field = self.app.screen.query_one(selector)
@@ -208,12 +211,21 @@ def begun(db):
         return [m for m in store.measurements() if m.points][-1]
 
 
+async def starts(op, url, points="16", cycles=("6", "6")):
+    """Start a sweep without the steps before it, each of which `test_app_way.py` takes."""
+    while op.app.desk.unit is None:
+        await op.pilot.pause(0.05)
+    op.app.desk.url = url
+    op.app.desk.options = PlanOptions(
+        (2.5,), 115.0, 160.0, int(points), None, None, *map(int, cycles)
+    )
+    assert op.app.keeper.start(hold=False)
+    await op.press("4")
+
+
 async def sweeping(op, url, **plan):
-    """Go to a sweep that has a few points."""
-    await op.connects(url)
-    await op.plans(**plan)
-    await op.checks()
-    await op.press("ctrl+n", "s")
+    """Start a sweep and wait until it has a few points."""
+    await starts(op, url, **plan)
     await some_points(op)
 
 

@@ -2,6 +2,8 @@
 
 import logging
 import shlex
+import shutil
+from pathlib import Path
 
 import pytest
 from outputs.screen import ESTIMATE, operated, quick_analyses, run
@@ -19,15 +21,21 @@ BAND = ["--level", "2.5", "--start", "120", "--stop", "160", "--points", "9"]
 
 
 @pytest.fixture
-def db(tmp_path):
+def db(measured, tmp_path):
+    """A copy for each test: what one keeps in it is not another's."""
+    return Path(shutil.copy(measured, tmp_path / "bench.db"))
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
     """Two complete sessions, the first of them estimated."""
-    path = tmp_path / "bench.db"
+    path = tmp_path_factory.mktemp("history") / "bench.db"
     words = ["measure", "--unit", "adss", "--db", str(path), *BAND, *SHORT]
     for seed in (1, 2):
         assert main([*words, "--instrument", f"sim:?seed={seed}"]) == 0
     with Store(path) as store:
-        measured = store.measurement(1)
-    keep_estimate(path, measured, ESTIMATE)
+        first = store.measurement(1)
+    keep_estimate(path, first, ESTIMATE)
     return path
 
 

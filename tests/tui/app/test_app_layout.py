@@ -49,7 +49,9 @@ def judged():
     return quick_analyses(diagnose=lambda *_: Diagnosed(DIAGNOSIS | {"prediction": told}))
 
 
-@pytest.mark.parametrize("size", [(80, 24), (140, 40), (200, 60)])
+@pytest.mark.parametrize(
+    "size", [(80, 24), (140, 40), pytest.param((200, 60), marks=pytest.mark.long)]
+)
 def test_the_history_shows_every_answer_whole(db, size):
     async def way():
         async with operated(db, size) as op:

@@ -77,7 +77,11 @@ async def holds(op, words=SHOWN, within_s=20.0):
     raise AssertionError(f"{words!r} is not on the screen:\n{op.screen}")
 
 
-@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+@pytest.mark.parametrize(
+    "size",
+    [pytest.param(SIZES[0], marks=pytest.mark.long), SIZES[1]],
+    ids=lambda size: f"{size[0]}x{size[1]}",
+)
 def test_hostile_history_is_plain_text_on_screens(tmp_path, monkeypatch, size):
     folder = tmp_path / "[b]bench[/x]"
     folder.mkdir(parents=True)

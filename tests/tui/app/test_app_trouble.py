@@ -16,6 +16,7 @@ from outputs.screen import (
     quick_analyses,
     run,
     some_points,
+    starts,
     sweeping,
 )
 
@@ -84,10 +85,7 @@ def test_dropped_connection_opens_dialog_and_resumes(tmp_path):
 
     async def way(url):
         async with operated(db) as op:
-            await op.connects(url)
-            await op.plans()
-            await op.checks()
-            await op.press("ctrl+n", "s")
+            await starts(op, url)
             screen = await op.sees("The session was interrupted", "points are kept")
             assert isinstance(op.app.screen, ErrorDialog)
             assert "Traceback" not in screen
@@ -136,10 +134,7 @@ def test_overload_is_marked_by_shape_and_words(tmp_path):
 
     async def way(url):
         async with operated(db) as op:
-            await op.connects(url)
-            await op.plans()
-            await op.checks()
-            await op.press("ctrl+n", "s")
+            await starts(op, url)
             screen = await op.sees("16 of 16 points stored; complete", "1 flagged")
             assert "! overload" in screen
             plot = screen.partition("gain, dB")[2].partition("phase, deg")[0]
@@ -164,9 +159,7 @@ def test_proposed_sweep_starts_by_one_key(tmp_path):
         analyses = quick_analyses(diagnose=diagnose)
         async with operated(db, (120, 40), analyses=analyses) as op:
             await op.connects(url)
-            await op.plans()
-            await op.checks()
-            await op.press("ctrl+n", "s")
+            await starts(op, url)
             await op.sees("complete")
             await op.press("ctrl+n", "ctrl+n", "d")
             await op.sees("MEASURE THIS NEXT", "shaft-stiffness", "3 from 120 to 140 Hz")
@@ -189,14 +182,11 @@ def test_band_picked_on_plot_is_remeasured(tmp_path):
 
     async def way(url):
         async with operated(db) as op:
-            await op.connects(url)
-            await op.plans()
-            await op.checks()
-            await op.press("ctrl+n", "s")
+            await starts(op, url)
             await op.sees("complete")
-            await op.goes_to(1)
+            await op.press("1")
             await op.types("#notes", "for the next one")
-            await op.goes_to(4)
+            await op.press("escape", "4")
             await op.press("left", "b")
             await op.sees("Band from")
             await op.press("right", "right", "right", "b")
@@ -310,8 +300,7 @@ def test_points_stay_visible_when_resuming_fails(tmp_path):
             await op.sees("#1 interrupted", "1 interrupted: Enter on RESUME goes on")
             done = op.app.desk.run.done
             op.app.desk.url = "TCPIP::127.0.0.1::1::SOCKET"
-            await op.goes_to(4)
-            await op.press("r")
+            await op.press("4", "r")
             await op.sees("The session did not begin")
             await op.press("escape")
             await op.sees(f"{done} of 2800 points stored; interrupted")
@@ -345,10 +334,7 @@ def test_failed_analysis_is_reported_and_isolated(tmp_path):
     async def way():
         analyses = quick_analyses(estimate=broken)
         async with operated(tmp_path / "bench.db", analyses=analyses) as op:
-            await op.connects("sim:")
-            await op.plans()
-            await op.checks()
-            await op.press("ctrl+n", "s")
+            await starts(op, "sim:")
             await op.sees("complete")
             await op.press("ctrl+n")
             screen = await op.sees("NO ESTIMATE: internal fault (ZeroDivisionError)", "ARF")

@@ -7,7 +7,11 @@ from outputs.screen import SIZES, operated, run
 from daq.store import Store
 
 
-@pytest.mark.parametrize("size", [SIZES[0], SIZES[-1]], ids=lambda size: f"{size[0]}x{size[1]}")
+@pytest.mark.parametrize(
+    "size",
+    [SIZES[0], pytest.param(SIZES[-1], marks=pytest.mark.long)],
+    ids=lambda size: f"{size[0]}x{size[1]}",
+)
 def test_all_seven_steps_run_in_order(tmp_path, monkeypatch, size):
     monkeypatch.chdir(tmp_path)
     db = tmp_path / "bench.db"

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from outputs.pictured import make_history, said_by, words_of
-from outputs.screen import operated, run, sweeping
+from outputs.screen import operated, run, some_points
 from textual.pilot import WaitForScreenTimeout
 
 PICTURES = Path(__file__).parents[3] / "docs" / "pictures"
@@ -72,7 +72,11 @@ def test_the_sweep_is_pictured_with_todays_words(tmp_path):
     async def look():
         async with operated(tmp_path / "bench.db", SIZE) as op:
             await op.types("#serial", "SN 7")
-            await sweeping(op, "sim:?ratio=0.3&seed=1&speed=realtime", **PLAN)
+            await op.connects("sim:?ratio=0.3&seed=1&speed=realtime")
+            await op.plans(**PLAN)
+            await op.checks()
+            await op.press("ctrl+n", "s")
+            await some_points(op)
             op.app.keeper.pause()
             await op.sees("Paused")
             await op.press("left")
