@@ -158,6 +158,10 @@ def table(path):
             true = EFFECTS[one["hidden"].partition("=")[0]]
             counted.setdefault("hidden: named first", []).append(named[:1] == [true])
             counted.setdefault("hidden: named alone", []).append(named == [true])
+        if one["true"]["ratio"] == 1.0 and not one["hidden"]:
+            low, high = one["estimate"]["b_t_deg"]["interval95"]
+            inside = low <= one["true"]["b_t_deg"] <= high
+            counted.setdefault("backlash of one stage within its 95 % interval", []).append(inside)
         if one["true"]["ratio"] < 1.0:
             told = one["ratio"]["extended"]
             off = abs(told["value"] - one["true"]["ratio"])
