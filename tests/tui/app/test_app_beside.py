@@ -64,7 +64,7 @@ def test_event_loop_opens_no_bench_file(db, tmp_path, monkeypatch):
                 await op.press("7")
                 await op.sees("[7 Report]", "9/9")
                 await op.press("u", "space", "down", "space", "o")
-                await op.sees("line #2 2.5 V")
+                await op.sees("\u25cf #2  \u25a0 #1")
                 await op.press("enter")
                 await op.sees("[5 Result]", "r = 0.310")
                 await op.press("ctrl+y")
