@@ -2,6 +2,7 @@
 
 import pytest
 from outputs.screen import operated, run
+from textual.events import Key
 
 from daq.configs import config_path
 from daq.errors import ConfigurationError
@@ -108,6 +109,26 @@ def test_bench_file_limits_sweep_and_is_stored(tmp_path, weak_bench):
 def test_missing_bench_file_is_refused_before_screen(capsys):
     assert main(["bench", "--bench", "nowhere.toml"]) == 2
     assert "nowhere.toml" in capsys.readouterr().err
+
+
+def test_enter_takes_all_that_was_typed(tmp_path):
+    """Keys that come faster than the screen works them off."""
+
+    async def way():
+        async with operated(tmp_path / "bench.db") as op:
+            await op.connects("sim:")
+            await op.goes_to(3)
+            await op.press("p")
+            await op.sees("The sweep")
+            levels = op.app.screen.query_one("#plan-levels")
+            levels.value = ""
+            levels.focus()
+            await op.pilot.pause()
+            for key, sign in (("1", "1"), ("full_stop", "."), ("5", "5"), ("enter", "\r")):
+                op.app.post_message(Key(key, sign))
+            await op.sees("[3 Check]", "at 1.5 V peak")
+
+    run(way)
 
 
 def test_refused_plan_keeps_dialog_and_recipe_optional(tmp_path):

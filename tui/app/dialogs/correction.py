@@ -35,10 +35,7 @@ class CorrectionDialog(ModalScreen[tuple[str, dict[str, str]] | None]):
         Who is likely to correct.
     """
 
-    BINDINGS = [
-        Binding("escape", "leave", "Leave it", priority=True),
-        Binding("enter", "take", "Correct it", priority=True),
-    ]
+    BINDINGS = [Binding("escape", "leave", "Leave it", priority=True)]
 
     DEFAULT_CSS = """
     CorrectionDialog { align: center middle; }
@@ -74,8 +71,9 @@ class CorrectionDialog(ModalScreen[tuple[str, dict[str, str]] | None]):
         """Close without a change."""
         self.dismiss(None)
 
-    def action_take(self) -> None:
+    def on_input_submitted(self, event: Field.Submitted) -> None:
         """Read the fields; stay where one is wrong."""
+        event.stop()
         person = self._text("person")
         changes = {
             name: self._text(name)

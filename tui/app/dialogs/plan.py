@@ -61,10 +61,7 @@ class PlanDialog(ModalScreen[PlanChoice | None]):
         Called with each choice; closes the dialog by `accept`, or has it say why by `refuse`.
     """
 
-    BINDINGS = [
-        Binding("escape", "leave", "Keep the old plan", priority=True),
-        Binding("enter", "take", "Take it", priority=True),
-    ]
+    BINDINGS = [Binding("escape", "leave", "Keep the old plan", priority=True)]
 
     DEFAULT_CSS = """
     PlanDialog { align: center middle; }
@@ -107,8 +104,9 @@ class PlanDialog(ModalScreen[PlanChoice | None]):
         """Close without a change."""
         self.dismiss(None)
 
-    def action_take(self) -> None:
+    def on_input_submitted(self, event: Field.Submitted) -> None:
         """Read the fields; stay where one is wrong."""
+        event.stop()
         try:
             choice = self._choice()
         except ValueError as error:
