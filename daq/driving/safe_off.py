@@ -72,8 +72,14 @@ class Attempt(Generic[_Talk]):
         self._budget = Deadline.after(budget_s)
         self._deaf = Deadline.after(_DEAF_S)
 
-    def act(self, what: str, action: Callable[[], str]) -> str | None:
-        """Try one thing; its result, None if it failed."""
+    def act(self, what: str, action: Callable[[], str], *, asks: bool = False) -> str | None:
+        """Try one thing; its result, None if it failed.
+
+        Parameters
+        ----------
+        asks
+            It ends well only where the instrument answered.
+        """
         self.dialogue.reply_s = self.bound(_REPLY_S)
         try:
             result = action()
@@ -84,6 +90,7 @@ class Attempt(Generic[_Talk]):
             fault = f"{type(error).__name__}: {error}"
             self.steps.append(Step(what, fault, failed=True))
             return None
+        self.answered = self.answered or asks
         self.steps.append(Step(what, result, failed=False))
         return result
 
@@ -109,9 +116,7 @@ class Attempt(Generic[_Talk]):
             result = f"not asked, as nothing was answered in {_DEAF_S:g} s"
             self.steps.append(Step(line, result, failed=True))
             return None
-        reply = self.act(line, lambda: self.dialogue.ask(line))
-        self.answered = self.answered or reply is not None
-        return reply
+        return self.act(line, lambda: self.dialogue.ask(line), asks=True)
 
     def pause(self, seconds: float) -> str:
         """Let time pass, announced; for use as an action."""

@@ -79,7 +79,7 @@ def _go_quiet(attempt: Attempt[Dialogue]) -> None:
     attempt.send("INIT:CONT OFF")
     attempt.send("SOUR:VOLT 0 VPK")
     attempt.send("SOUR:VOLT:OFFS 0 V")
-    attempt.act("wait for the ramp", lambda: _ramp(attempt))
+    attempt.act("wait for the ramp", lambda: _ramp(attempt), asks=True)
     attempt.send("INST:SEL FFT")
     attempt.send("SOUR:VOLT 0 VPK")
     attempt.send("SOUR:VOLT:OFFS 0 V")

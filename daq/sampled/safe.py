@@ -37,7 +37,7 @@ def make_safe(transport: Transport, told: Callable[[float], None] | None) -> Saf
     attempt.act("device clear", cleared)
     for line in ("ACQ:HALT", "SOUR:VOLT 0", "SOUR:OFFS 0"):
         attempt.send(line)
-    attempt.act("wait for the ramp", at_rest)
+    attempt.act("wait for the ramp", at_rest, asks=True)
     proven = _is_at_rest(attempt)
     if not proven:
         attempt.send("*RST")

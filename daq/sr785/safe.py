@@ -87,7 +87,7 @@ def _go_quiet(attempt: Attempt[Dialogue]) -> None:
     attempt.send(f"OUTX {attempt.dialogue.interface}")
     attempt.send("SRCO 0")
     attempt.send("PAUS")
-    attempt.act("wait for the ramp", lambda: _ramp(attempt))
+    attempt.act("wait for the ramp", lambda: _ramp(attempt), asks=True)
     for line in _ZERO:
         attempt.send(line)
     # Each question also lets the commands before it be worked off: the buffer is short.

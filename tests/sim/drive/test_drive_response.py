@@ -52,8 +52,10 @@ def test_drive_with_backlash_matches_independent_plant(name):
     )
     off = ours.mean(axis=0) / theirs.mean(axis=0) - 1.0
     scatter = np.hypot(ours.std(axis=0), theirs.std(axis=0)) / np.abs(ours.mean(axis=0)) / 2.0
-    # An independent integrator is off by its numerical damping; the start is another one.
-    assert np.all(np.abs(off) < 4.0 * scatter + 0.03), (off, scatter)
+    # An independent integrator is off by its numerical damping; the start is another one. The
+    # scatter of four seeds is uncertain: by Student's t one comparison in 660 is farther off than
+    # 5.5 of it. Chaos makes each processor a draw of its own.
+    assert np.all(np.abs(off) < 5.5 * scatter + 0.03), (off, scatter)
 
 
 def test_held_command_is_late_by_half_sample():
