@@ -6,11 +6,10 @@ Owns its field. The search runs beside the screen and is told on its step.
 from __future__ import annotations
 
 from textual.app import ComposeResult
-from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
-from textual.screen import ModalScreen
 
 from daq.errors import InputError
+from tui.app.dialogs.form import FormDialog
 from tui.app.widgets.plain import Caption, Field, Words
 from tui.options import real_number
 from tui.unit_under_test import checked_minutes
@@ -18,7 +17,7 @@ from tui.unit_under_test import checked_minutes
 __all__ = ["BestPlanDialog"]
 
 
-class BestPlanDialog(ModalScreen[float | None]):
+class BestPlanDialog(FormDialog[float]):
     """Asks for minutes at the bench; None where no sweep is to be found.
 
     Parameters
@@ -29,18 +28,7 @@ class BestPlanDialog(ModalScreen[float | None]):
         What is likely.
     """
 
-    BINDINGS = [Binding("escape", "leave", "Leave it", priority=True)]
-
-    DEFAULT_CSS = """
-    BestPlanDialog { align: center middle; }
-    BestPlanDialog > #dialog {
-        width: 70; max-width: 96%; height: auto;
-        border: round $accent; background: $surface; padding: 0 1;
-    }
-    BestPlanDialog Caption { width: 18; }
-    BestPlanDialog Field { width: 12; }
-    BestPlanDialog #fault { color: $text-error; height: auto; }
-    """
+    DEFAULT_CSS = "BestPlanDialog Field { width: 12; }"
 
     def __init__(self, unit: str, minutes: float) -> None:
         super().__init__()
@@ -60,16 +48,12 @@ class BestPlanDialog(ModalScreen[float | None]):
             yield Words("", id="fault")
             yield Words("Enter finds it, Esc leaves the plan as it is")
 
-    def action_leave(self) -> None:
-        """Close without a search."""
-        self.dismiss(None)
-
     def on_input_submitted(self, event: Field.Submitted) -> None:
         """Read the field; stay where it is wrong."""
         event.stop()
         try:
             minutes = checked_minutes(real_number(event.value.strip()))
         except (InputError, ValueError) as error:
-            self.query_one("#fault", Words).update(str(error))
+            self.refuse(str(error))
             return
         self.dismiss(minutes)

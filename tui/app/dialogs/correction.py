@@ -9,12 +9,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from textual.app import ComposeResult
-from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
-from textual.screen import ModalScreen
 
 from daq.store_records import CORRECTABLE
 from daq.untrusted.visible_text import visible_line
+from tui.app.dialogs.form import FormDialog
 from tui.app.widgets.plain import Caption, Field, Words
 
 __all__ = ["CorrectionDialog"]
@@ -22,7 +21,7 @@ __all__ = ["CorrectionDialog"]
 _LABELS = {"serial": "serial number", "operator": "operator", "notes": "notes"}
 
 
-class CorrectionDialog(ModalScreen[tuple[str, dict[str, str]] | None]):
+class CorrectionDialog(FormDialog[tuple[str, dict[str, str]]]):
     """Asks for new values and who gives them; None where nothing is to be corrected.
 
     Parameters
@@ -35,18 +34,7 @@ class CorrectionDialog(ModalScreen[tuple[str, dict[str, str]] | None]):
         Who is likely to correct.
     """
 
-    BINDINGS = [Binding("escape", "leave", "Leave it", priority=True)]
-
-    DEFAULT_CSS = """
-    CorrectionDialog { align: center middle; }
-    CorrectionDialog > #dialog {
-        width: 70; max-width: 96%; height: auto;
-        border: round $accent; background: $surface; padding: 0 1;
-    }
-    CorrectionDialog Caption { width: 18; }
-    CorrectionDialog Field { width: 1fr; }
-    CorrectionDialog #fault { color: $text-error; height: auto; }
-    """
+    DEFAULT_CSS = "CorrectionDialog Field { width: 1fr; }"
 
     def __init__(self, measurement: int, values: Mapping[str, Any], person: str) -> None:
         super().__init__()
@@ -67,10 +55,6 @@ class CorrectionDialog(ModalScreen[tuple[str, dict[str, str]] | None]):
             yield Words("", id="fault")
             yield Words("Enter corrects it, Esc leaves it, Tab goes on; old values are kept")
 
-    def action_leave(self) -> None:
-        """Close without a change."""
-        self.dismiss(None)
-
     def on_input_submitted(self, event: Field.Submitted) -> None:
         """Read the fields; stay where one is wrong."""
         event.stop()
@@ -85,7 +69,7 @@ class CorrectionDialog(ModalScreen[tuple[str, dict[str, str]] | None]):
         for name, value in {"corrected by": person, **changes}.items():
             fault = fault if value.isprintable() else f"{name} is not one line of text"
         if fault:
-            self.query_one("#fault", Words).update(fault)
+            self.refuse(fault)
             return
         self.dismiss((person, changes) if changes else None)
 

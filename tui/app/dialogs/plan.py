@@ -10,11 +10,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from textual.app import ComposeResult
-from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
-from textual.screen import ModalScreen
 
 from daq.plan import SweepPlan
+from tui.app.dialogs.form import FormDialog
 from tui.app.state.desk import NO_RECIPE
 from tui.app.widgets.plain import Caption, Field, Words
 from tui.measure_options import PlanOptions
@@ -44,7 +43,7 @@ class PlanChoice:
     options: PlanOptions
 
 
-class PlanDialog(ModalScreen[PlanChoice | None]):
+class PlanDialog(FormDialog[PlanChoice]):
     """Asks for a plan; gives None where the old one is to stay.
 
     Parameters
@@ -61,18 +60,9 @@ class PlanDialog(ModalScreen[PlanChoice | None]):
         Called with each choice; closes the dialog by `accept`, or has it say why by `refuse`.
     """
 
-    BINDINGS = [Binding("escape", "leave", "Keep the old plan", priority=True)]
-
     DEFAULT_CSS = """
-    PlanDialog { align: center middle; }
-    PlanDialog > #dialog {
-        width: 70; max-width: 96%; height: auto;
-        border: round $accent; background: $surface; padding: 0 1;
-    }
-    PlanDialog Label { width: 18; }
     PlanDialog Input { width: 22; }
     PlanDialog .unit { width: 1fr; padding: 0 1; color: $text-muted; }
-    PlanDialog #fault { color: $text-error; height: auto; }
     """
 
     def __init__(
@@ -100,10 +90,6 @@ class PlanDialog(ModalScreen[PlanChoice | None]):
             yield Words("", id="fault")
             yield Words("Enter takes it, Esc keeps the old plan, Tab goes on", id="keys")
 
-    def action_leave(self) -> None:
-        """Close without a change."""
-        self.dismiss(None)
-
     def on_input_submitted(self, event: Field.Submitted) -> None:
         """Read the fields; stay where one is wrong."""
         event.stop()
@@ -112,17 +98,8 @@ class PlanDialog(ModalScreen[PlanChoice | None]):
         except ValueError as error:
             self.refuse(str(error))
             return
-        self.query_one("#fault", Words).update("")
+        self.refuse("")
         self._judge(self, choice)
-
-    def refuse(self, why: str) -> None:
-        """Stay open, with what was typed, and say why."""
-        self.query_one("#fault", Words).update(why)
-
-    def accept(self, choice: PlanChoice) -> None:
-        """Close with a choice, unless it was closed meanwhile."""
-        if self.is_current:
-            self.dismiss(choice)
 
     def _choice(self) -> PlanChoice:
         recipe = self._text("recipe") or NO_RECIPE
