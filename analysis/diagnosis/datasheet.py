@@ -32,11 +32,7 @@ def learn_datasheet(accepted: FittedModel, found: ParameterPosterior) -> tuple[D
     """
     surface, unit = accepted.surface, accepted.hypothesis.unit
     spread = spread_of(unit)
-    sizes, ways = np.linalg.eigh(found.covariance)
-    # These have the mean and the covariance of the answer.
-    steps = ways * np.sqrt(len(sizes) * np.maximum(sizes, 0.0))
-    low, high = surface.places.min(axis=0), surface.places.max(axis=0)
-    places = np.clip(found.mean + np.concatenate([steps.T, -steps.T]), low, high)
+    places = found.sigma_points(surface.places.min(axis=0), surface.places.max(axis=0))
     learned = [_departures(surface, place) for place in places]
     values = datasheet_values(
         unit, surface.observation, spread, np.ones(len(spread), dtype=bool), learned

@@ -85,17 +85,12 @@ def find_residuals(candidate: FittedModel, observation: Observation) -> tuple[Re
                 chance.append(2.0 * float(stdtr(len(runs) - 1, -abs(sigma))))
     if not found:
         return ()
-    kept = np.array(chance) <= _largest_discovery(np.array(chance))
+    # Half a second to load, which whoever only imports a diagnosis does not need.
+    from scipy.stats import false_discovery_control
+
+    kept = false_discovery_control(chance) <= _FALSE_DISCOVERIES
     real = [one for one, keep in zip(found, kept, strict=True) if keep]
     return tuple(sorted(real, key=lambda one: -abs(one.sigma)))
-
-
-def _largest_discovery(chance: NDArray[np.float64]) -> float:
-    """The largest chance that counts by the rule of Benjamini and Hochberg; -1.0 for none."""
-    ranked = np.sort(chance)
-    share = np.arange(1, len(ranked) + 1) / len(ranked)
-    (counts,) = np.nonzero(ranked <= _FALSE_DISCOVERIES * share)
-    return float(ranked[counts[-1]]) if counts.size else -1.0
 
 
 def _sweep_of(row: int, observation: Observation) -> int | None:

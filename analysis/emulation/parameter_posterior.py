@@ -53,6 +53,17 @@ class ParameterPosterior:
         weight = np.exp(-0.5 * (distance - distance.min()))
         return np.asarray(weight / weight.sum())
 
+    def sigma_points(
+        self, low: NDArray[np.float64], high: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Places (2 d, d) with this mean and covariance (Julier and Uhlmann 2004), cut to bounds.
+
+        `low`, `high` (d,).
+        """
+        sizes, ways = np.linalg.eigh(self.covariance)
+        steps = ways * np.sqrt(len(sizes) * np.maximum(sizes, 0.0))
+        return np.clip(self.mean + np.concatenate([steps.T, -steps.T]), low, high)
+
 
 def calibrate(
     observation: Observation,

@@ -130,11 +130,8 @@ def _datasheet(
     low, high = np.array([axis.low for axis in axes]), np.array([axis.high for axis in axes])
     width = 0.6 * np.array([axis.scale for axis in axes])
     emulator = _emulator(observation, population, width, spread)
-    sizes, ways = np.linalg.eigh(found.covariance)
-    # These have the mean and the covariance of the answer.
-    steps = ways * np.sqrt(len(sizes) * np.maximum(sizes, 0.0))
-    places = np.clip(found.mean + np.concatenate([steps.T, -steps.T]), low, high)
     used = np.any(population.deviations != 0.0, axis=0)
+    places = found.sigma_points(low, high)
     learned = [predicted_departures(observation, emulator.predict(place)) for place in places]
     return datasheet_values(unit, observation, spread, used, learned)
 

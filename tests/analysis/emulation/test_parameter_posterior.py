@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.emulation.parameter_posterior import calibrate
+from analysis.emulation.parameter_posterior import ParameterPosterior, calibrate
 from analysis.ensemble.runs import Population
 from analysis.observation.observation import observe, unread
 from analysis.observation.reading_noise import USUAL_NOISE_V
@@ -160,3 +160,12 @@ def test_intervals_cover_with_chatter_or_noise(noise_v):
     assert np.count_nonzero(np.abs(z) < 1.96) > 33
     # Evenly over its range it would be known to 0.29.
     assert np.median([np.sqrt(c.covariance[0, 0]) for c in found]) < 0.22
+
+
+def test_sigma_points_have_mean_and_covariance():
+    root = np.random.default_rng(3).normal(size=(3, 3))
+    found = ParameterPosterior(np.array([0.2, 0.5, -1.0]), root @ root.T)
+    places = found.sigma_points(np.full(3, -np.inf), np.full(3, np.inf))
+    np.testing.assert_allclose(places.mean(axis=0), found.mean)
+    np.testing.assert_allclose(np.cov(places.T, bias=True), found.covariance)
+    assert found.sigma_points(np.zeros(3), np.ones(3)).min() == 0.0
