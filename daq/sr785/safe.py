@@ -52,7 +52,7 @@ def make_safe(
         asked.
     """
     attempt = Attempt(Dialogue(transport, interface=interface), told, _BUDGET_S)
-    attempt.act("device clear", lambda: attempt.dialogue.recover() or "done")
+    attempt.act("device clear", lambda: attempt.dialogue.recover() or "done", asks=True)
     _go_quiet(attempt)
     proven = _proof(attempt)
     if not attempt.answered:

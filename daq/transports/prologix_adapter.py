@@ -113,7 +113,7 @@ class Adapter:
         """One line of answer to an adapter command, None if it stays silent."""
         self.send(command.encode("ascii"), deadline)
         line = self._next_line(deadline)
-        while line is not None and self._is_late(line) and not command.startswith("++ver"):
+        while line is not None and self._is_late(line):
             line = self._next_line(deadline)
         return line
 

@@ -34,11 +34,11 @@ def levels(tmp_path_factory):
 def test_resonances_agree_between_instruments(levels, driver, level):
     """Four comparisons of normal errors: by chance one in 400 is more than 3.5 of them apart."""
     first, other = levels[""][level], levels[driver][level]
-    for one, two in ((first.arf, other.arf), (first.rf, other.rf)):
+    # The error of an ARF that two or three chaotic points decide is uncertain itself: on one
+    # processor it is 0.4 Hz by one instrument and 3.3 Hz by the other.
+    for one, two, alike in ((first.arf, other.arf, 10.0), (first.rf, other.rf, 4.0)):
         assert one is not None
         assert two is not None
         apart_hz = abs(one.frequency_hz - two.frequency_hz)
         assert apart_hz < 3.5 * (one.std_hz**2 + two.std_hz**2) ** 0.5
-        # An error that two or three chaotic points decide is uncertain itself: on one processor
-        # 0.4 and 3.3 Hz at the same ARF.
-        assert 0.1 < one.std_hz / two.std_hz < 10.0
+        assert 1.0 / alike < one.std_hz / two.std_hz < alike
