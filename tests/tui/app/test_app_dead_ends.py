@@ -139,6 +139,7 @@ def test_refused_plan_keeps_dialog_and_recipe_optional(tmp_path):
             await op.sees("recipe adss (P: another or none)")
             await op.press("p")
             await op.sees("The sweep")
+            assert "name, file, none" in op.screen
             levels = op.app.screen.query_one("#plan-levels")
             levels.value = "1 4"
             await op.press("enter")

@@ -28,7 +28,10 @@ class BestPlanDialog(FormDialog[float]):
         What is likely.
     """
 
-    DEFAULT_CSS = "BestPlanDialog Field { width: 12; }"
+    DEFAULT_CSS = """
+    BestPlanDialog Caption { width: 18; }
+    BestPlanDialog Field { width: 12; }
+    """
 
     def __init__(self, unit: str, minutes: float) -> None:
         super().__init__()

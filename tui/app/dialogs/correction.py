@@ -34,7 +34,10 @@ class CorrectionDialog(FormDialog[tuple[str, dict[str, str]]]):
         Who is likely to correct.
     """
 
-    DEFAULT_CSS = "CorrectionDialog Field { width: 1fr; }"
+    DEFAULT_CSS = """
+    CorrectionDialog Caption { width: 18; }
+    CorrectionDialog Field { width: 1fr; }
+    """
 
     def __init__(self, measurement: int, values: Mapping[str, Any], person: str) -> None:
         super().__init__()

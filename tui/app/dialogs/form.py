@@ -29,7 +29,6 @@ class FormDialog(ModalScreen[_Result | None], Generic[_Result]):
         width: 70; max-width: 96%; height: auto;
         border: round $accent; background: $surface; padding: 0 1;
     }
-    FormDialog Caption { width: 18; }
     FormDialog #fault { color: $text-error; height: auto; }
     """
 

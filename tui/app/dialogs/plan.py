@@ -22,7 +22,7 @@ from tui.options import real_number
 __all__ = ["PlanChoice", "PlanDialog"]
 
 _FIELDS = (
-    ("recipe", "recipe", f"name, file or {NO_RECIPE}"),
+    ("recipe", "recipe", f"name, file, {NO_RECIPE}"),
     ("levels", "source levels", "V peak: 1 2.5"),
     ("start", "start", "Hz"),
     ("stop", "stop", "Hz"),
@@ -61,6 +61,7 @@ class PlanDialog(FormDialog[PlanChoice]):
     """
 
     DEFAULT_CSS = """
+    PlanDialog Label { width: 18; }
     PlanDialog Input { width: 22; }
     PlanDialog .unit { width: 1fr; padding: 0 1; color: $text-muted; }
     """
