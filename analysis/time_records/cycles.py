@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.signal import hilbert
 
@@ -59,13 +60,17 @@ def cycle_starts(record: TimeRecord) -> tuple[NDArray[np.float64], NDArray[np.fl
 def find_dwells(record: TimeRecord) -> list[Dwell]:
     """Stretches of one frequency and level, in the order of time."""
     starts, amplitude = cycle_starts(record)
+    begins = _where_even(starts)
     found: list[Dwell] = []
     first = 0
     while first + _FIRST < len(amplitude):
+        if not begins[first]:
+            # Straight to the next cycle at which a dwell may begin.
+            onwards = begins[first : len(amplitude) - _FIRST]
+            if not onwards.any():
+                break
+            first += int(np.argmax(onwards))
         last = _end_of_dwell(starts, amplitude, first)
-        if last is None:
-            first += 1
-            continue
         # The cycles at both ends carry the change.
         cycles = last - first - 2
         if cycles >= _LEAST_CYCLES:
@@ -80,16 +85,23 @@ def find_dwells(record: TimeRecord) -> list[Dwell]:
     return found
 
 
-def _end_of_dwell(
-    starts: NDArray[np.float64], amplitude: NDArray[np.float64], first: int
-) -> int | None:
-    """Index one past the last cycle that fits those before it; None where none begins here."""
+def _where_even(starts: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether the cycles from each one on (cycles - `_FIRST`,) follow one another evenly."""
+    if starts.size <= _FIRST:
+        return np.zeros(0, dtype=bool)
+    window = sliding_window_view(starts, _FIRST + 1)
+    k = np.arange(_FIRST + 1) - _FIRST / 2.0
+    period = window @ k / np.sum(k * k)
+    off = window - window.mean(axis=1)[:, None] - period[:, None] * k
+    return np.asarray((period > 0.0) & (np.abs(off).max(axis=1) <= _TURN * period))
+
+
+def _end_of_dwell(starts: NDArray[np.float64], amplitude: NDArray[np.float64], first: int) -> int:
+    """Index one past the last cycle that fits those before it, of a dwell that begins here."""
     t = starts[first : first + _FIRST + 1]
     n = t.size
     k = np.arange(n, dtype=float)
     period = float(np.sum((k - k.mean()) * t) / np.sum((k - k.mean()) ** 2))
-    if not period > 0.0 or np.max(np.abs(t - t.mean() - period * (k - k.mean()))) > _TURN * period:
-        return None
     level = float(np.median(amplitude[first + 1 : first + _FIRST]))
     sums = np.array([n, k.sum(), (k * k).sum(), t.sum(), (k * t).sum()])
     strange = 0
