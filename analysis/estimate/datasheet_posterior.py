@@ -132,11 +132,13 @@ def _effects(unit: Unit, observation: Observation, spread: Spread) -> NDArray[np
 
 
 def datasheet_lines(document: Mapping[str, Any]) -> list[str]:
-    """The same in words, of a document that holds it."""
+    """The same in words, of a document that holds it; a value of zero has no share to be told."""
     values = document.get("datasheet") or {}
     told, silent = [], []
     for symbol, one in values.items():
-        size = abs(one["datasheet"]) or 1.0
+        size = abs(one["datasheet"])
+        if not size:
+            continue
         if one["determined"]:
             off = 100.0 * (one["value"] - one["datasheet"]) / size
             told.append(

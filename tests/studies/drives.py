@@ -1,7 +1,7 @@
 """Published drives, measured by the independent plant and judged, with no cause or one hidden.
 
-    python tests/studies/drives.py UNIT [CAUSE=FACTOR] [--points N] [--seed N] [--drawn] [--out FILE]
-    python tests/studies/drives.py --every FILE
+    python tests/studies/drives.py UNIT [CAUSE=FACTOR] [--points N] [--seed N] [--drawn]
+    python tests/studies/drives.py --every FILE [--points N]
     python tests/studies/drives.py --table FILE
 
 CAUSE is a number of the plant (J_L, k_s1, B_m, k_a ...) and is multiplied by FACTOR. Prints a line

@@ -17,7 +17,7 @@ from analysis.observation.joint import sweep_lines
 from analysis.selection.wording import verdict_words
 from daq.untrusted.visible_text import visible_line
 from tui.app.plot.palette import Palette
-from tui.app.plot.tables import LEAST_TOLD, bar, departure_grid
+from tui.app.plot.tables import LEAST_TOLD, bar, datasheet_table, departure_grid
 from tui.text.symbols import named_symbol, printed_unit
 
 __all__ = ["diagnosis_lines", "next_sentence"]
@@ -52,6 +52,8 @@ def diagnosis_lines(
     if document.get("shape"):
         lines.append(_said(f"left by the plain model: {document['shape']}"))
     lines += map(_said, sweep_lines(document.get("sweeps", ())))
+    if known := datasheet_table(document.get("datasheet") or {}):
+        lines += [Content(""), *map(_said, known)]
     lines += map(_said, believed_lines(document))
     lines += [_said(f"warning: {text}") for text in document.get("warnings", ())]
     if document.get("unseen"):

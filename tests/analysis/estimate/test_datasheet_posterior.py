@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.estimate import estimate_response
+from analysis.estimate.datasheet_posterior import datasheet_lines
 from daq.plan import SweepPlan
 from sim.response import simulate
 from sim.unit import load_unit
@@ -46,3 +47,8 @@ def test_summary_tells_both_kinds(answer):
 
 def test_exact_values_are_not_told(answer):
     assert set(answer.to_json()["datasheet"]) == {"J_L", "R_m", "k_g1", "k_ts"}
+
+
+def test_value_of_zero_is_not_told():
+    nothing = dict.fromkeys(("datasheet", "datasheet_std", "value", "std"), 0.0)
+    assert datasheet_lines({"datasheet": {"B_m": nothing | {"determined": False}}}) == []

@@ -96,3 +96,44 @@ def test_probability_of_nothing_hidden_is_shown(tmp_path):
     assert "x (probability 0.30) is not ruled out" in text
     assert "1 band departs from the plain model, by up to 6.9 sigma" in text
     assert "no further cause is needed" not in text
+
+
+MEASURED = {
+    "k_s1": {"datasheet": 22.8, "datasheet_std": 3.42, "value": 19.61, "std": 0.524,
+             "determined": True},
+    "J_L": {"datasheet": 2.75e-3, "datasheet_std": 1.375e-4, "value": 2.7495e-3, "std": 1.8e-5,
+            "determined": True},
+    "B_m": {"datasheet": 0.0, "datasheet_std": 0.0, "value": 0.0, "std": 0.0,
+            "determined": False},
+    "J_g1": {"datasheet": 2.34e-5, "datasheet_std": 2.34e-6, "value": 2.34e-5, "std": 2.33e-6,
+             "determined": False},
+}  # fmt: skip
+
+
+def test_measured_datasheet_values_fit_the_screen(tmp_path):
+    """In 80 by 24 characters, each row whole; what is zero has no share."""
+    seen = []
+
+    async def way():
+        async with operated(tmp_path / "bench.db", (80, 24)) as op:
+            op.app.desk.measurement, op.app.desk.unit = 1, load_unit("adss")
+            op.app.desk.results.diagnosis = Diagnosed(EXPLAINED | {"datasheet": MEASURED})
+            op.app.go(6)
+            await op.sees("[6 ")
+            await op.press("end")
+            seen.append(await op.sees("not determined by this sweep: J_g1"))
+
+    run(way)
+    for row in (
+        "                   measured            datasheet              off by",
+        "k_s1 N\u00b7m/rad          19.61 +- 2.3 %        22.8 +- 15 %     -14.0 %",
+        "J_L kg\u00b7m\u00b2           0.00275 +- 0.65 %    0.00275 +- 5 %       +0.0 %",
+    ):
+        assert row in seen[0]
+    assert "B_m" not in seen[0]
+
+
+def test_undecided_diagnosis_shows_no_measured_values(tmp_path):
+    text = shown(tmp_path, 6, ESTIMATE, DIAGNOSIS | {"datasheet": {}})
+    assert "Datasheet values by this sweep" not in text
+    assert "not determined" not in text

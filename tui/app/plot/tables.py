@@ -1,4 +1,4 @@
-"""Pictures made of text: departures by level and band, and bars of probability.
+"""Pictures made of text: departures by level and band, bars of probability, datasheet values.
 
 Owns their layout. Colour repeats what signs and digits say. It knows no widget.
 """
@@ -10,9 +10,11 @@ from typing import Any
 
 from textual.content import Content
 
+from sim.datasheet.catalogue_units import unit_in_files
 from tui.app.plot.palette import Palette
+from tui.text.symbols import printed_unit
 
-__all__ = ["LEAST_TOLD", "bar", "departure_grid"]
+__all__ = ["LEAST_TOLD", "bar", "datasheet_table", "departure_grid"]
 
 LEAST_TOLD = 0.005
 """What is believed less is 0.00 in two digits, and not told."""
@@ -64,6 +66,42 @@ def departure_grid(
     if left > 0:
         lines.append(Content(f"and {left} bands that depart less"))
     return lines
+
+
+def datasheet_table(values: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """What the sweep says of each datasheet value beside its tolerance; in 69 columns.
+
+    Parameters
+    ----------
+    values
+        The field ``datasheet`` of a diagnosis: those first of which most was learned. Values of
+        zero are left out.
+    """
+    known = {symbol: one for symbol, one in values.items() if one["datasheet"]}
+    told = [(symbol, one) for symbol, one in known.items() if one["determined"]]
+    silent = [symbol for symbol, one in known.items() if not one["determined"]]
+    lines = []
+    if told:
+        lines = [
+            "Datasheet values by this sweep, each with one standard deviation",
+            f"{'measured':>28}{'datasheet':>21}{'off by':>20}",
+        ]
+    for symbol, one in told:
+        size = abs(one["datasheet"])
+        off = round(100.0 * (one["value"] - one["datasheet"]) / size, 1) + 0.0
+        name = f"{symbol}{printed_unit(unit_in_files(symbol))}"
+        lines.append(
+            f" {name:<17}{_with_share(one['value'], one['std'] / size)}"
+            f"{_with_share(one['datasheet'], one['datasheet_std'] / size)}{f'{off:+.1f} %':>9}"
+        )
+    if silent:
+        lines.append(f"datasheet values not determined by this sweep: {', '.join(silent)}")
+    return lines
+
+
+def _with_share(value: float, std: float) -> str:
+    """A value and its standard deviation in per cent, in 21 columns."""
+    return f"{value:>10.4g} +- {f'{100.0 * std:.2g} %':<7}"
 
 
 def _bands(departures: Sequence[Mapping[str, Any]], most: int) -> list[tuple[float, float]]:
