@@ -114,14 +114,14 @@ def answered(name, cause, ratio, points, seed, tolerance=None, drawn=False):
     unit, response = measured(name, ratio, points, seed, of_plant(values | hidden))
     if tolerance is not None:
         unit = unit.with_tolerance({"default": tolerance})
-    estimate = estimate_response(response, unit).to_json()
+    estimate = None if cause else estimate_response(response, unit).to_json()
     found = diagnose_response(response, unit).to_json()
     return {
         "unit": name,
         "hidden": cause,
         "seed": seed,
         "true": {"ratio": ratio, "b_t_deg": unit.backlash.b_t_deg, **values},
-        "estimate": {name: estimate[name] for name in ("contribution_ratio", "b_t_deg")},
+        "estimate": estimate and {n: estimate[n] for n in ("contribution_ratio", "b_t_deg")},
         "verdict": found["verdict"],
         "causes": {c["effect"]: c["parameters"] for c in found["causes"]},
         "rivals": [[r["causes"], round(r["probability"], 3)] for r in found["rivals"][:4]],
