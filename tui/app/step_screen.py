@@ -17,13 +17,13 @@ from textual.content import Content
 from textual.events import Key
 from textual.screen import Screen
 from textual.style import Style
-from textual.widgets import Footer
 
 from daq.analyser import SourceState
 from daq.errors import LashbenchError
 from tui.app.command_lines import commands_of
 from tui.app.dialogs.dialogs import CommandDialog
 from tui.app.dialogs.limits import LimitsDialog
+from tui.app.widgets.key_footer import KeyFooter
 from tui.app.widgets.plain import Caption, Field, Words
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ class StepScreen(Screen[None]):
         with Container(id="body"):
             yield from self.body()
         yield Words(id="hint")
-        yield Footer(compact=True)
+        yield KeyFooter(compact=True)
 
     def body(self) -> ComposeResult:
         """The step's own widgets."""

@@ -20,7 +20,6 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical
 from textual.message import Message
-from textual.widgets import Footer
 
 from analysis.execution.pace import duration
 from daq.control import SessionControl
@@ -32,6 +31,7 @@ from tui.app.line.letters import large
 from tui.app.run_view import RunView
 from tui.app.style import STYLE
 from tui.app.terminal_app import TerminalApp
+from tui.app.widgets.key_footer import KeyFooter
 from tui.app.widgets.plain import Caption, Field, Words
 from tui.exit_codes import INTERRUPTED
 from tui.line.dialogue import Dialogue, Duplicates
@@ -221,7 +221,7 @@ class LineApp(TerminalApp):
             with Horizontal(classes="field"):
                 yield Caption("scan or type")
                 yield Field(id="line", compact=True)
-        yield Footer()
+        yield KeyFooter()
 
     def on_mount(self) -> None:
         """Begin the dialogue; the field is ready for the scanner."""

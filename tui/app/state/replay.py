@@ -11,7 +11,7 @@ from typing import ClassVar
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Vertical
-from textual.widgets import Footer, ProgressBar
+from textual.widgets import ProgressBar
 
 from daq.store_records import StoredPoint
 from daq.untrusted.visible_text import visible_line
@@ -20,6 +20,7 @@ from tui.app.plot.traces import traces_of_points
 from tui.app.state.recording import Recording
 from tui.app.style import STYLE
 from tui.app.terminal_app import TerminalApp
+from tui.app.widgets.key_footer import KeyFooter
 from tui.app.widgets.plain import Words
 from tui.app.words import point_words, span_words
 
@@ -71,7 +72,7 @@ class ReplayApp(TerminalApp):
             yield BodePlot()
             yield ProgressBar(total=max(0.001, self.recording.duration_s), show_eta=False)
             yield Words("", id="text")
-        yield Footer(compact=True)
+        yield KeyFooter(compact=True)
 
     def on_mount(self) -> None:
         """Start the clock."""
