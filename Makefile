@@ -44,7 +44,7 @@ test: $(READY)
 	@$(MAKE) --no-print-directory --jobs 2 check tests
 
 tests: $(READY)
-	@$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile --no-loadscope-reorder
+	@$(BIN)/python -m pytest --numprocesses $(JOBS) --dist worksteal
 
 # What asks once more, of other machines or in full, what a quick test asks every day.
 long: $(READY)

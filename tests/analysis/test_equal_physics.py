@@ -72,6 +72,7 @@ def test_limits_do_not_change_cause_ranges(name, tmp_path):
         np.testing.assert_array_equal(*logs)
 
 
+@pytest.mark.long
 def test_name_limits_and_format_keep_estimate(tmp_path):
     plan = SweepPlan((110.0, 122.0, 128.0, 134.0, 140.0, 152.0), (1.5, 3.0), "up", 6, 6)
     measured = simulate(load_unit("adss"), 0.4, plan, seed=3)

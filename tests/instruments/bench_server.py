@@ -67,8 +67,8 @@ def gimbal_analyser(ratio=0.3, seed=0, faults=(), unit="adss") -> Analyser35670A
 
 
 @contextmanager
-def served(instrument, wire: str = "tcp", driver: str = "", **options):
-    """Serve in a thread, as fast as can be; yields the instrument's address."""
+def served(instrument, wire: str = "tcp", driver: str = "", realtime: bool = False, **options):
+    """Serve in a thread, as fast as can be or by the clock; yields the instrument's address."""
     ports = {
         "tcp": {"tcp": 0},
         "prologix_tcp": {"prologix_tcp": 0},
@@ -77,7 +77,7 @@ def served(instrument, wire: str = "tcp", driver: str = "", **options):
         "serial_pty": {"serial_pty": instrument},
     }
     wires = ports.get(wire, {"prologix_pty": True})
-    with Server(instrument, realtime=False, **wires, **options) as server:
+    with Server(instrument, realtime=realtime, **wires, **options) as server:
         thread = threading.Thread(target=server.run)
         thread.start()
         try:

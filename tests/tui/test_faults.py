@@ -37,7 +37,7 @@ def test_page_lists_the_outcomes(outcomes):
     assert rows(outcomes) == written_rows()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_page_lists_outcomes_of_an_sr785(tmp_path_factory):
     faults = {name: ordered(name) for name in OWN}
     made = provoke_all(tmp_path_factory.mktemp("faults"), faults, "sr785")

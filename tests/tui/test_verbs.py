@@ -78,7 +78,7 @@ def check_estimate(result):
         assert set(result[name]) >= {"value", "std"}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_estimate_has_agreed_fields(capsys):
     """For the paper's ADSS, it tells what the microscope saw."""
     words = ["estimate", "--unit", "adss", "--arf-hz", "128", "--rf-hz", "137"]
@@ -161,7 +161,7 @@ def test_estimate_warns_of_another_units_response(calls, capsys, tmp_path):
     assert "of unit ADSS" in text(["estimate", few, "--unit", "edss"], capsys, calls.compute)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_reproduce_has_agreed_fields(capsys, tmp_path):
     from analysis.paper import reproduce
 

@@ -131,7 +131,7 @@ def test_dead_watchdog_is_replaced_and_reported(db):
 @pytest.mark.slow
 def test_stopped_watchdog_is_replaced(db):
     instrument = linear_analyser(known_gain)
-    with served(instrument) as url, measuring(url, db) as process:
+    with served(instrument, realtime=True) as url, measuring(url, db) as process:
         wait_for(lambda: drives(instrument))
         (first,) = watchdogs_of(process.pid)
         os.kill(first, signal.SIGSTOP)
@@ -335,8 +335,8 @@ def test_blocked_transcript_ends_and_measurement_continues(tmp_path):
     assert not drives(instrument)
 
 
+@pytest.mark.long
 @needs_holding
-@pytest.mark.slow
 def test_unconfirmed_flush_ends_measurement(tmp_path):
     """Commits go on, into memory; a power cut would take them all."""
     folder = tmp_path / "share"

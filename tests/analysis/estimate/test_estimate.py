@@ -66,6 +66,7 @@ def test_short_sweep_estimates_ratio_off_datasheet(ratio, cache):
     assert (found.b_t_deg.value, found.b_t_deg.std) == (b_t, 0.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.study) for n in (1, 2))])
 def test_two_sweeps_are_estimated_together(seed, cache):
     """Other levels, band and direction."""
@@ -91,6 +92,7 @@ def test_two_sweeps_are_estimated_together(seed, cache):
         estimate_response(first, unit, further=[first])
 
 
+@pytest.mark.long
 def test_error_index_uses_first_of_several_sweeps():
     """From the same runs, read with the same noise, though the second holds the same level."""
     unit = load_unit("adss")
@@ -110,6 +112,7 @@ def test_error_index_uses_first_of_several_sweeps():
     assert np.max(np.abs(other.hz - alone.hz)) > 0.1
 
 
+@pytest.mark.long
 def test_driven_dc_offset_is_no_backlash():
     """It leans the gears on one side: taken for none, the ratio came out at 0.64 for 0.4."""
     unit, leaning = load_unit("adss"), replace(SHORT, dc_offset_v=1.0)
@@ -140,6 +143,7 @@ def test_uninformative_sweep_leaves_ratio_open(level_vpk, seed, cache):
     assert high > 0.8
 
 
+@pytest.mark.long
 def test_level_held_by_friction_does_no_harm(cache):
     """Its simulation moves by nothing, and what was read there is the noise of the reading."""
     unit, both = load_unit("adss"), replace(SHORT, levels_vpk=(0.25, 2.5))

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from worlds.hidden import reading
 
 from analysis.estimate import estimate_response
@@ -32,6 +33,7 @@ def first_warning(response):
     return [*estimate_response(response, load_unit("adss")).warnings, ""][0]
 
 
+@pytest.mark.long
 def test_levels_in_other_measure_are_stated_first():
     said = first_warning(stated(swept(), 0.5))
     assert "taken for peak-to-peak and halved: multiply source_vpk by 2" in said

@@ -122,6 +122,7 @@ def test_csv_rows_are_read_in_few_calls(tmp_path):
     assert pstats.Stats(profile).total_calls < 8 * len(whole)
 
 
+@pytest.mark.long
 def test_estimate_simulates_the_stated_thinned_rows(tmp_path, capsys):
     path = tmp_path / "large.csv"
     cycles = {"settle_cycles": 1, "integrate_cycles": 2}

@@ -169,6 +169,7 @@ def test_paper_scheme_reproduces_table_2(count):
             assert abs(np.median(read.rf_hz) - row.rf_hz) <= 4.0, row
 
 
+@pytest.mark.long
 def test_edss_motions_occur_as_in_oracle(monkeypatch):
     # At 78 Hz two motions coexist, one of them at -6 dB; too coarse a step falls for it.
     unit = load_unit("edss")

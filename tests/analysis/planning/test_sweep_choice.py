@@ -78,7 +78,10 @@ def test_too_short_time_states_shortest_sweep(name):
         plan_sweep(load_unit(name), 1e-6)
 
 
-@pytest.mark.parametrize(("name", "most_min"), [("feed-axis", 0.2), ("srv02-torsion", 0.3)])
+@pytest.mark.parametrize(
+    ("name", "most_min"),
+    [("feed-axis", 0.2), pytest.param("srv02-torsion", 0.3, marks=pytest.mark.long)],
+)
 def test_slow_drives_get_few_cycles(name, most_min):
     """Of 50 cycles at 11 points the shortest sweeps took 0.45 and 1.3 min."""
     with pytest.raises(InputError, match="the shortest useful sweep") as told:

@@ -57,7 +57,7 @@ def test_noted_truth_has_known_extrema():
         pytest.param(Truth(), {}, marks=pytest.mark.long),
         pytest.param(Truth(integrator=False), {}, marks=pytest.mark.long),
         pytest.param(Truth(corner=135.0, delay_s=1e-3), {}, marks=pytest.mark.long),
-        (Truth(corner=135.0, delay_s=1e-3), {"stated": False}),
+        pytest.param(Truth(corner=135.0, delay_s=1e-3), {"stated": False}, marks=pytest.mark.long),
     ],
     ids=["noted", "5 %", "bare", "filtered", "filtered, noise unknown"],
 )

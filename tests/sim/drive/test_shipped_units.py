@@ -50,7 +50,10 @@ def test_resonances_are_within_limits(name):
     assert 1.5 * found.resonances_hz[0] < unit.limits.stop_hz
 
 
-@pytest.mark.parametrize("name", PUBLISHED)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(one, marks=[pytest.mark.long] * (one == "irb")) for one in PUBLISHED],
+)
 def test_motion_agrees_with_independent_plant(name):
     """With its clock, counts, clips, play and friction, below ARF, between and above RF."""
     unit = load_unit(name)

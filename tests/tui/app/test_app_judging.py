@@ -70,7 +70,7 @@ async def opens(op, number):
     await op.sees("[5 Result]", "r = 0.310")
 
 
-@pytest.mark.parametrize("size", [(80, 24), (140, 40)])
+@pytest.mark.parametrize("size", [(80, 24), pytest.param((140, 40), marks=pytest.mark.long)])
 def test_limits_are_chosen_and_decide(db, tmp_path, size):
     file = limits(tmp_path, (
         "r = { upper = 0.2 }\nb1_deg = { upper = 0.4 }\narf_hz = { lower = 100, upper = 200 }\n"

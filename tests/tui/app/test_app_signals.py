@@ -283,7 +283,7 @@ def test_blocked_terminal_delays_no_signal_and_redraws(tmp_path, on_terminal):
     assert begun(db).source_state is SourceState.CONFIRMED_OFF
 
 
-@pytest.mark.parametrize("way", ["ctrl+x", "SIGTERM"])
+@pytest.mark.parametrize("way", ["ctrl+x", pytest.param("SIGTERM", marks=pytest.mark.long)])
 def test_source_stops_whatever_the_event_loop_does(tmp_path, on_terminal, way):
     db, stuck = tmp_path / "bench.db", tmp_path / "bench.db-stuck"
     terminal = on_terminal(str(db), SLOW, program=STUCK)

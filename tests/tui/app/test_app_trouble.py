@@ -28,7 +28,9 @@ from daq.store import Store
 from tui.app.dialogs.dialogs import ErrorDialog
 
 
-@pytest.mark.parametrize("place", ["sweep", "field", "dialog"])
+@pytest.mark.parametrize(
+    "place", ["sweep", pytest.param("field", marks=pytest.mark.long), "dialog"]
+)
 def test_one_key_stops_source_from_every_screen(tmp_path, place):
     db = tmp_path / "bench.db"
 

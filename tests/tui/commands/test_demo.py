@@ -125,6 +125,7 @@ def test_repeated_run_prints_same_points_and_json(quick, tmp_path, capsys):
     assert result["report"] == str(tmp_path / "b" / "report.html")
 
 
+@pytest.mark.long
 def test_surprise_differs_by_seed_and_can_repeat(quick, tmp_path, capsys):
     _, demo = quick("load-inertia")
     results = []

@@ -232,7 +232,7 @@ def test_paper_row_gives_json_and_picture(capsys, tmp_path):
     assert asked == ["ADSS"]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_large_effect_behind_simulated_analyser_is_found(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     compiled = code_folder()

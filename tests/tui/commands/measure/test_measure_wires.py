@@ -64,6 +64,7 @@ def test_every_wire_gives_equal_points(tmp_path):
     assert all(readback == readbacks[0] for readback in readbacks)
 
 
+@pytest.mark.long
 def test_all_wires_of_drivers_give_equal_points(tmp_path):
     """Known ones, within what the instrument prints; of the preset to the last bit, see above."""
     for driver in (driver.scheme for driver in DRIVERS if driver.scheme):
@@ -116,7 +117,12 @@ def test_another_seed_gives_other_points(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("driver", "wire"), [("", "tcp"), ("", "prologix_pty"), ("sr785", "serial_pty")]
+    ("driver", "wire"),
+    [
+        ("", "tcp"),
+        pytest.param("", "prologix_pty", marks=pytest.mark.long),
+        pytest.param("sr785", "serial_pty", marks=pytest.mark.long),
+    ],
 )
 def test_random_kill_9_loses_no_point(tmp_path, driver, wire):
     """Two kills of one measurement, then on to the end: equal to an unbroken one."""

@@ -135,6 +135,7 @@ def serials(path):
     return [json.loads(line)["serial"] for line in path.read_text().splitlines()]
 
 
+@pytest.mark.long
 def test_second_results_file_ignores_the_first(here, tmp_path):
     """Each file has its units: none is judged into another, or driven under an old serial."""
     first, second = tmp_path / "first.jsonl", tmp_path / "second.jsonl"
