@@ -12,6 +12,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from sim.drive.controller import Controller
 from sim.drive.sections import Damping
 from sim.drive.sensors import Encoder, SampledTachometer
 from sim.drive.unit import Unit
@@ -147,7 +148,7 @@ def shaft_dampers(unit: Unit, c_s1: float) -> dict[str, Element]:
 def _motor(unit: Unit) -> Motor:
     motor, current, sampling = unit.motor, unit.amplifier, unit.sampling
     hold_hz = sampling.rate_hz if sampling is not None and sampling.holds_command else 0.0
-    amplifier = Amplifier(unit.electronics.k_a, hold_hz=hold_hz)
+    amplifier = Amplifier(unit.electronics.k_a, hold_hz=hold_hz, controller=_controller(unit))
     if current is not None:
         amplifier = replace(amplifier, V_sat=current.current_limit_a)
         lag_s = 1.0 / (2.0 * math.pi * current.bandwidth_hz)
@@ -158,6 +159,31 @@ def _motor(unit: Unit) -> Motor:
     return Motor("th_m", motor.L_a, motor.R_m, motor.k_b, motor.k_t, amplifier)
 
 
+def _controller(unit: Unit) -> Controller | None:
+    loop, sensor, sampling = unit.loop, unit.sensor, unit.sampling
+    if loop is None:
+        return None
+    coordinate, k_ts = _sensed(unit), unit.electronics.k_ts
+    encoder = sensor is not None and sensor.kind == "encoder"
+    return Controller(
+        loop.K_p,
+        loop.T_i_s,
+        loop.K_v,
+        loop.excited == "reference",
+        {"V_o": 1.0} if loop.filtered else {f"{coordinate}'": k_ts},
+        coordinate,
+        k_ts,
+        sensor.counts if encoder and sensor is not None else None,
+        sampling.rate_hz if sampling is not None and sampling.holds_command else 0.0,
+        loop.computing_s or 0.0,
+    )
+
+
+def _sensed(unit: Unit) -> str:
+    """The coordinate that the sensor is on."""
+    return "th_L" if unit.sensor is not None and unit.sensor.at == "load" else "th_m"
+
+
 def _sensor(unit: Unit) -> Element:
     electronics, sensor, sampling = unit.electronics, unit.sensor, unit.sampling
     filtered = electronics.filter_numerator, electronics.filter_denominator
@@ -165,7 +191,7 @@ def _sensor(unit: Unit) -> Element:
         assert sampling is not None
         assert sensor.counts is not None
         return Encoder(
-            "th_m" if sensor.at == "motor" else "th_L",
+            _sensed(unit),
             electronics.k_ts,
             sampling.rate_hz,
             sensor.counts,
@@ -177,8 +203,7 @@ def _sensor(unit: Unit) -> Element:
     assert filtered[0] is not None
     assert filtered[1] is not None
     late = 0.0 if sensor is None else sensor.delay_s or 0.0
-    coordinate = "th_L" if sensor is not None and sensor.at == "load" else "th_m"
-    known = coordinate, electronics.k_ts, filtered[0], filtered[1]
+    known = _sensed(unit), electronics.k_ts, filtered[0], filtered[1]
     if sensor is not None and sensor.sampled:
         assert sampling is not None
         return SampledTachometer(*known, sampling.rate_hz, sensor.held, late)

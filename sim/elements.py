@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
+from sim.drive.controller import Controller, Feed
 from sim.drive.sensors import add_filter, read_late
 from sim.engine.system import Assembly, Law
 
@@ -169,6 +170,18 @@ class Amplifier:
     uneven: float = 1.0
     hold_hz: float = 0.0
     """Rate at which its input is sampled and held, Hz; 0 where it is continuous."""
+    controller: Controller | None = None
+    """What commands it; the source does where there is none."""
+
+    def feed(self, assembly: Assembly) -> Feed:
+        """What its input is, once all that makes it has entered."""
+        if self.controller is not None:
+            return self.controller.feed(assembly)
+        if self.hold_hz == 0.0:
+            return Feed(source=1.0)
+        clock = (self.hold_hz,)
+        assembly.add_law("command", Law.HOLD, {}, {}, feedthrough=1.0, parameters=clock)
+        return Feed(laws={"command": 1.0})
 
     def kinks(self) -> Iterator[tuple[str, float, float, float]]:
         """Name, weight, limit and centre of the `Law.EXCESS` that bend its characteristic."""
@@ -208,38 +221,26 @@ class Motor:
         assembly.add_coupling("i_a", "i_a", -self.R_m / self.L_a)
         assembly.add_coupling("i_a", f"{self.coordinate}'", -self.k_b / self.L_a)
         assembly.add_coupling(self.coordinate, "i_a", self.k_t)
-        hears: dict[str, float] = {}
+        feed = amplifier.feed(assembly)
         if amplifier.tau_a > 0.0:
             assembly.add_signal("V_m")
             assembly.add_coupling("V_m", "V_m", -1.0 / amplifier.tau_a)
-            self._drive(assembly, "V_m", amplifier.k_a / amplifier.tau_a)
+            feed.into(assembly, "V_m", amplifier.k_a / amplifier.tau_a)
             assembly.add_coupling("i_a", "V_m", linear / self.L_a)
-            looks_at, feedthrough = {"V_m": 1.0}, 0.0
+            felt = Feed({"V_m": 1.0})
         else:
-            self._drive(assembly, "i_a", linear * amplifier.k_a / self.L_a)
-            looks_at, feedthrough = {}, amplifier.k_a
-            if amplifier.hold_hz > 0.0:
-                feedthrough, hears = 0.0, {"command": amplifier.k_a}
+            feed.into(assembly, "i_a", linear * amplifier.k_a / self.L_a)
+            felt = feed.times(amplifier.k_a)
         for name, weight, limit, centre in amplifier.kinks():
             assembly.add_law(
                 name,
                 Law.EXCESS,
                 {"i_a": weight / self.L_a},
-                looks_at,
-                feedthrough=feedthrough,
+                felt.states,
+                feedthrough=felt.source,
                 parameters=(limit, centre),
-                hears=hears,
+                hears=felt.laws,
             )
-
-    def _drive(self, assembly: Assembly, signal: str, gain: float) -> None:
-        """Let the input, or what is held of it, drive a signal."""
-        rate = self.amplifier.hold_hz
-        if rate > 0.0:
-            assembly.add_law(
-                "command", Law.HOLD, {signal: gain}, {}, feedthrough=1.0, parameters=(rate,)
-            )
-        else:
-            assembly.add_input(signal, gain)
 
 
 @dataclass(frozen=True, slots=True)

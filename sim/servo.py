@@ -105,10 +105,15 @@ def _held(
     """What sampled laws hold at the start (5 per law, levels)."""
     held = np.zeros((HELD * len(system.sampled), still.shape[1]))
     phase = rng.random(still.shape[1]) if system.sampled else 0.0
+    offsets: dict[bytes, NDArray[np.float64]] = {}
     for i, law in enumerate(system.sampled):
         held[HELD * i] = phase
         if law.law is not Law.HOLD:
-            offset = rng.random(still.shape[1])
+            # Laws that count the same shaft are one encoder.
+            shaft = law.outlet.tobytes()
+            if shaft not in offsets:
+                offsets[shaft] = rng.random(still.shape[1])
+            offset = offsets[shaft]
             held[HELD * i + 1] = offset
             held[HELD * i + 2] = np.floor(law.outlet @ still / law.parameters[1] + offset)
     return held

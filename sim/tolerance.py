@@ -15,7 +15,7 @@ from pydantic import BeforeValidator, Field, ValidationError
 
 from daq.untrusted.toml_files import Positive, Section
 
-__all__ = ["DEFAULT", "MOST", "RESPONSE_SCALES", "USUAL", "Share", "believed_shares", "find_fault"]
+__all__ = ["DEFAULT", "MOST", "USUAL", "Share", "believed_shares", "find_fault", "response_scales"]
 
 MOST = 0.5
 """Largest tolerance: a value that is known no better is not known."""
@@ -64,17 +64,28 @@ _BY_KIND = {
 """By kind: windings and magnets, inertias, stiffness, friction and damping. Gains and the load are
 known better."""
 
-_EXACT = ("filter_numerator", "N_1", "N", "delay_s")
-"""Teeth are counted, the filter's gain is the tachometer's, and a delay is so many samples: no
-tolerance if not by name."""
+_EXACT = ("filter_numerator", "N_1", "N", "delay_s", "K_p", "T_i_s", "K_v", "computing_s")
+"""Teeth are counted, the filter's gain is the tachometer's, a delay is so many samples, and a
+controller's gains are set: no tolerance if not by name."""
 
-RESPONSE_SCALES = ("k_ts", "filter_numerator")
-"""They scale the whole response and do nothing else."""
+_SCALES = ("k_ts", "filter_numerator")
+
+
+def response_scales(unit: Any) -> tuple[str, ...]:
+    """Values that scale the whole response of a unit and do nothing else.
+
+    What a controller acts on decides its loop gain, too.
+    """
+    if unit.loop is None:
+        return _SCALES
+    return () if unit.loop.filtered else ("filter_numerator",)
+
 
 _TOLERATED = (
     "L_a", "R_m", "k_b", "k_t", "J_m", "B_m", "T_f_m", "k_a", "k_ts", "filter_numerator",
     "N_1", "k_g1", "J_g1", "k_s1", "J_s1", "J_p2", "N", "k_2", "J_L", "T_f_L", "B_L", "c_s1",
     "c_g1", "c_2", "bandwidth_hz", "delay_s", "k_cm", "c_cm", "J_cm", "k_cL", "c_cL", "J_cL",
+    "K_p", "T_i_s", "K_v", "computing_s",
 )  # fmt: skip
 """Table 1 but for the backlash, whose departure is the effect total-backlash; and what drives have
 that are not the paper's."""

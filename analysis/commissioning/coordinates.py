@@ -17,7 +17,7 @@ from scipy.special import ndtr
 
 from analysis.ensemble.machine import Machine
 from daq.errors import InputError
-from sim.tolerance import RESPONSE_SCALES
+from sim.tolerance import response_scales
 from sim.unit import Unit
 
 Vector = NDArray[np.float64]
@@ -81,7 +81,8 @@ class Coordinates:
     @property
     def scales(self) -> NDArray[np.bool_]:
         """Which coordinates (d,) do no more than scale the response."""
-        return np.array([symbol in RESPONSE_SCALES for symbol in self.symbols])
+        scales = response_scales(self.unit)
+        return np.array([symbol in scales for symbol in self.symbols])
 
     def factors(self, z: Vector) -> Vector:
         """Values (..., d) as multiples of the datasheet's; the ratio itself in its place."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from analysis.ensemble.linear_response import linear_response
 from sim.effect import SOURCE_MOST_VPK, shaft_at_load
-from sim.tolerance import RESPONSE_SCALES
+from sim.tolerance import response_scales
 from sim.unit import Unit
 
 __all__ = ["Deviations", "Spread", "feature_spread", "spread_of"]
@@ -96,7 +96,7 @@ def feature_spread(unit: Unit) -> tuple[float, float]:
     """
     shares = unit.tolerances
     frequency = 0.5 * math.hypot(shares["J_L"], shares["k_s1"])
-    scales = ("k_a", "k_t", "R_m", "J_m", *RESPONSE_SCALES)
+    scales = ("k_a", "k_t", "R_m", "J_m", "k_ts", "filter_numerator")
     return frequency, math.hypot(*(shares.get(s, 0.0) for s in scales))
 
 
@@ -116,12 +116,12 @@ class _Key:
 
 @lru_cache(maxsize=64)
 def _spread_of(key: _Key) -> Spread:
-    unit, shares = key.unit, key.unit.tolerances
+    unit, shares, scales = key.unit, key.unit.tolerances, response_scales(key.unit)
     symbols = [s for s in _FIRST if s in shares]
-    symbols += [s for s in shares if s not in (*_FIRST, *RESPONSE_SCALES)]
+    symbols += [s for s in shares if s not in (*_FIRST, *scales)]
     symbols = [s for s in symbols if shares[s] > 0.0] or [_FIRST[0]]
     tolerance = np.array([max(shares[s], _LEAST) for s in symbols])
-    gain = max(math.hypot(*(shares.get(s, 0.0) for s in RESPONSE_SCALES)), _LEAST)
+    gain = max(math.hypot(*(shares.get(s, 0.0) for s in scales)), _LEAST)
     if len(symbols) <= _MOST:
         every = np.eye(len(symbols))
         return Spread(tuple(symbols), every, every, tolerance, gain)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.effects import drivetrain_with
-from sim.engine.linear import chain_factor, smooth_parts
+from sim.engine.linear import parts_at
 from sim.engine.system import Law
 from sim.unit import Unit
 
@@ -37,18 +37,18 @@ def linear_response(
     system = drivetrain_with(unit, 0.5 if unit.stages == 2 else 1.0).system()
     frictions = [law for law in system.nonlinearities if law.law is Law.FRICTION]
     s = 2.0 * np.pi * frequency_hz * (1j + _DAMPED)
-    A, b, o = smooth_parts(system)
-    plain = s[:, None, None] * np.eye(len(b)) - A
-    chain = chain_factor(system, s)
+    A, b, o, chain = parts_at(system, s)
+    plain = s[:, None, None] * np.eye(b.shape[-1]) - A
     found = []
     for level_vpk in levels_vpk:
-        state = np.linalg.solve(plain, b[:, None].astype(complex))[..., 0]
+        state = np.linalg.solve(plain, b[..., None].astype(complex))[..., 0]
         for _ in range(_ROUNDS):
             held = plain.copy()
             for law in frictions:
                 speed = np.maximum(level_vpk * np.abs(state @ law.outlet), 1e-12)
                 damper = 4.0 * law.parameters[0] / (np.pi * speed)
                 held += damper[:, None, None] * np.outer(law.inlet, law.outlet)
-            state = np.linalg.solve(held, b[:, None].astype(complex))[..., 0]
-        found.append(state @ o * chain)
+            state = np.linalg.solve(held, b[..., None].astype(complex))[..., 0]
+        seen = state @ o if o.ndim == 1 else np.einsum("fn,fn->f", state, o)
+        found.append(seen * chain)
     return np.concatenate(found)

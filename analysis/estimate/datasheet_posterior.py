@@ -19,7 +19,7 @@ from analysis.emulation.quadratic import TAIL_FREEDOM, Prediction
 from analysis.ensemble.datasheet_spread import Spread
 from analysis.ensemble.linear_response import linear_response
 from analysis.observation.observation import Observation
-from sim.tolerance import RESPONSE_SCALES
+from sim.tolerance import response_scales
 from sim.unit import Unit
 
 __all__ = [
@@ -106,7 +106,7 @@ def datasheet_values(
         # What the ways leave out of a value stays as the datasheet has it.
         rest = max(tolerance**2 - float(way**2 @ sigmas**2), 0.0)
         found.append(_value(symbol, known[symbol], tolerance, off, left + rest))
-    for symbol in RESPONSE_SCALES:
+    for symbol in response_scales(unit):
         tolerance = tolerances.get(symbol, 0.0)
         if tolerance > 0.0 and known.get(symbol):
             part = (tolerance / spread.gain) ** 2

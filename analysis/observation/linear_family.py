@@ -10,12 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.drivetrain import paper_drivetrain
 from sim.engine.linear import chain_factor
+from sim.engine.nonlinearity import held
 from sim.unit import Unit
 
 __all__ = ["Family", "draw_machines", "neighbours"]
@@ -126,13 +128,32 @@ class Family:
         if (current := self.unit.amplifier) is not None:
             electrical = p["resistance"] + s / (2.0 * np.pi * current.bandwidth_hz)
         speed = electronics.k_a * k_t / (electrical * mechanical + k_t * k_b)
-        shown = electronics.k_ts * speed / (1.0 + s * p["lag"])
+        read = electronics.k_ts * speed
         numerator, denominator = electronics.filter_numerator, electronics.filter_denominator
+        filtered = np.ones_like(s)
         if numerator is not None and denominator is not None:
             d2, d1, d0 = denominator
             corner = p["corner"]
-            shown = shown * numerator * corner**2 / (d2 * s**2 + d1 * corner * s + d0 * corner**2)
+            filtered = numerator * corner**2 / (d2 * s**2 + d1 * corner * s + d0 * corner**2)
+        shown = read / (1.0 + s * p["lag"]) * filtered * self._closing(s, read, filtered)
         return np.asarray(np.log(shown) + np.log(self._read(s)))
+
+    def _closing(
+        self, s: NDArray[np.complex128], read: NDArray[np.complex128], filtered: Any
+    ) -> NDArray[np.complex128]:
+        """What a loop makes of a response: by how much it is larger than without one."""
+        loop, clock = self.unit.loop, self.unit.sampling
+        if loop is None:
+            return np.ones_like(s)
+        control = loop.K_p * (1.0 + (0.0 if loop.T_i_s is None else 1.0 / (loop.T_i_s * s)))
+        control = control * np.exp(-s * (loop.computing_s or 0.0))
+        around = control * read * (filtered if loop.filtered else 1.0)
+        if clock is not None and clock.holds_command:
+            around = around * held(s / clock.rate_hz)
+        if loop.K_v is not None:
+            # It hears the position, the integral of the speed, besides.
+            control, around = loop.K_v * control, around * (1.0 + loop.K_v / s)
+        return np.asarray((control if loop.excited == "reference" else 1.0) / (1.0 + around))
 
     def _read(self, s: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """What a clock, an encoder and a stated delay do."""
@@ -140,7 +161,9 @@ class Family:
             return np.ones_like(s)
         sensor = self.unit.sensor
         position = sensor is not None and sensor.reads == "position"
-        system = paper_drivetrain(self.unit, 1.0).system()
+        # What a controller holds is in its loop, not behind it.
+        plain = self.unit.model_copy(update={"loop": None})
+        system = paper_drivetrain(plain, 1.0).system()
         return chain_factor(system, s) / (s if position else 1.0)
 
     def _train(self, p: Mapping[str, Vector], s: NDArray[np.complex128]) -> NDArray[np.complex128]:

@@ -159,7 +159,8 @@ _QUANTITIES: Mapping[str, tuple[CatalogueUnit, ...]] = {
     **dict.fromkeys(("start_hz", "stop_hz", "corner_hz", "rate_hz"), _FREQUENCY),
     "bandwidth_hz": _FREQUENCY,
     "current_limit_a": _of("A", {"mA": 1e-3, "A rms": math.sqrt(2.0)}),
-    "delay_s": _of("s", {"ms": 1e-3, "us": 1e-6}),
+    **dict.fromkeys(("delay_s", "T_i_s", "computing_s"), _of("s", {"ms": 1e-3, "us": 1e-6})),
+    "K_v": _of("1/s", {"m/min/mm": 1000.0 / 60.0}),
     "source_vpk": _PEAK,
     "source_offset_v": _VOLTAGE,
 }

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.datasheet.stability import gain_margin, loop_features
 from sim.drive.unit import Unit
 from sim.drivetrain import paper_drivetrain
 from sim.elements import Inertia, Mesh, Spring
@@ -90,6 +91,7 @@ def describe_chain(unit: Unit) -> list[str]:
         f"  {'total':<9}{total:.3e} kg.m^2",
         f"total backlash: {play:.4g} deg at the load, {play * ratio:.4g} deg at the motor",
         *_frequency_lines(unit),
+        *([] if unit.loop is None else _loop_lines(unit)),
     ]
     return lines
 
@@ -108,7 +110,33 @@ def _drive_lines(unit: Unit) -> list[str]:
         counts = "" if sensor.counts is None else f", {sensor.counts:.0f} counts a turn"
         late = f", {1e3 * sensor.delay_s:g} ms late" if sensor.delay_s else ""
         lines.append(f"sensor     {sensor.kind} at the {sensor.at}, {sensor.reads}{counts}{late}")
+    if (loop := unit.loop) is not None:
+        outer = "" if loop.K_v is None else f"K_v {loop.K_v:.4g} 1/s, "
+        inner = "" if loop.T_i_s is None else f", T_i {loop.T_i_s:.4g} s"
+        late = f", {1e3 * loop.computing_s:g} ms to compute" if loop.computing_s else ""
+        lines += [
+            f"loop       {loop.controls}, {outer}K_p {loop.K_p:.4g}{inner}{late}",
+            f"           the source is {_EXCITED[loop.excited]}",
+        ]
     return lines
+
+
+_EXCITED = {"reference": "its reference", "command": "added to its command"}
+
+
+def _loop_lines(unit: Unit) -> list[str]:
+    """What the closed loop makes of it."""
+    found, margin = loop_features(unit), gain_margin(unit)
+    if margin is None:
+        stable = "stable at any K_p"
+    else:
+        stable = f"stable up to {margin:.3g} times its K_p" if margin >= 1.0 else "unstable"
+    arf = "no ARF" if found.arf_hz is None else f"ARF {found.arf_hz:.4g} Hz"
+    rf = "no RF" if found.rf_hz is None else f"RF {found.rf_hz:.4g} Hz, {found.rf_db:.3g} dB"
+    return [
+        f"closed loop, linear: {stable}, meshes closed or open",
+        f"  shows {arf}, {rf}",
+    ]
 
 
 def _frequency_lines(unit: Unit) -> list[str]:

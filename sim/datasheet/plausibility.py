@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from sim.datasheet.catalogue_units import unit_in_files, units_of
 from sim.datasheet.chain import natural_frequencies
 from sim.datasheet.ranges import COMBINED, KEYS, SINGLES, Range, Values
+from sim.datasheet.stability import MARGIN, find_unstable
 
 if TYPE_CHECKING:
     from sim.drive.unit import Unit
@@ -23,12 +24,14 @@ __all__ = ["find_impossible", "find_unusual", "impossible_among", "unusual_among
 def find_impossible(unit: Unit) -> list[str]:
     """What a unit's values cannot be: key, value, what is plausible, and the likely slip each."""
     values = _values(unit)
-    return list(impossible_among(values)) or _resonances(unit, beyond=20.0)
+    # What cannot be says more than what follows from it.
+    return list(impossible_among(values)) or _resonances(unit, beyond=20.0) or find_unstable(unit)
 
 
 def find_unusual(unit: Unit) -> list[str]:
     """What is unusual in a unit's values and can be all the same, in the same form."""
-    return list(unusual_among(_values(unit))) or _resonances(unit, beyond=1.0)
+    found = list(unusual_among(_values(unit))) or _resonances(unit, beyond=1.0)
+    return found + find_unstable(unit, MARGIN)
 
 
 def impossible_among(values: Values) -> Iterator[str]:

@@ -30,6 +30,7 @@ _SECTIONS = {
     "sensor": ("counts", "delay_s"),
     "motor_coupling": ("k_cm", "c_cm", "J_cm"),
     "load_coupling": ("k_cL", "c_cL", "J_cL"),
+    "loop": ("K_p", "T_i_s", "K_v", "computing_s"),
 }
 KEYS = {symbol: f"{name}.{symbol}" for name, symbols in _SECTIONS.items() for symbol in symbols}
 """Where a value stands in a unit file, by symbol."""
@@ -110,6 +111,10 @@ SINGLES = (
     _single("rate_hz", (50.0, 1e5), (0.1, 1e5)),
     _single("counts", (64.0, 5e7), (4.0, 1e9), "counts in a turn are four times the lines"),
     _single("delay_s", (0.0, 0.02), (0.0, 0.1)),
+    _single("K_p", (1e-6, 1e6), (1e-12, 1e12)),
+    _single("T_i_s", (1e-4, 100.0), (1e-6, 1e5)),
+    _single("K_v", (0.5, 1e3), (1e-3, 1e5)),
+    _single("computing_s", (0.0, 0.005), (0.0, 0.1)),
     *(_single(symbol, *_STIFFNESS) for symbol in ("k_cm", "k_cL")),
     *(_single(symbol, *_INERTIA) for symbol in ("J_cm", "J_cL")),
     *(

@@ -1,12 +1,15 @@
 """What real drives have and the paper's two do not, as sections of a unit file and as elements.
 
-Owns damping, current-controlled amplifiers, clocks, encoders and couplings. It knows no effect.
+Owns damping, current-controlled amplifiers, clocks, encoders, couplings and controllers. It knows
+no effect.
 """
 
+from sim.drive.controller import Controller
 from sim.drive.sections import (
     CurrentAmplifier,
     Damping,
     LoadCoupling,
+    Loop,
     MotorCoupling,
     Sampling,
     Sensor,
@@ -14,10 +17,12 @@ from sim.drive.sections import (
 from sim.drive.sensors import Encoder, SampledTachometer
 
 __all__ = [
+    "Controller",
     "CurrentAmplifier",
     "Damping",
     "Encoder",
     "LoadCoupling",
+    "Loop",
     "MotorCoupling",
     "SampledTachometer",
     "Sampling",

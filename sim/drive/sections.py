@@ -15,6 +15,7 @@ __all__ = [
     "CurrentAmplifier",
     "Damping",
     "LoadCoupling",
+    "Loop",
     "MotorCoupling",
     "Sampling",
     "Sensor",
@@ -31,6 +32,7 @@ OPTIONAL_SECTIONS = (
     "sensor",
     "motor_coupling",
     "load_coupling",
+    "loop",
 )
 """Sections of a unit that are not there where a drive is like the paper's."""
 
@@ -135,6 +137,37 @@ class LoadCoupling(_Section):
     """Inertia of the last gear with its half of the coupling, kg.m^2."""
 
 
+class Loop(_Section):
+    """A controller that is closed around the drive while it is measured.
+
+    It acts on the volts that `Sensor` gives before a filter. With a command that a clock holds it
+    runs at the clock; without one it is continuous. Its integral goes on while the amplifier clips.
+    """
+
+    controls: Literal["speed", "position"]
+    """A position controller is around a speed controller; both act on the same sensor."""
+    K_p: Positive
+    """Of the speed controller, V of command per V of speed; per V/s where positions are read."""
+    T_i_s: Positive | None = None
+    """Integral time of the speed controller, s; left out by one that is proportional alone."""
+    K_v: Positive | None = None
+    """Of the position controller, which is proportional, 1/s."""
+    excited: Literal["reference", "command"] = "reference"
+    """Where the source is added: as the reference, or to the command, behind the controller."""
+    filtered: bool = False
+    """Of a tachometer: whether the controller gets what is behind the filter of [electronics]."""
+    computing_s: Annotated[float, Field(ge=0, le=0.1)] | None = None
+    """Time from reading to command, beyond sampling, s."""
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> Self:
+        if self.controls == "position" and self.K_v is None:
+            raise ValueError("loop.K_v is required by a position loop: its gain in 1/s")
+        if self.controls == "speed" and self.K_v is not None:
+            raise ValueError("loop.K_v is that of a position loop; leave it out, or set controls")
+        return self
+
+
 _OF_VOLTAGE = ("L_a", "R_m", "k_b")
 
 
@@ -167,4 +200,24 @@ def find_contradiction(unit: Any) -> str:
     clocked = sensor is not None and sensor.is_sampled
     if unit.sampling is not None and not (unit.sampling.holds_command or clocked):
         return "sampling.holds_command is false and no sensor is sampled; leave out [sampling]"
+    return "" if unit.loop is None else _against_loop(unit)
+
+
+def _against_loop(unit: Any) -> str:
+    """What contradicts [loop], in words; empty where nothing does."""
+    loop, encoder = unit.loop, unit.sensor is not None and unit.sensor.kind == "encoder"
+    reads = "speed" if unit.sensor is None else unit.sensor.reads
+    if loop.controls != reads:
+        told = "; a tachometer reads speed" if loop.controls == "position" and not encoder else ""
+        return (
+            f"loop.controls is {loop.controls!r}, and sensor.reads is {reads!r}; a loop controls "
+            f"what its sensor reads{told}"
+        )
+    if encoder and not unit.sampling.holds_command:
+        return (
+            "sampling.holds_command is false, and [loop] acts on an encoder: its controller runs "
+            "at the clock and holds the command; set it to true"
+        )
+    if encoder and loop.filtered:
+        return "loop.filtered: a controller acts on an encoder itself; leave it out"
     return ""

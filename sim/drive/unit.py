@@ -21,6 +21,7 @@ from sim.drive.sections import (
     CurrentAmplifier,
     Damping,
     LoadCoupling,
+    Loop,
     MotorCoupling,
     Sampling,
     Sensor,
@@ -33,7 +34,6 @@ __all__ = ["StageBacklash", "Unit", "stage_backlash", "unit_from_mapping"]
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-
 
 NO_PHYSICS = {
     "schema_", "schema", "name", "limits", "acceptance", "tolerance", "commissioning",
@@ -153,6 +153,7 @@ class Unit(_Section):
     sensor: Sensor | None = None
     motor_coupling: MotorCoupling | None = None
     load_coupling: LoadCoupling | None = None
+    loop: Loop | None = None
     acceptance: Acceptance | None = None
     """What `--judge` decides by, with ``b1_deg`` and ``b2_deg`` of the limits."""
     tolerance: Mapping[str, Share] | None = None

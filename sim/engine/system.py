@@ -16,7 +16,7 @@ then stepped exactly. A law that a clock samples has a memory besides.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,13 +31,17 @@ Along = Mapping[str, float]
 """A direction over coordinates: the torque tau acts as tau * coefficient on each of them."""
 
 
+_KnownLaw = tuple[str, Law, dict[str, float], Along, float, float, float, tuple[float, ...]]
+
+
 @dataclass(frozen=True, slots=True)
 class PiecewiseLinearSystem:
     """What the engine steps; shapes for n states.
 
     `A` (n, n), `b` (n,) input, `f` (n,) constant forcing, `o` (n,) output row,
     `states` the names, `energy` a symmetric (n, n) matrix such that
-    x' energy x / 2 is the stored energy with every mesh closed.
+    x' energy x / 2 is the stored energy with every mesh closed. `closed`: whether what a clock
+    samples may come back to it, through a controller.
     """
 
     A: NDArray[np.float64]
@@ -48,11 +52,22 @@ class PiecewiseLinearSystem:
     states: tuple[str, ...]
     energy: NDArray[np.float64]
     reading: Reading = Reading()
+    closed: bool = False
 
     @property
     def sampled(self) -> tuple[Nonlinearity, ...]:
         """The laws that a clock samples."""
         return tuple(law for law in self.nonlinearities if law.law in SAMPLED)
+
+    def opened(self) -> PiecewiseLinearSystem:
+        """The system with every mesh inside its play, so that the teeth never touch."""
+        A = self.A
+        for law in self.nonlinearities:
+            if law.law is Law.PLAY:
+                # The row of a coordinate in A is its rate.
+                takes = law.stiffness * law.outlet + law.damping * (law.outlet @ self.A)
+                A = A + np.outer(law.inlet, takes)
+        return replace(self, A=A)
 
     def transfer(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Linear response V_o/u with every mesh closed and no friction, shape of the input."""
@@ -73,13 +88,12 @@ class Assembly:
     signals: list[str] = field(default_factory=list)
     output: dict[str, float] = field(default_factory=lambda: {"V_o": 1.0})
     reading: Reading = Reading()
+    closed: bool = False
     _torques: list[tuple[Along, Along, float, float]] = field(default_factory=list)
     _couplings: list[tuple[str, str, float]] = field(default_factory=list)
     _inputs: dict[str, float] = field(default_factory=dict)
     _constants: dict[str, float] = field(default_factory=dict)
-    _laws: list[tuple[str, Law, Along, Along, float, float, float, tuple[float, ...]]] = field(
-        default_factory=list
-    )
+    _laws: list[_KnownLaw] = field(default_factory=list)
     _reads: dict[str, float] = field(default_factory=dict)
     _hears: dict[str, tuple[tuple[int, float], ...]] = field(default_factory=dict)
 
@@ -142,8 +156,13 @@ class Assembly:
         if law is Law.PLAY:
             self.add_torque(looks_at, stiffness, damping)
         self._laws.append(
-            (name, law, acts_on, looks_at, feedthrough, stiffness, damping, parameters)
+            (name, law, dict(acts_on), looks_at, feedthrough, stiffness, damping, parameters)
         )
+
+    def let_act(self, name: str, target: str, coefficient: float) -> None:
+        """Let a law that was added before act on one more signal or coordinate."""
+        acts_on = next(acts for known, _, acts, *_ in self._laws if known == name)
+        acts_on[target] = acts_on.get(target, 0.0) + coefficient
 
     def build(self, output: Along | None = None) -> PiecewiseLinearSystem:
         """Matrices and laws, with `output` as the row of what is read, V_o where not given."""
@@ -193,6 +212,7 @@ class Assembly:
             states=at.names,
             energy=energy,
             reading=self.reading,
+            closed=self.closed,
         )
 
 

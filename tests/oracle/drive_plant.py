@@ -1,9 +1,10 @@
 """A second oracle: drives that are not the paper's, written out by hand and stepped by RK4.
 
 Owns an independent answer for current-controlled amplifiers, couplings, one or two stages, and a
-bench with a clock: command held, encoder or tachometer sampled, readings late. Nothing is
-linearised: counts are counted, and a delay is a wait. It must never import a module of the project
-but for the compiler's decorator, and takes a parsed unit file as it stands.
+bench with a clock: command held, encoder or tachometer sampled, readings late, and a speed or
+position loop around all that. Nothing is linearised: counts are counted, and a delay is a wait. It
+must never import a module of the project but for the compiler's decorator, and takes a parsed unit
+file as it stands.
 """
 
 from __future__ import annotations
@@ -72,6 +73,33 @@ class Bench(NamedTuple):
     delay_s: float
 
 
+class Loop(NamedTuple):
+    """A controller. `K_p` 0: none. `K_i` is K_p / T_i, `K_v` 0: of the speed alone."""
+
+    K_p: float
+    K_i: float
+    K_v: float
+    reference: bool
+    filtered: bool
+    digital: bool
+    computing_s: float
+
+
+def loop_of(document: dict[str, Any]) -> Loop:
+    """The controller of a parsed unit file."""
+    loop, clock = document.get("loop", {}), document.get("sampling")
+    K_p = loop.get("K_p", 0.0)
+    return Loop(
+        K_p,
+        K_p / loop["T_i_s"] if "T_i_s" in loop else 0.0,
+        loop.get("K_v", 0.0),
+        loop.get("excited", "reference") == "reference",
+        bool(loop.get("filtered", False)),
+        bool(clock and clock.get("holds_command", True)),
+        loop.get("computing_s", 0.0),
+    )
+
+
 def plant_of(document: dict[str, Any], ratio: float, **changed: float) -> tuple[Plant, Bench]:
     """Plant and bench of a parsed unit file at a contribution ratio; some numbers changed."""
     d = document
@@ -132,8 +160,8 @@ def plant_of(document: dict[str, Any], ratio: float, **changed: float) -> tuple[
     return Plant(**numbers), bench
 
 
-_N = 17
-# i, th_m, w_m, th_c, w_c, g1, wg1, s1, ws1, p2, wp2, h, wh, L, wL, V_o, dV_o
+_N = 18
+# i, th_m, w_m, th_c, w_c, g1, wg1, s1, ws1, p2, wp2, h, wh, L, wL, V_o, dV_o, integral of the error
 
 
 @njit(cache=True)
@@ -190,6 +218,7 @@ def _slopes(m, u, fed, y, dy):
         arrives = Th
     dy[13] = y[14]
     dy[14] = (arrives - m.T_f_L * _sgn(y[14]) - m.B_L * y[14]) / m.J_L
+    dy[17] = 0.0
     dy[15], dy[16] = y[16], m.num * fed - m.a1 * y[16] - m.a0 * y[15]
 
 
@@ -200,10 +229,31 @@ def _fed(m, bench, y, held):
 
 
 @njit(cache=True)
-def _dwell(m, bench, volts, hertz, settle, cycles, dt, clock, counter, y, kept):
+def _error(m, loop, source, y):
+    """Error of an analogue speed controller, V."""
+    speed = y[15] if loop.filtered else m.k_ts * (y[14] if m.at_load else y[2])
+    return (source if loop.reference else 0.0) - speed
+
+
+@njit(cache=True)
+def _driven(m, loop, source, fed, y, dy):
+    """Slopes with an analogue controller, or with none."""
+    if loop.K_p == 0.0 or loop.digital:
+        _slopes(m, source, fed, y, dy)
+        return
+    e = _error(m, loop, source, y)
+    command = loop.K_p * e + loop.K_i * y[17]
+    _slopes(m, command + (0.0 if loop.reference else source), fed, y, dy)
+    dy[17] = e
+
+
+@njit(cache=True)
+def _dwell(m, bench, loop, volts, hertz, settle, cycles, dt, clock, counter, y, kept):
     """Sine and cosine in what is read in each kept cycle, as a complex number.
 
-    `clock`: time to the next tick and what is held; `counter`: the last count.
+    `clock`: time to the next tick, command and reading that are held; then of a controller at the
+    clock the sum of errors, the command to come, and the time until it comes. `counter`: the last
+    count.
     """
     k = np.empty((4, _N))
     at = np.empty(_N)
@@ -215,7 +265,7 @@ def _dwell(m, bench, volts, hertz, settle, cycles, dt, clock, counter, y, kept):
         if bench.rate_hz > 0.0 and clock[0] <= 0.5 * dt:
             clock[0] += period
             clock[1] = volts * math.sin(2.0 * math.pi * hertz * t)
-            angle = y[13] if m.at_load else y[1]
+            angle, before = y[13] if m.at_load else y[1], counter[0]
             if bench.kind == 0:
                 clock[2] = y[15]
             else:
@@ -228,25 +278,45 @@ def _dwell(m, bench, volts, hertz, settle, cycles, dt, clock, counter, y, kept):
                 counter[0] = count
             if bench.samples and not bench.held and not (m.filtered and bench.kind > 0):
                 _add(normal, right, t + bench.delay_s, clock[2], hertz, settle, cycles)
+            if loop.K_p > 0.0 and loop.digital:
+                if bench.kind > 0:
+                    size = 2.0 * math.pi / bench.counts
+                    speed = m.k_ts * (counter[0] - before) * size * bench.rate_hz
+                else:
+                    speed = -_error(m, loop, 0.0, y)
+                set_point = clock[1] if loop.reference else 0.0
+                if loop.K_v > 0.0:
+                    set_point = loop.K_v * (set_point - m.k_ts * counter[0] * size)
+                e = set_point - speed
+                clock[4] = loop.K_p * e + loop.K_i * period * clock[3]
+                clock[3] += e
+                clock[5] = loop.computing_s
+        if loop.K_p > 0.0 and loop.digital and clock[5] <= 0.5 * dt:
+            # What is added behind the controller is added at its tick.
+            clock[6] = clock[4]
+        clock[5] -= dt
         fed = clock[2]
         if not bench.samples or bench.held or (m.filtered and bench.kind > 0):
             direct = clock[2] if bench.samples else y[15]
             value = y[15] if m.filtered and not (bench.samples and bench.kind == 0) else direct
             _add(normal, right, t + bench.delay_s, value, hertz, settle, cycles)
         held = bench.holds
-        a = clock[1] if held else volts * math.sin(2.0 * math.pi * hertz * t)
-        b = clock[1] if held else volts * math.sin(2.0 * math.pi * hertz * (t + 0.5 * dt))
-        c = clock[1] if held else volts * math.sin(2.0 * math.pi * hertz * (t + dt))
-        _slopes(m, a, _fed(m, bench, y, fed), y, k[0])
+        level = clock[1]
+        if loop.K_p > 0.0 and loop.digital:
+            level = clock[6] + (0.0 if loop.reference else clock[1])
+        a = level if held else volts * math.sin(2.0 * math.pi * hertz * t)
+        b = level if held else volts * math.sin(2.0 * math.pi * hertz * (t + 0.5 * dt))
+        c = level if held else volts * math.sin(2.0 * math.pi * hertz * (t + dt))
+        _driven(m, loop, a, _fed(m, bench, y, fed), y, k[0])
         for j in range(_N):
             at[j] = y[j] + 0.5 * dt * k[0, j]
-        _slopes(m, b, _fed(m, bench, at, fed), at, k[1])
+        _driven(m, loop, b, _fed(m, bench, at, fed), at, k[1])
         for j in range(_N):
             at[j] = y[j] + 0.5 * dt * k[1, j]
-        _slopes(m, b, _fed(m, bench, at, fed), at, k[2])
+        _driven(m, loop, b, _fed(m, bench, at, fed), at, k[2])
         for j in range(_N):
             at[j] = y[j] + dt * k[2, j]
-        _slopes(m, c, _fed(m, bench, at, fed), at, k[3])
+        _driven(m, loop, c, _fed(m, bench, at, fed), at, k[3])
         for j in range(_N):
             y[j] += dt / 6.0 * (k[0, j] + 2.0 * (k[1, j] + k[2, j]) + k[3, j])
         clock[0] -= dt
@@ -286,14 +356,17 @@ def sweep(
     after its end.
     """
     m, bench = plant_of(document, ratio, **changed)
+    loop = loop_of(document)
     rng = np.random.default_rng(seed)
     period = 1.0 / bench.rate_hz if bench.rate_hz else 0.0
-    clock = np.array([rng.random() * period, 0.0, 0.0])
+    clock = np.array([rng.random() * period, *[0.0] * 6])
     counter = np.array([0.0, rng.random()])
     y = np.zeros(_N)
     found = np.zeros((len(frequencies_hz), cycles), dtype=complex)
     for i, hertz in enumerate(frequencies_hz):
-        _dwell(m, bench, volts, float(hertz), settle, cycles, step_s, clock, counter, y, found[i])
+        _dwell(
+            m, bench, loop, volts, float(hertz), settle, cycles, step_s, clock, counter, y, found[i]
+        )
     return found / volts
 
 

@@ -38,6 +38,26 @@ DRIVES = {
 }
 """Sections to add by what they are; ``filter`` None takes the filter away."""
 
+SPEED = {"controls": "speed", "K_p": 1.0, "T_i_s": 0.02}
+LOOPS = {
+    "speed, reference": {"loop": SPEED},
+    "speed, command": {"loop": SPEED | {"excited": "command", "filtered": True, "K_p": 0.3}},
+    "speed at a clock": {"loop": SPEED, "sampling": SAMPLED},
+    "speed by an encoder": DRIVES["encoder, speed"]
+    | {
+        "amplifier": CURRENT,
+        "electronics": {"k_a": 1.0},
+        "loop": SPEED | {"K_p": 0.3, "computing_s": 3e-4},
+    },
+    "position": {
+        "sampling": SAMPLED,
+        "sensor": ENCODER | {"reads": "position", "counts": 65536.0},
+        "filter": None,
+        "loop": {"controls": "position", "K_p": 1.0, "T_i_s": 0.02, "K_v": 40.0},
+    },
+}
+"""The same with a loop closed around them."""
+
 
 def document(sections, base="adss", free=False):
     """The parsed unit file; `free`: without friction and play, so that it is linear."""

@@ -23,14 +23,23 @@ _PARTS = (
     ("motor_coupling", "an elastic coupling behind the motor"),
     ("load_coupling", "an elastic coupling before the load"),
     ("damping", "known damping of shaft or load"),
+    ("loop", "a speed or position loop stays closed while it is measured"),
 )
-_FIRST = "an encoder, a digital controller, a torque drive, couplings or known damping"
+_OF_LOOP = (
+    ("position", "a position loop is around the speed loop"),
+    ("command", "the source is added behind the controller, not as its reference"),
+)
+_FIRST = (
+    "an encoder, a digital controller, a torque drive, couplings, known damping or a closed loop"
+)
 _OF_VOLTAGE = ("L_a", "R_m", "k_b")
 _OF_FILTER = ("filter_numerator", "filter_denominator")
 
 
 def ask_parts(say: Say, read: Read) -> tuple[str, ...]:
     """Names of the sections that a drive needs; one question where it needs none.
+
+    After a loop what it is, ``position`` or ``command``, where it is so.
 
     Raises
     ------
@@ -40,6 +49,10 @@ def ask_parts(say: Say, read: Read) -> tuple[str, ...]:
     if not _yes(say, read, _FIRST):
         return ()
     found = [name for name, words in _PARTS if _yes(say, read, words)]
+    if "loop" in found:
+        # A tachometer reads no position.
+        asked = _OF_LOOP if "sensor" in found else _OF_LOOP[1:]
+        found += [name for name, words in asked if _yes(say, read, words)]
     return tuple(found)
 
 
@@ -48,11 +61,18 @@ def with_parts(template: str, parts: str, names: Collection[str]) -> str:
     wanted = set(names)
     sections = dict(_sections(parts))
     if "sensor" in wanted and "sampling" not in wanted:
-        # An encoder has a clock all the same.
-        sections["sampling"] = sections["sampling"].replace(
-            "holds_command = true ", "holds_command = false"
-        )
+        # An encoder has a clock all the same, and so has a controller that acts on it.
+        if "loop" not in wanted:
+            sections["sampling"] = sections["sampling"].replace(
+                "holds_command = true ", "holds_command = false"
+            )
         wanted.add("sampling")
+    if "position" in wanted:
+        sections["sensor"] = sections["sensor"].replace('reads = "speed"   ', 'reads = "position"')
+        loop = sections["loop"].replace('controls = "speed"   ', 'controls = "position"')
+        sections["loop"] = loop.replace("# K_v = 30.0  ", "K_v = 30.0    ")
+    if "command" in wanted:
+        sections["loop"] = sections["loop"].replace('"reference"  ', '"command"    ')
     useless: tuple[str, ...] = ()
     if "amplifier" in wanted:
         useless += _OF_VOLTAGE

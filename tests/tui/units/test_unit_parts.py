@@ -15,7 +15,7 @@ from tui import cli
 from tui.unit_questions import ask_for_values
 from tui.units import ask_parts, with_parts
 
-NAMES = ("amplifier", "sensor", "sampling", "motor_coupling", "load_coupling", "damping")
+NAMES = ("amplifier", "sensor", "sampling", "motor_coupling", "load_coupling", "damping", "loop")
 
 
 def template(name):
@@ -52,7 +52,7 @@ def test_every_choice_of_parts_makes_a_unit(stages):
             has = {name for name in NAMES if getattr(unit, name) is not None}
             assert has == {*names, *(["sampling"] if "sensor" in names else [])}
             if "sensor" in names:
-                assert unit.sampling.holds_command == ("sampling" in names)
+                assert unit.sampling.holds_command == bool({"sampling", "loop"} & set(names))
 
 
 def test_part_values_use_catalogue_units():
