@@ -173,7 +173,7 @@ class Amplifier:
     controller: Controller | None = None
     """What commands it; the source does where there is none."""
 
-    def feed(self, assembly: Assembly) -> Feed:
+    def _feed(self, assembly: Assembly) -> Feed:
         """What its input is, once all that makes it has entered."""
         if self.controller is not None:
             return self.controller.feed(assembly)
@@ -221,7 +221,7 @@ class Motor:
         assembly.add_coupling("i_a", "i_a", -self.R_m / self.L_a)
         assembly.add_coupling("i_a", f"{self.coordinate}'", -self.k_b / self.L_a)
         assembly.add_coupling(self.coordinate, "i_a", self.k_t)
-        feed = amplifier.feed(assembly)
+        feed = amplifier._feed(assembly)
         if amplifier.tau_a > 0.0:
             assembly.add_signal("V_m")
             assembly.add_coupling("V_m", "V_m", -1.0 / amplifier.tau_a)

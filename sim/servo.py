@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,15 +106,14 @@ def _held(
     """What sampled laws hold at the start (5 per law, levels)."""
     held = np.zeros((HELD * len(system.sampled), still.shape[1]))
     phase = rng.random(still.shape[1]) if system.sampled else 0.0
-    offsets: dict[bytes, NDArray[np.float64]] = {}
+    offsets: dict[bytes, Any] = {}
     for i, law in enumerate(system.sampled):
         held[HELD * i] = phase
         if law.law is not Law.HOLD:
             # Laws that count the same shaft are one encoder.
             shaft = law.outlet.tobytes()
-            if shaft not in offsets:
-                offsets[shaft] = rng.random(still.shape[1])
-            offset = offsets[shaft]
+            offset = offsets[shaft] if shaft in offsets else rng.random(still.shape[1])
+            offsets[shaft] = offset
             held[HELD * i + 1] = offset
             held[HELD * i + 2] = np.floor(law.outlet @ still / law.parameters[1] + offset)
     return held

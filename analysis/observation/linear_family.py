@@ -145,7 +145,8 @@ class Family:
         loop, clock = self.unit.loop, self.unit.sampling
         if loop is None:
             return np.ones_like(s)
-        control = loop.K_p * (1.0 + (0.0 if loop.T_i_s is None else 1.0 / (loop.T_i_s * s)))
+        integral = 0.0 if loop.T_i_s is None else 1.0 / (loop.T_i_s * s)
+        control: Any = loop.K_p * (1.0 + integral)
         control = control * np.exp(-s * (loop.computing_s or 0.0))
         around = control * read * (filtered if loop.filtered else 1.0)
         if clock is not None and clock.holds_command:

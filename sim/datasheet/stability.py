@@ -26,9 +26,9 @@ __all__ = ["MARGIN", "LoopFeatures", "find_unstable", "gain_margin", "loop_featu
 _UNDAMPED = 1e-3
 """Negative damping ratio that any train's own damping, which the model lacks, makes up for."""
 
-_SLOW = 0.01
-"""Growth in the time of a radian at the lowest frequency of the limits that is taken for none:
-poles at zero, of which a drive has some, come out as far from it."""
+_SLOW = 0.1
+"""Share of the lowest angular frequency of the limits below which a pole is taken for one at zero.
+A drive has several of these, and they come out a little off."""
 
 _NEAR = 2e-3
 """A pole that a loop moves by less than so many radians per radian is one of the train alone."""
@@ -135,5 +135,5 @@ def _growing(
             moved = np.abs(np.exp(alone / clock) - np.exp(pole / clock)) * clock
             near = alone[moved < _NEAR * np.abs(alone)]
             rate = max([rate, *np.abs(near)])
-        if pole.real > max(_UNDAMPED * rate, slow):
+        if pole.real > _UNDAMPED * rate and abs(pole) > slow:
             yield complex(pole)

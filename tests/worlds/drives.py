@@ -6,6 +6,7 @@ import tomllib
 from daq.configs import config_path
 from sim.unit import unit_from_mapping
 
+FINE = 4e6
 ENCODER = {"kind": "encoder", "counts": 4096.0}
 CURRENT = {"kind": "current", "bandwidth_hz": 1000.0, "current_limit_a": 1.6}
 COUPLINGS = {
@@ -74,6 +75,17 @@ def document(sections, base="adss", free=False):
             found["motor"].pop(key)
     if free:
         found["motor"]["T_f_m"] = found["load"]["T_f_L"] = found["backlash"]["b_t_deg"] = 0.0
+    return found
+
+
+def finely(sections):
+    """The same drive with an encoder so fine that it hardly counts, and no clip."""
+    found = {name: dict(section) if section else section for name, section in sections.items()}
+    if "counts" in found.get("sensor", {}):
+        found["sensor"]["counts"] = FINE
+    found.get("amplifier", {}).pop("current_limit_a", None)
+    # What the undamped train keeps of its start would hide small errors.
+    found["load_coupling"] = {"k_cL": 3000.0, "c_cL": 0.5, "J_cL": 1e-4}
     return found
 
 

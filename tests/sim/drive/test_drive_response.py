@@ -10,7 +10,6 @@ from sim.drivetrain import paper_drivetrain
 from sim.effects import EffectSetting, drivetrain_with
 from sim.response import Servo, SteppedServo, simulate, simulate_cycles
 
-FINE = 4e6
 LINEAR_HZ = (60.0, 100.0, 140.0, 200.0)
 PLAYED_HZ = (63.0, 97.0, 211.0)
 
@@ -19,20 +18,9 @@ def plan(hertz, **more):
     return SweepPlan(tuple(hertz), (2.5,), **more)
 
 
-def finely(sections):
-    """The same drive with an encoder so fine that it hardly counts, and no clip."""
-    found = {name: dict(section) if section else section for name, section in sections.items()}
-    if "counts" in found.get("sensor", {}):
-        found["sensor"]["counts"] = FINE
-    found.get("amplifier", {}).pop("current_limit_a", None)
-    # What the undamped train keeps of its start would hide small errors.
-    found["load_coupling"] = {"k_cL": 3000.0, "c_cL": 0.5, "J_cL": 1e-4}
-    return found
-
-
 @pytest.mark.parametrize("name", drives.DRIVES)
 def test_drive_without_backlash_has_linear_response(name):
-    sections = finely(drives.DRIVES[name])
+    sections = drives.finely(drives.DRIVES[name])
     unit = drives.unit(sections, free=True)
     shown = simulate(unit, 0.5, plan(LINEAR_HZ, settle_cycles=120, integrate_cycles=60)).gain
     expected = paper_drivetrain(unit, 0.5).system().transfer(np.array(LINEAR_HZ))
@@ -80,7 +68,7 @@ def test_few_counts_scatter_from_cycle_to_cycle(counts):
     """The noise of counting is in the readings, and grows as the counts get coarser."""
     sections = drives.DRIVES["encoder, speed"]
     coarse = sections | {"sensor": sections["sensor"] | {"counts": float(counts)}}
-    fine = sections | {"sensor": sections["sensor"] | {"counts": FINE}}
+    fine = sections | {"sensor": sections["sensor"] | {"counts": drives.FINE}}
     hertz = plan((63.0,), settle_cycles=60)
     noise = [
         simulate(drives.unit(one, free=True), 0.5, hertz).gain_std_db[0] for one in (coarse, fine)
@@ -100,7 +88,7 @@ def test_sampled_lanes_do_not_depend_on_neighbours():
 
 def test_clock_continues_from_dwell_to_dwell():
     """Two dwells are what one of both lengths is, as if nobody had looked in between."""
-    unit = drives.unit(finely(drives.DRIVES["encoder, speed"]), free=True)
+    unit = drives.unit(drives.finely(drives.DRIVES["encoder, speed"]), free=True)
     whole, parts = SteppedServo(unit, 0.4), SteppedServo(unit, 0.4)
     once = whole.dwell(80.0, 2.5, settle_cycles=10, integrate_cycles=10).output_cycles
     parts.dwell(80.0, 2.5, settle_cycles=5, integrate_cycles=5)

@@ -12,21 +12,10 @@ from sim.response import simulate
 
 LINEAR_HZ = (60.0, 140.0)
 PLAYED_HZ = (63.0, 211.0)
-FINE = 4e6
 
 
 def plan(hertz, level=2.5, **more):
     return SweepPlan(tuple(hertz), (level,), **more)
-
-
-def finely(name):
-    """Without a clip, and with an encoder so fine that it hardly counts; the train is damped."""
-    found = {k: dict(v) if v else v for k, v in drives.LOOPS[name].items()}
-    if "counts" in found.get("sensor", {}):
-        found["sensor"]["counts"] = FINE
-    found.get("amplifier", {}).pop("current_limit_a", None)
-    found["load_coupling"] = {"k_cL": 3000.0, "c_cL": 0.5, "J_cL": 1e-4}
-    return found
 
 
 def linear(sections, hertz):
@@ -36,10 +25,11 @@ def linear(sections, hertz):
 
 @pytest.mark.parametrize("name", drives.LOOPS)
 def test_loop_without_backlash_is_linear(name):
-    unit = drives.unit(finely(name), free=True)
+    sections = drives.finely(drives.LOOPS[name])
+    unit = drives.unit(sections, free=True)
     assert not find_impossible(unit)
     shown = simulate(unit, 0.5, plan(LINEAR_HZ, settle_cycles=40, integrate_cycles=20)).gain
-    np.testing.assert_allclose(shown, linear(finely(name), LINEAR_HZ), rtol=2e-3)
+    np.testing.assert_allclose(shown, linear(sections, LINEAR_HZ), rtol=2e-3)
 
 
 def test_closed_loop_follows_from_open_loop():
@@ -47,7 +37,7 @@ def test_closed_loop_follows_from_open_loop():
     hertz = np.array([20.0, 60.0, 140.0, 300.0])
     s = 2j * np.pi * hertz
     control = 0.3 * (1.0 + 1.0 / (0.02 * s))
-    train = {"load_coupling": finely("speed, command")["load_coupling"]}
+    train = {"load_coupling": drives.finely({})["load_coupling"]}
     plain = linear(train, hertz)
     loop = drives.SPEED | {"K_p": 0.3, "filtered": True}
     for where, source in (("reference", control), ("command", 1.0)):
