@@ -123,7 +123,7 @@ def around(symbol: str, low: float, high: float) -> Callable[[Unit], tuple[float
 def _much(unit: Unit, symbol: str) -> float:
     """A friction or a play that would be much for a drive whose datasheet has none."""
     motor = unit.motor
-    volts = unit.electronics.k_a * unit.limits.source_vpk
+    volts = unit.electronics.k_a * unit.limits.source_vpk * _command_gain(unit)
     torque = 0.3 * motor.k_t * volts / (motor.R_m or 1.0)
     return {
         "T_f_m": torque,
@@ -145,7 +145,7 @@ def times(scale: Callable[[Unit], float], low: float, high: float) -> Callable[[
 
 def drive_voltage(unit: Unit) -> float:
     """The largest voltage that the analyser's source puts on the motor, V."""
-    return unit.electronics.k_a * SOURCE_MOST_VPK
+    return unit.electronics.k_a * SOURCE_MOST_VPK * _command_gain(unit)
 
 
 def load_frequency(unit: Unit) -> float:
@@ -176,7 +176,13 @@ def stall_torque(unit: Unit) -> float:
     motor = unit.motor
     ratio = unit.stage1.N_1 * unit.output_ratio
     # A current-controlled amplifier makes a current of the command, without a resistance.
-    return unit.electronics.k_a * motor.k_t / (motor.R_m or 1.0) * ratio
+    volts = unit.electronics.k_a * _command_gain(unit)
+    return volts * motor.k_t / (motor.R_m or 1.0) * ratio
+
+
+def _command_gain(unit: Unit) -> float:
+    """V at the amplifier's input per V of the source, as long as nothing moves."""
+    return 1.0 if unit.loop is None else unit.loop.gain_at(unit.limits.stop_hz)
 
 
 def shaft_at_load(unit: Unit) -> float:

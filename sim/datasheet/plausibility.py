@@ -129,6 +129,7 @@ def _values(unit: Unit) -> dict[str, float]:
     return (
         unit.parameters
         | _filter_values(unit)
+        | _loop_values(unit)
         | {
             "source_vpk": limits.source_vpk,
             "source_offset_v": limits.source_offset_v,
@@ -136,6 +137,13 @@ def _values(unit: Unit) -> dict[str, float]:
             "stop_hz": limits.stop_hz,
         }
     )
+
+
+def _loop_values(unit: Unit) -> dict[str, float]:
+    if unit.loop is None:
+        return {}
+    limits, gain_at = unit.limits, unit.loop.gain_at
+    return {"slow_gain": gain_at(limits.start_hz), "fast_gain": gain_at(limits.stop_hz)}
 
 
 def _filter_values(unit: Unit) -> dict[str, float]:

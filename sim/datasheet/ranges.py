@@ -15,6 +15,7 @@ from sim.datasheet.catalogue_units import unit_in_files
 __all__ = ["COMBINED", "KEYS", "SINGLES", "Range", "Values"]
 
 Values = Mapping[str, float]
+"""By symbol; `slow_gain` and `fast_gain` are those of a controller at the ends of the limits."""
 
 _SECTIONS = {
     "motor": ("L_a", "R_m", "k_b", "k_t", "J_m", "B_m", "T_f_m"),
@@ -129,7 +130,7 @@ def _total(v: Values) -> float:
 
 
 def _stall_torque(v: Values) -> float:
-    volts = v["source_vpk"] + v["source_offset_v"]
+    volts = (v["source_vpk"] + v["source_offset_v"]) * v.get("slow_gain", 1.0)
     if "R_m" in v:
         return v["k_t"] * v["k_a"] * volts / v["R_m"]
     return v["k_t"] * min(v["k_a"] * volts, v.get("current_limit_a", math.inf))
@@ -241,7 +242,7 @@ COMBINED = (
     ),
     Range(
         ("current_limit_a", "k_a", "source_vpk"), (0.2, math.inf), (0.0, math.inf),
-        lambda v: v["current_limit_a"] / (v["k_a"] * v["source_vpk"]),
+        lambda v: v["current_limit_a"] / (v["k_a"] * v["source_vpk"] * v.get("fast_gain", 1.0)),
         "it is {value} times the current that limits.source_vpk asks for",
         remedy="the amplifier clips at most levels; lower limits.source_vpk, or see whether k_a is "
         "in A/V",

@@ -6,6 +6,7 @@ equations: `sim.drivetrain` does.
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -166,6 +167,13 @@ class Loop(_Section):
         if self.controls == "speed" and self.K_v is not None:
             raise ValueError("loop.K_v is that of a position loop; leave it out, or set controls")
         return self
+
+    def gain_at(self, hertz: float) -> float:
+        """V of command per V of source at a frequency, as long as nothing moves."""
+        if self.excited == "command":
+            return 1.0
+        integral = 0.0 if self.T_i_s is None else 1.0 / (2.0 * math.pi * hertz * self.T_i_s)
+        return self.K_p * (self.K_v or 1.0) * math.hypot(1.0, integral)
 
 
 _OF_VOLTAGE = ("L_a", "R_m", "k_b")

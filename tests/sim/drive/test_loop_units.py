@@ -1,6 +1,7 @@
 """Unit files with [loop]: what is refused, what is unstable, and what a person is told."""
 
 import hashlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -159,3 +160,22 @@ def test_drive_without_loop_is_bit_identical(name):
     unit = load_unit(name)
     system = paper_drivetrain(unit, 1.0 if unit.stages == 1 else 0.3).system()
     assert hashlib.sha256(linear_key(system)).hexdigest()[:16] == DIGESTS[name]
+
+
+def test_small_reference_of_loop_may_overcome_friction():
+    """What the motor gets is the controller's command, not the source: so are ranges of effects."""
+    limits = {"source_vpk": 0.05, "source_offset_v": 0.0}
+    amplifier = {"current_limit_a": 1.6, "kind": "current", "bandwidth_hz": 1000.0}
+    sections = POSITION | {"limits": limits, "amplifier": amplifier, "electronics": {"k_a": 0.1}}
+    unit = drives.unit(sections)
+    assert not find_impossible(unit)
+    without = unit.model_copy(update={"loop": None})
+    assert "T_f_m" in find_impossible(without)[0]
+    (dead,) = BUILT_IN["amplifier-dead-zone"].parameters
+    assert dead.range(unit)[1] == pytest.approx(40.0 * dead.range(without)[1], rel=1e-3)
+
+
+def test_example_of_loop_is_plausible():
+    unit = load_unit(str(Path(__file__).parents[3] / "docs" / "examples" / "loop.toml"))
+    assert not find_unusual(unit)
+    assert unit.loop is not None
