@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 from sim.drive.controller import Controller
 from sim.drive.sections import Damping
-from sim.drive.sensors import Encoder, SampledTachometer
+from sim.drive.sensors import AnalogueSensor, Encoder, SampledTachometer
 from sim.drive.unit import Unit
 from sim.elements import (
     Amplifier,
@@ -187,6 +187,19 @@ def _sensed(unit: Unit) -> str:
 def _sensor(unit: Unit) -> Element:
     electronics, sensor, sampling = unit.electronics, unit.sensor, unit.sampling
     filtered = electronics.filter_numerator, electronics.filter_denominator
+    late = 0.0 if sensor is None else sensor.delay_s or 0.0
+    if sensor is not None and sensor.kind in ("accelerometer", "current"):
+        return AnalogueSensor(
+            "current" if sensor.kind == "current" else "acceleration",
+            _sensed(unit),
+            electronics.k_ts * (sensor.radius_m or 1.0),
+            sensor.low_pass_hz,
+            sensor.high_pass_hz,
+            *filtered,
+            sampling.rate_hz if sensor.sampled and sampling is not None else 0.0,
+            sensor.held,
+            late,
+        )
     if sensor is not None and sensor.kind == "encoder":
         assert sampling is not None
         assert sensor.counts is not None
@@ -198,11 +211,10 @@ def _sensor(unit: Unit) -> Element:
             sensor.reads == "speed",
             sensor.held,
             *filtered,
-            sensor.delay_s or 0.0,
+            late,
         )
     assert filtered[0] is not None
     assert filtered[1] is not None
-    late = 0.0 if sensor is None else sensor.delay_s or 0.0
     known = _sensed(unit), electronics.k_ts, filtered[0], filtered[1]
     if sensor is not None and sensor.sampled:
         assert sampling is not None

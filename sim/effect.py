@@ -64,6 +64,12 @@ class EffectParameter:
         """
         return 1.0 if self.name == "scale" else unit.parameters.get(self.name) or None
 
+    def symbol_of(self, unit: Unit) -> str:
+        """Unit of its value: `unit_symbol`, but for the gain of a sensor that is no tachometer."""
+        if self.name == "k_ts" and unit.sensor is not None:
+            return unit.sensor.gain_unit
+        return self.unit_symbol
+
     def spread(self, unit: Unit) -> float:
         """One standard deviation of it that is believed of the datasheet, as a share; 0 if none."""
         shares = unit.tolerances

@@ -85,7 +85,7 @@ _TOLERATED = (
     "L_a", "R_m", "k_b", "k_t", "J_m", "B_m", "T_f_m", "k_a", "k_ts", "filter_numerator",
     "N_1", "k_g1", "J_g1", "k_s1", "J_s1", "J_p2", "N", "k_2", "J_L", "T_f_L", "B_L", "c_s1",
     "c_g1", "c_2", "bandwidth_hz", "delay_s", "k_cm", "c_cm", "J_cm", "k_cL", "c_cL", "J_cL",
-    "K_p", "T_i_s", "K_v", "computing_s",
+    "K_p", "T_i_s", "K_v", "computing_s", "low_pass_hz", "high_pass_hz",
 )  # fmt: skip
 """Table 1 but for the backlash, whose departure is the effect total-backlash; and what drives have
 that are not the paper's."""

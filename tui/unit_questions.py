@@ -13,7 +13,14 @@ from dataclasses import dataclass
 from textwrap import wrap
 
 from daq.errors import InputError
-from sim.datasheet import impossible_among, parse_quantity, units_of, unusual_among
+from sim.datasheet import (
+    SENSOR_GAINS,
+    impossible_among,
+    parse_quantity,
+    shown_symbol,
+    units_of,
+    unusual_among,
+)
 
 __all__ = ["HELP", "ask_for_values", "ask_stages"]
 
@@ -34,6 +41,9 @@ class _Question:
     symbol: str
     meaning: str
     example: str
+    quantity: str
+    """What its units are known by: the symbol, but for the gain of a sensor in a tachometer's
+    place."""
 
 
 Say = Callable[[str], None]
@@ -75,7 +85,7 @@ def ask_for_values(template: str, say: Say, read: Read) -> str:
     place = 0
     while place < len(questions):
         question = questions[place]
-        symbol = question.symbol
+        symbol = question.quantity
         answer = _line(say, read, _text(question))
         if answer == "<":
             place = max(0, place - 1)
@@ -97,14 +107,19 @@ def ask_for_values(template: str, say: Say, read: Read) -> str:
             if unit.name != units_of(symbol)[0].name or not unit.name:
                 say(f"  = {value:.6g} {units_of(symbol)[0].name}".rstrip() + "\n")
         place += 1
-    return _filled(template, values, told)
+    shown = {question.quantity: question.symbol for question in questions}
+    return _filled(
+        template,
+        {shown[quantity]: value for quantity, value in values.items()},
+        {shown[quantity]: answer for quantity, answer in told.items()},
+    )
 
 
 def _faults(symbol: str, value: float, before: dict[str, float]) -> list[str]:
     """What is wrong with an answer, alone or beside those before."""
     zero_is_allowed = symbol in _MAY_BE_ZERO
     if value < 0.0 or (value == 0.0 and not zero_is_allowed):
-        return [f"{symbol} must be {'0 or more' if zero_is_allowed else 'above 0'}"]
+        return [f"{shown_symbol(symbol)} must be {'0 or more' if zero_is_allowed else 'above 0'}"]
     faults = list(impossible_among({**before, symbol: value}))
     return [*faults, "give it again, or < for the one before"] if faults else []
 
@@ -119,7 +134,7 @@ def _line(say: Say, read: Read, prompt: str) -> str:
 
 
 def _text(question: _Question) -> str:
-    units = ", ".join(unit.name for unit in units_of(question.symbol) if unit.name)
+    units = ", ".join(unit.name for unit in units_of(question.quantity) if unit.name)
     texts = [f"{question.symbol}: {question.meaning}", *([f"in {units}"] if units else [])]
     lines = [line for text in texts for line in wrap(text, 76, subsequent_indent="  ")]
     return "\n  ".join([*lines, f"(example {question.example}): "])
@@ -132,13 +147,14 @@ def _questions(template: str) -> list[_Question]:
         match = _VALUE.match(line)
         if line.startswith(_FILTER[0]):
             found += [
-                _Question(_CORNER, "corner of the filter behind the tachometer", "158 Hz"),
-                _Question(_DAMPING, "damping ratio of that filter", "0.71"),
+                _Question(_CORNER, "corner of the filter behind the tachometer", "158 Hz", _CORNER),
+                _Question(_DAMPING, "damping ratio of that filter", "0.71", _DAMPING),
             ]
         elif match and match["symbol"] not in _SKIPPED:
             # After the unit, which stands first in the comment.
-            meaning = re.split(r"  +", match["comment"], maxsplit=1)[-1]
-            found.append(_Question(match["symbol"], meaning, match["value"]))
+            parts, symbol = re.split(r"  +", match["comment"], maxsplit=1), match["symbol"]
+            quantity = SENSOR_GAINS.get(parts[0], symbol) if symbol == "k_ts" else symbol
+            found.append(_Question(symbol, parts[-1], match["value"], quantity))
     return found
 
 

@@ -242,7 +242,9 @@ def _causes(
     sizes: dict[str, list[Size]] = {}
     for (effect, parameter), value, std in zip(hypothesis.parameters, values, stds, strict=True):
         known = parameter.nominal(hypothesis.unit)
-        size = Size(parameter.name, float(value), float(std), parameter.unit_symbol, known)
+        size = Size(
+            parameter.name, float(value), float(std), parameter.symbol_of(hypothesis.unit), known
+        )
         sizes.setdefault(effect, []).append(size)
     likelihood = {c.hypothesis.effects: c.best.log_likelihood for c in candidates}
 

@@ -18,7 +18,7 @@ from sim.engine.linear import smooth_response
 from sim.engine.system import PiecewiseLinearSystem
 from sim.unit import Unit
 
-__all__ = ["Landmarks", "draw_plan", "landmarks", "reference_response"]
+__all__ = ["Landmarks", "draw_plan", "feature_sign", "landmarks", "reference_response"]
 
 _SMOOTHING = 0.15
 """Loss factor of the reference response: wide enough that no resonance is sharp."""
@@ -61,6 +61,11 @@ def reference_response(unit: Unit, frequency_hz: NDArray[np.float64]) -> NDArray
     return smooth_response(linear_system(unit), s)
 
 
+def feature_sign(unit: Unit) -> int:
+    """-1 where a resonance is a minimum of the gain, as of the motor's current; else 1."""
+    return -1 if unit.sensor is not None and unit.sensor.kind == "current" else 1
+
+
 def landmarks(unit: Unit) -> Landmarks:
     """Simulate a few machines as the datasheet has them, and read where their features lie.
 
@@ -68,7 +73,8 @@ def landmarks(unit: Unit) -> Landmarks:
     """
     closed = np.geomspace(unit.limits.start_hz, unit.limits.stop_hz, 2000)
     gain = np.abs(linear_system(unit).transfer(closed) / reference_response(unit, closed))
-    highest = closed[int(np.argmax(gain))]
+    sign = feature_sign(unit)
+    highest = closed[int(np.argmax(sign * np.log(gain)))]
     grid = np.geomspace(
         max(_PILOT_HZ[0] * highest, unit.limits.start_hz),
         min(_PILOT_HZ[1] * highest, unit.limits.stop_hz),
@@ -79,7 +85,8 @@ def landmarks(unit: Unit) -> Landmarks:
     ratios = [1.0] if unit.stages == 1 else np.linspace(0.05, 0.95, 5).tolist()
     servos = [Machine(ratio, seed).servo(unit) for seed, ratio in enumerate(ratios)]
     cycles = np.array(safe_cycles(servos, plan, workers=1))[..., 1].mean(axis=-1)
-    excess = np.log(np.abs(cycles / reference_response(unit, grid))).reshape(-1, len(grid))
+    excess = sign * np.log(np.abs(cycles / reference_response(unit, grid)))
+    excess = excess.reshape(-1, len(grid))
     valleys = np.argmin(excess, axis=1)
     peaks = [v + int(np.argmax(one[v:])) for v, one in zip(valleys, excess, strict=True)]
     return Landmarks(float(grid[valleys].min()), float(np.median(grid[peaks])))

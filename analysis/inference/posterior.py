@@ -211,7 +211,9 @@ def limits(
             low if low > least and (amid or not from_zero) else None,
             high if high < most and (amid or from_zero) else None,
         )
-        found.append(ExclusionLimit(effect, parameter.name, parameter.unit_symbol, *shown, known))
+        found.append(
+            ExclusionLimit(effect, parameter.name, parameter.symbol_of(unit), *shown, known)
+        )
     return tuple(found)
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from analysis.observation.excitation import excitation_doubt
 from analysis.observation.linear_family import Family, draw_machines, neighbours
-from analysis.observation.usual_mistakes import GAIN, MISTAKES, Curve
+from analysis.observation.usual_mistakes import GAIN, MISTAKES, Curve, quantities
 from analysis.resonance.samples import refuse_levels
 from daq.errors import AnalysisError, InputError
 from daq.frf import DB_PER_NEPER, FrequencyResponse, PointFlag
@@ -285,7 +285,10 @@ def _judged(
         likely = name if distances[name] < distances[likely] + _TOLD else likely
     if likely and (likely in told or _is_better(distances[likely], given)):
         near = [] if likely in told else _as_likely(distances, offsets, likely)
-        words = [MISTAKES[n].words.format(factor=_factor(offsets[n])) for n in (likely, *near)]
+        told_of = quantities("speed" if unit.sensor is None else unit.sensor.reads)
+        words = [
+            MISTAKES[n].words.format(factor=_factor(offsets[n]), **told_of) for n in (likely, *near)
+        ]
         return Finding(likely, False, "; or ".join(words), distances)
     if given > _NOT_OF_UNIT:
         return Finding(None, True, _FOREIGN.format(unit=unit.name), distances)

@@ -128,6 +128,8 @@ class Family:
         if (current := self.unit.amplifier) is not None:
             electrical = p["resistance"] + s / (2.0 * np.pi * current.bandwidth_hz)
         speed = electronics.k_a * k_t / (electrical * mechanical + k_t * k_b)
+        if (sensor := self.unit.sensor) is not None and sensor.kind == "current":
+            speed = speed * mechanical / k_t
         read = electronics.k_ts * speed
         numerator, denominator = electronics.filter_numerator, electronics.filter_denominator
         filtered = np.ones_like(s)
@@ -157,15 +159,21 @@ class Family:
         return np.asarray((control if loop.excited == "reference" else 1.0) / (1.0 + around))
 
     def _read(self, s: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """What a clock, an encoder and a stated delay do."""
+        """What a clock, another sensor than a tachometer and a stated delay do."""
         if self.unit.sampling is None and self.unit.sensor is None:
             return np.ones_like(s)
-        sensor = self.unit.sensor
-        position = sensor is not None and sensor.reads == "position"
         # What a controller holds is in its loop, not behind it.
         plain = self.unit.model_copy(update={"loop": None})
-        system = paper_drivetrain(plain, 1.0).system()
-        return chain_factor(system, s) / (s if position else 1.0)
+        read = chain_factor(paper_drivetrain(plain, 1.0).system(), s)
+        if (sensor := self.unit.sensor) is None:
+            return read
+        derived = {"position": 1.0 / s, "acceleration": s * (sensor.radius_m or 1.0)}
+        read = read * derived.get(sensor.reads, 1.0)
+        if sensor.low_pass_hz is not None:
+            read = read / (1.0 + s / (2.0 * np.pi * sensor.low_pass_hz))
+        if sensor.high_pass_hz is not None:
+            read = read * s / (s + 2.0 * np.pi * sensor.high_pass_hz)
+        return read
 
     def _train(self, p: Mapping[str, Vector], s: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """Torque over speed (machines, frequencies) at gear 1."""

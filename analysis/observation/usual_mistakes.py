@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from daq.frf import DB_PER_NEPER
 
-__all__ = ["GAIN", "MISTAKES", "Curve", "Mistake"]
+__all__ = ["GAIN", "MISTAKES", "Curve", "Mistake", "quantities"]
 
 Vector = NDArray[np.float64]
 
@@ -155,14 +155,14 @@ MISTAKES: Mapping[str, Mistake] = {
     ),
     "position": Mistake(
         _times_omega(1),
-        "the output is likely a position, not a velocity; multiply the gain by the angular "
+        "the output is likely {integral}, not {read}; multiply the gain by the angular "
         "frequency and add 90 to phase_deg",
         _ANY_GAIN,
         needs_phase=True,
     ),
     "acceleration": Mistake(
         _times_omega(-1),
-        "the output is likely an acceleration, not a velocity; divide the gain by the angular "
+        "the output is likely {derivative}, not {read}; divide the gain by the angular "
         "frequency and subtract 90 from phase_deg",
         _ANY_GAIN,
         needs_phase=True,
@@ -174,4 +174,23 @@ MISTAKES: Mapping[str, Mistake] = {
         _ANY_GAIN,
     ),
 }
-"""Every mistake that is looked for, by its name."""
+"""Every mistake that is looked for, by its name: "position" and "acceleration" are those of a drive
+that reads a velocity, and one integral or derivative of what another reads."""
+
+_QUANTITIES = (
+    "the integral of a position", "a position", "a velocity", "an acceleration",
+    "the derivative of an acceleration",
+)  # fmt: skip
+_READ = {"position": 1, "speed": 2, "acceleration": 3}
+_OF_CURRENT = {
+    "integral": "the integral of a current", "read": "a current",
+    "derivative": "the derivative of a current",
+}  # fmt: skip
+
+
+def quantities(reads: str) -> Mapping[str, str]:
+    """What a sensor reads (``read``), its integral and its derivative, in words."""
+    if reads == "current":
+        return _OF_CURRENT
+    at = _READ[reads]
+    return dict(zip(("integral", "read", "derivative"), _QUANTITIES[at - 1 : at + 2], strict=True))

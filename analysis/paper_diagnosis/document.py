@@ -117,7 +117,7 @@ def parameters(agreement: Agreement) -> dict[str, dict[str, dict[str, Any]]]:
         found[effect][parameter.name] = {
             "value": float(value),
             "std": float(error),
-            "unit": parameter.unit_symbol,
+            "unit": parameter.symbol_of(hypothesis.unit),
         }
     return found
 

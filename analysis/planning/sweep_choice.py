@@ -24,7 +24,7 @@ from analysis.commissioning.regression import Gaussian, expected_std
 from analysis.execution.blas import on_one_core
 from analysis.execution.executor import Executor
 from analysis.execution.progress import Progress, part_of
-from analysis.inference.plans import landmarks
+from analysis.inference.plans import feature_sign, landmarks
 from analysis.observation.observation import Observation, unread
 from analysis.observation.reading_noise import USUAL_NOISE_V
 from daq.errors import InputError
@@ -224,6 +224,7 @@ def plan_sweep(
     std, _, plan = min((one for one in found if one[0] <= _ENOUGH * least), key=lambda one: one[1])
     single = [std for std, _, one in found if len(one.levels_vpk) == 1]
     log_gain = drawn.y.reshape(len(drawn.z), 3, len(wide.levels_vpk), -1)[:, 0]
+    log_gain = feature_sign(unit) * log_gain
     middle = log_gain[:, len(wide.levels_vpk) // 2]
     arf, rf = _features(np.array(wide.frequencies_hz), middle)
     return Planned(

@@ -3,7 +3,13 @@
 Owns what a person who fills in a unit file is told. It simulates no motion.
 """
 
-from sim.datasheet.catalogue_units import CatalogueUnit, parse_quantity, units_of
+from sim.datasheet.catalogue_units import (
+    SENSOR_GAINS,
+    CatalogueUnit,
+    parse_quantity,
+    shown_symbol,
+    units_of,
+)
 from sim.datasheet.chain import describe_chain, natural_frequencies
 from sim.datasheet.plausibility import (
     find_impossible,
@@ -13,6 +19,7 @@ from sim.datasheet.plausibility import (
 )
 
 __all__ = [
+    "SENSOR_GAINS",
     "CatalogueUnit",
     "describe_chain",
     "find_impossible",
@@ -20,6 +27,7 @@ __all__ = [
     "impossible_among",
     "natural_frequencies",
     "parse_quantity",
+    "shown_symbol",
     "units_of",
     "unusual_among",
 ]

@@ -11,7 +11,14 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-__all__ = ["CatalogueUnit", "parse_quantity", "unit_in_files", "units_of"]
+__all__ = [
+    "SENSOR_GAINS",
+    "CatalogueUnit",
+    "parse_quantity",
+    "shown_symbol",
+    "unit_in_files",
+    "units_of",
+]
 
 # Exact by definition: international inch and pound, standard gravity (NIST SP 811, appendix B).
 _INCH = 0.0254
@@ -141,6 +148,15 @@ _PLAY = _of(
     "deg", {"arcmin": 1.0 / 60.0, "arcsec": 1.0 / 3600.0, "mrad": 1e-3 / _DEGREE,
             "rad": 1.0 / _DEGREE},
 )  # fmt: skip
+_SENSITIVITY = _of(
+    "V.s^2/m",
+    {"V/(m/s^2)": 1.0, "mV/(m/s^2)": 1e-3, "V/g": 1.0 / _GRAVITY, "mV/g": 1e-3 / _GRAVITY},
+)
+_ANGULAR_SENSITIVITY = _of(
+    "V.s^2/rad", {"V/(rad/s^2)": 1.0, "mV/(rad/s^2)": 1e-3, "mV/(deg/s^2)": 1e-3 / _DEGREE}
+)
+_CURRENT_SENSITIVITY = _of("V/A", {"mV/A": 1e-3, "mV/mA": 1.0})
+_LENGTH = _of("m", {"mm": 1e-3, "cm": 1e-2, "in": _INCH})
 _FREQUENCY = _of("Hz", {"kHz": 1e3, "rad/s": 1.0 / (2.0 * math.pi)})
 _PEAK = _of("V", {"mV": 1e-3, "V rms": math.sqrt(2.0), "V pp": 0.5})
 _VOLTAGE = _of("V", {"mV": 1e-3})
@@ -157,14 +173,21 @@ _QUANTITIES: Mapping[str, tuple[CatalogueUnit, ...]] = {
     **dict.fromkeys(("k_g1", "k_s1", "k_2", "k_cm", "k_cL"), _STIFFNESS),
     "b_t_deg": _PLAY,
     **dict.fromkeys(("start_hz", "stop_hz", "corner_hz", "rate_hz"), _FREQUENCY),
-    "bandwidth_hz": _FREQUENCY,
+    **dict.fromkeys(("bandwidth_hz", "low_pass_hz", "high_pass_hz"), _FREQUENCY),
+    "radius_m": _LENGTH,
     "current_limit_a": _of("A", {"mA": 1e-3, "A rms": math.sqrt(2.0)}),
     **dict.fromkeys(("delay_s", "T_i_s", "computing_s"), _of("s", {"ms": 1e-3, "us": 1e-6})),
     "K_v": _of("1/s", {"m/min/mm": 1000.0 / 60.0}),
     "source_vpk": _PEAK,
     "source_offset_v": _VOLTAGE,
+    "k_acc": _SENSITIVITY,
+    "k_angular": _ANGULAR_SENSITIVITY,
+    "k_current": _CURRENT_SENSITIVITY,
 }
 _PURE = (CatalogueUnit("", 1.0),)
+
+SENSOR_GAINS = {"V.s^2/m": "k_acc", "V.s^2/rad": "k_angular", "V/A": "k_current"}
+"""Symbols that ``k_ts`` of other sensors than a tachometer is known by here, by its unit."""
 
 _SAME = (
     ("1000rpm", "krpm"), ("rpm/1000", "krpm"), ("µ", "u"), ("μ", "u"), ("Ω", "ohm"), ("Ω", "ohm"),
@@ -186,6 +209,11 @@ _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 def units_of(symbol: str) -> tuple[CatalogueUnit, ...]:
     """The units in which a value may be given, that of the file first; a ratio has none."""
     return _QUANTITIES.get(symbol, _PURE)
+
+
+def shown_symbol(symbol: str) -> str:
+    """The symbol as it stands in a unit file."""
+    return "k_ts" if symbol in SENSOR_GAINS.values() else symbol
 
 
 def unit_in_files(symbol: str) -> str:
@@ -223,7 +251,7 @@ def parse_quantity(symbol: str, text: str) -> tuple[float, CatalogueUnit]:
     unit = choices[0] if not rest else _named(rest, choices)
     if unit is None:
         known = ", ".join(choice.name for choice in choices)
-        raise ValueError(f"{rest!r} is no unit of {symbol}; use one of: {known}")
+        raise ValueError(f"{rest!r} is no unit of {shown_symbol(symbol)}; use one of: {known}")
     converted = unit.convert(value)
     if not math.isfinite(converted):
         raise ValueError(f"{text!r} is too large a number")

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.datasheet.stability import gain_margin, loop_features
+from sim.drive.sections import Sensor
 from sim.drive.unit import Unit
 from sim.drivetrain import paper_drivetrain
 from sim.elements import Inertia, Mesh, Spring
@@ -109,7 +110,10 @@ def _drive_lines(unit: Unit) -> list[str]:
     if (sensor := unit.sensor) is not None:
         counts = "" if sensor.counts is None else f", {sensor.counts:.0f} counts a turn"
         late = f", {1e3 * sensor.delay_s:g} ms late" if sensor.delay_s else ""
-        lines.append(f"sensor     {sensor.kind} at the {sensor.at}, {sensor.reads}{counts}{late}")
+        where = "of the motor" if sensor.kind == "current" else f"at the {sensor.at}"
+        read = "" if sensor.kind in ("accelerometer", "current") else f", {sensor.reads}"
+        lines.append(f"sensor     {sensor.kind} {where}{read}{counts}{late}")
+        lines += _band_lines(sensor)
     if (loop := unit.loop) is not None:
         outer = "" if loop.K_v is None else f"K_v {loop.K_v:.4g} 1/s, "
         inner = "" if loop.T_i_s is None else f", T_i {loop.T_i_s:.4g} s"
@@ -137,6 +141,17 @@ def _loop_lines(unit: Unit) -> list[str]:
         f"closed loop, linear: {stable}, meshes closed or open",
         f"  shows {arf}, {rf}",
     ]
+
+
+def _band_lines(sensor: Sensor) -> list[str]:
+    """Mounting and corners of a sensor, where it has any."""
+    told = (
+        (sensor.radius_m, "at {:g} m from the axis"),
+        (sensor.high_pass_hz, "from {:g} Hz"),
+        (sensor.low_pass_hz, "up to {:g} Hz"),
+    )
+    words = ", ".join(text.format(value) for value, text in told if value is not None)
+    return [f"           {words}"] if words else []
 
 
 def _frequency_lines(unit: Unit) -> list[str]:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
-from sim.datasheet.catalogue_units import unit_in_files, units_of
+from sim.datasheet.catalogue_units import SENSOR_GAINS, shown_symbol, unit_in_files, units_of
 from sim.datasheet.chain import natural_frequencies
 from sim.datasheet.ranges import COMBINED, KEYS, SINGLES, Range, Values
 from sim.datasheet.stability import MARGIN, find_unstable
@@ -73,7 +73,7 @@ def _sentence(given: Range, values: Values) -> str:
     what = "" if not given.means else f": {given.means.format(value=quantity)}"
     plausible = _range_text(given)
     slips = [
-        f"if {name} is in {written}, give {converted:.4g}"
+        f"if {shown_symbol(name)} is in {written}, give {converted:.4g}"
         for name, written, converted in _slips(given, values)[:2]
     ]
     remedy = given.remedy or ("" if slips else "see whether it is in SI units")
@@ -125,9 +125,11 @@ def _distance(value: float, bounds: tuple[float, float]) -> float:
 
 
 def _values(unit: Unit) -> dict[str, float]:
-    limits = unit.limits
+    limits, known = unit.limits, unit.parameters
+    if unit.sensor is not None and unit.sensor.gain_unit in SENSOR_GAINS:
+        known[SENSOR_GAINS[unit.sensor.gain_unit]] = known.pop("k_ts")
     return (
-        unit.parameters
+        known
         | _filter_values(unit)
         | _loop_values(unit)
         | {

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from sim.datasheet.catalogue_units import unit_in_files
+from sim.datasheet.catalogue_units import SENSOR_GAINS, unit_in_files
 
 __all__ = ["COMBINED", "KEYS", "SINGLES", "Range", "Values"]
 
@@ -28,12 +28,13 @@ _SECTIONS = {
     "damping": ("B_L", "c_s1", "c_g1", "c_2"),
     "amplifier": ("bandwidth_hz", "current_limit_a"),
     "sampling": ("rate_hz",),
-    "sensor": ("counts", "delay_s"),
+    "sensor": ("counts", "delay_s", "radius_m", "low_pass_hz", "high_pass_hz"),
     "motor_coupling": ("k_cm", "c_cm", "J_cm"),
     "load_coupling": ("k_cL", "c_cL", "J_cL"),
     "loop": ("K_p", "T_i_s", "K_v", "computing_s"),
 }
 KEYS = {symbol: f"{name}.{symbol}" for name, symbols in _SECTIONS.items() for symbol in symbols}
+KEYS |= dict.fromkeys(SENSOR_GAINS.values(), "electronics.k_ts")
 """Where a value stands in a unit file, by symbol."""
 
 
@@ -116,6 +117,13 @@ SINGLES = (
     _single("T_i_s", (1e-4, 100.0), (1e-6, 1e5)),
     _single("K_v", (0.5, 1e3), (1e-3, 1e5)),
     _single("computing_s", (0.0, 0.005), (0.0, 0.1)),
+    # From piezoresistive sensors for shocks (0.1 mV/g) to seismic ones (10 V/g).
+    _single("k_acc", (1e-5, 2.0), (1e-9, 1e4)),
+    _single("k_angular", (1e-7, 10.0), (1e-12, 1e5)),
+    _single("k_current", (1e-3, 1e2), (1e-7, 1e6)),
+    _single("radius_m", (2e-3, 5.0), (1e-4, 1e3), "it is the distance from the axis"),
+    _single("low_pass_hz", (20.0, 1e5), (0.1, 1e7)),
+    _single("high_pass_hz", (1e-4, 20.0), (1e-9, 1e5)),
     *(_single(symbol, *_STIFFNESS) for symbol in ("k_cm", "k_cL")),
     *(_single(symbol, *_INERTIA) for symbol in ("J_cm", "J_cL")),
     *(
@@ -136,6 +144,10 @@ def _stall_torque(v: Values) -> float:
     return v["k_t"] * min(v["k_a"] * volts, v.get("current_limit_a", math.inf))
 
 
+def _acceleration(v: Values) -> float:
+    return _stall_torque(v) / v["J_m"]
+
+
 def _friction(v: Values) -> float:
     return (v["T_f_m"] + v["T_f_L"] / _total(v)) / _stall_torque(v)
 
@@ -152,6 +164,7 @@ def _samples_a_cycle(v: Values) -> float:
     return v["rate_hz"] / v["stop_hz"]
 
 
+_MOVED = ("J_m", "k_t", "k_a", "source_vpk", "source_offset_v")
 _DRIVEN = ("k_t", "k_a", "R_m", "source_vpk", "source_offset_v", "N_1")
 _BY_CURRENT = ("k_t", "k_a", "bandwidth_hz", "source_vpk", "source_offset_v", "N_1")
 
@@ -239,6 +252,27 @@ COMBINED = (
         ("bandwidth_hz", "stop_hz"), (0.5, math.inf), (0.01, math.inf),
         lambda v: v["bandwidth_hz"] / v["stop_hz"],
         "the current loop's bandwidth is {value} times limits.stop_hz",
+    ),
+    Range(
+        ("low_pass_hz", "stop_hz"), (0.5, math.inf), (0.01, math.inf),
+        lambda v: v["low_pass_hz"] / v["stop_hz"],
+        "the sensor's upper corner is {value} times limits.stop_hz",
+    ),
+    Range(
+        ("high_pass_hz", "start_hz"), (0.0, 1.0), (0.0, 100.0),
+        lambda v: v["high_pass_hz"] / v["start_hz"],
+        "the sensor's lower corner is {value} times limits.start_hz",
+    ),
+    Range(
+        ("k_acc", "radius_m", *_MOVED), (2e-4, 50.0), (1e-7, 1e5),
+        lambda v: v["k_acc"] * v["radius_m"] * _acceleration(v),
+        "the accelerometer gives {value} V at the largest torque of the motor, with nothing else "
+        "on its shaft", "V",
+    ),
+    Range(
+        ("k_current", "k_a", "R_m", "source_vpk"), (1e-3, 50.0), (1e-6, 1e5),
+        lambda v: v["k_current"] * v["k_a"] * v["source_vpk"] / v["R_m"],
+        "the sensor gives {value} V at the current that limits.source_vpk drives through R_m", "V",
     ),
     Range(
         ("current_limit_a", "k_a", "source_vpk"), (0.2, math.inf), (0.0, math.inf),

@@ -1,6 +1,6 @@
 """What real drives have and the paper's two do not, as sections of a unit file and as elements.
 
-Owns damping, current-controlled amplifiers, clocks, encoders, couplings and controllers. It knows
+Owns damping, current-controlled amplifiers, clocks, sensors, couplings and controllers. It knows
 no effect.
 """
 
@@ -14,9 +14,10 @@ from sim.drive.sections import (
     Sampling,
     Sensor,
 )
-from sim.drive.sensors import Encoder, SampledTachometer
+from sim.drive.sensors import AnalogueSensor, Encoder, SampledTachometer
 
 __all__ = [
+    "AnalogueSensor",
     "Controller",
     "CurrentAmplifier",
     "Damping",

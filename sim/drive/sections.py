@@ -9,7 +9,14 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 
 __all__ = [
     "OPTIONAL_SECTIONS",
@@ -78,42 +85,94 @@ class Sampling(_Section):
     """Whether the amplifier's input is held from sample to sample (zero-order hold)."""
 
 
+_READS = {"accelerometer": "acceleration", "current": "current"}
+"""What is read by a sensor that reads one thing only."""
+
+_GAIN_UNITS = {"position": "V/rad", "acceleration": "V.s^2/rad", "current": "V/A"}
+
+_ANALOGUE = ("low_pass_hz", "high_pass_hz")
+_LATER = ("radius_m", *_ANALOGUE)
+"""Keys that are no part of a unit's physics where they are not given: older units lack them."""
+
+
 class Sensor(_Section):
     """What the bench reads; without it a tachometer on the motor, read continuously."""
 
-    kind: Literal["tachometer", "encoder"]
+    kind: Literal["tachometer", "encoder", "accelerometer", "current"]
     at: Literal["motor", "load"] = "motor"
-    reads: Literal["speed", "position"] = "speed"
+    reads: Literal["speed", "position", "acceleration", "current"] = "speed"
     """Speed of an encoder is the difference of two samples over the time between them."""
     counts: Annotated[float, Field(ge=4, le=1e9)] | None = None
     """Counts of an encoder in a turn, after quadrature: four times its lines."""
     sampled: bool = False
-    """Of a tachometer: whether it is sampled by the clock of [sampling]; an encoder always is."""
+    """Whether it is sampled by the clock of [sampling]; an encoder always is."""
     held: bool = False
     """Whether samples are read from an analogue output that holds them; else as recorded."""
     delay_s: Annotated[float, Field(ge=0, le=0.1)] | None = None
     """The response is late by so much beyond sampling, over command and sensor together, s."""
+    radius_m: Positive | None = None
+    """Of an accelerometer that is mounted tangentially, m; without it electronics.k_ts is V per
+    rad/s^2, with it V per m/s^2."""
+    low_pass_hz: Positive | None = None
+    """Upper -3 dB corner of an accelerometer or current sensor, of first order, Hz."""
+    high_pass_hz: Positive | None = None
+    """Lower -3 dB corner of the same, of first order, Hz; none where it reads down to 0 Hz."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _reads_what_its_kind_does(cls, given: Any) -> Any:
+        if not isinstance(given, dict) or "reads" in given or given.get("kind") not in _READS:
+            return given
+        return {**given, "reads": _READS[given["kind"]]}
 
     @model_validator(mode="after")
     def _is_consistent(self) -> Self:
-        if self.kind == "encoder" and self.counts is None:
+        kind = self.kind
+        if kind == "encoder" and self.counts is None:
             raise ValueError("sensor.counts is required by an encoder: counts in a turn")
         if self.counts is not None and self.counts != round(self.counts):
             raise ValueError(f"sensor.counts {self.counts:g} is no whole number of counts")
-        if self.kind == "tachometer" and self.counts is not None:
-            raise ValueError("sensor.counts: a tachometer has none; leave it out")
-        if self.kind == "tachometer" and self.reads == "position":
+        if kind != "encoder" and self.counts is not None:
+            raise ValueError(f"sensor.counts: sensor.kind {kind} has none; leave it out")
+        if self.reads != _READS.get(kind, self.reads) or (
+            kind not in _READS and self.reads in _READS.values()
+        ):
+            raise ValueError(f"sensor.reads: sensor.kind {kind} does not read {self.reads}")
+        if kind == "tachometer" and self.reads == "position":
             raise ValueError("sensor.reads: a tachometer reads speed; use an encoder")
-        if self.kind == "encoder" and self.sampled:
+        if kind == "encoder" and self.sampled:
             raise ValueError("sensor.sampled: an encoder always is; leave it out")
         if self.held and not self.is_sampled:
             raise ValueError("sensor.held: nothing is sampled; leave it out or set sensor.sampled")
+        if kind == "current" and self.at == "load":
+            raise ValueError("sensor.at: the current is that of the motor; leave it out")
+        if kind != "accelerometer" and self.radius_m is not None:
+            raise ValueError("sensor.radius_m is that of an accelerometer; leave it out")
+        for name in _ANALOGUE:
+            if kind not in _READS and getattr(self, name) is not None:
+                raise ValueError(
+                    f"sensor.{name} is that of an accelerometer or current sensor; leave it out"
+                )
+        low, high = self.high_pass_hz, self.low_pass_hz
+        if low is not None and high is not None and low >= high:
+            raise ValueError(f"sensor.high_pass_hz {low:g} is not below low_pass_hz {high:g}")
         return self
+
+    @model_serializer(mode="wrap")
+    def _without_later_keys(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return {k: v for k, v in handler(self).items() if v is not None or k not in _LATER}
 
     @property
     def is_sampled(self) -> bool:
         """Whether it is sampled by the clock."""
         return self.kind == "encoder" or self.sampled
+
+    @property
+    def gain_unit(self) -> str:
+        """Unit of ``electronics.k_ts``."""
+        if self.radius_m is not None:
+            return "V.s^2/m"
+        return _GAIN_UNITS.get(self.reads, "V.s/rad")
 
 
 class MotorCoupling(_Section):
@@ -197,11 +256,22 @@ def find_contradiction(unit: Any) -> str:
     if unit.damping is not None and unit.damping.c_2 is not None and unit.stage2 is None:
         return "damping.c_2 is that of stage 2, and there is none; leave it out"
     filtered = (electronics.filter_numerator, electronics.filter_denominator)
-    encoder = sensor is not None and sensor.kind == "encoder"
-    if None in filtered and not (encoder and filtered == (None, None)):
+    tachometer = sensor is None or sensor.kind == "tachometer"
+    if None in filtered and (tachometer or filtered != (None, None)):
         return (
-            "electronics.filter_numerator and filter_denominator are required; a drive with an "
-            "encoder that has no filter has neither"
+            "electronics.filter_numerator and filter_denominator are required; a drive with "
+            "another sensor than a tachometer that has no filter has neither"
+        )
+    endless = sensor is not None and sensor.kind == "accelerometer" and sensor.low_pass_hz is None
+    if endless and None in filtered:
+        return (
+            "sensor.low_pass_hz is required by an accelerometer without a filter: the upper "
+            "corner of its datasheet"
+        )
+    if sensor is not None and sensor.kind == "current" and unit.amplifier is not None:
+        return (
+            "sensor.kind current tells nothing beside [amplifier], which controls the current "
+            "whatever the drive does; read a speed, position or acceleration"
         )
     if sensor is not None and sensor.is_sampled and unit.sampling is None:
         return "sensor is sampled, and there is no section [sampling] with rate_hz"

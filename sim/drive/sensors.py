@@ -1,6 +1,7 @@
-"""Sensors that a clock samples, as elements of a drivetrain.
+"""Sensors other than the paper's tachometer, as elements of a drivetrain.
 
-Owns encoder and sampled tachometer: what is counted, held and read. They never step time.
+Owns encoder, sampled tachometer, accelerometer and current sensor: what is counted, held and read.
+They never step time.
 """
 
 from __future__ import annotations
@@ -8,10 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from sim.engine.system import Assembly, Law
 
-__all__ = ["Encoder", "SampledTachometer", "add_filter", "read_late"]
+__all__ = ["AnalogueSensor", "Encoder", "SampledTachometer", "add_filter", "read_late"]
 
 
 def add_filter(assembly: Assembly, numerator: float, denominator: tuple[float, float, float],
@@ -96,3 +98,71 @@ class SampledTachometer:
         )
         assembly.output = {}
         read_late(assembly, self.delay_s + self.T_d, 0.0 if self.held else 1.0 / self.rate_hz)
+
+
+@dataclass(frozen=True, slots=True)
+class AnalogueSensor:
+    """An accelerometer on a coordinate, or a sensor of the motor's current.
+
+    `gain` is V.s^2/rad of an acceleration, V/A of a current. Between the sensor's corners, each of
+    first order, and behind a filter of second order, if any, it is read as it is, or sampled at
+    `rate_hz` where that is above 0. Delays are exact.
+
+    The acceleration is exact, too: w' behind a low-pass of corner c is c (w - w_c), where w_c is
+    the speed w behind the same low-pass, and behind the filter it is the rate of the filtered
+    speed. So neither torques nor laws need be known, and jumps of either lose nothing.
+    """
+
+    reads: Literal["acceleration", "current"]
+    coordinate: str
+    gain: float
+    low_pass_hz: float | None = None
+    high_pass_hz: float | None = None
+    numerator: float | None = None
+    denominator: tuple[float, float, float] | None = None
+    rate_hz: float = 0.0
+    held: bool = False
+    delay_s: float = 0.0
+    T_d: float = 0.0
+
+    def enter(self, assembly: Assembly) -> None:
+        """Add the sensor's corners and the filter, and the law that samples what is read."""
+        read = self._low_passed(assembly)
+        if self.numerator is not None and self.denominator is not None:
+            add_filter(assembly, self.numerator, self.denominator, read)
+            read = {"V_o'" if self._is_derived_by_filter else "V_o": 1.0}
+        if self.high_pass_hz is not None:
+            corner = 2.0 * math.pi * self.high_pass_hz
+            _follow(assembly, "V_h", read, corner)
+            read = {**read, "V_h": -1.0}
+        period = 0.0
+        if self.rate_hz > 0.0:
+            assembly.add_law("converter", Law.HOLD, {}, read, parameters=(self.rate_hz,), read=1.0)
+            read, period = {}, 0.0 if self.held else 1.0 / self.rate_hz
+        assembly.output = read
+        read_late(assembly, self.delay_s + self.T_d, period)
+
+    @property
+    def _is_derived_by_filter(self) -> bool:
+        """Whether the filter alone limits the band of an acceleration."""
+        return self.reads == "acceleration" and self.low_pass_hz is None
+
+    def _low_passed(self, assembly: Assembly) -> dict[str, float]:
+        """What is sensed, over states; the speed where the filter makes an acceleration of it."""
+        source = "i_a" if self.reads == "current" else f"{self.coordinate}'"
+        if self.low_pass_hz is None:
+            return {source: self.gain}
+        corner = 2.0 * math.pi * self.low_pass_hz
+        if self.reads == "current":
+            _follow(assembly, "V_c", {source: self.gain}, corner)
+            return {"V_c": 1.0}
+        _follow(assembly, "w_c", {source: 1.0}, corner)
+        return {source: self.gain * corner, "w_c": -self.gain * corner}
+
+
+def _follow(assembly: Assembly, signal: str, source: Mapping[str, float], corner: float) -> None:
+    """A low-pass of first order of a sum over states; `corner` in rad/s."""
+    assembly.add_signal(signal)
+    assembly.add_coupling(signal, signal, -corner)
+    for name, gain in source.items():
+        assembly.add_coupling(signal, name, corner * gain)

@@ -71,9 +71,9 @@ class Electronics(_Section):
     k_a: Positive
     """Amplifier gain; A/V of one that controls the current."""
     k_ts: Positive
-    """Tachometer gain, V.s/rad; of an encoder that reads positions V/rad."""
+    """Gain of the sensor: V.s/rad of a tachometer, else `sim.drive.sections.Sensor.gain_unit`."""
     filter_numerator: Positive | None = None
-    """Numerator of G_f, 1/s^2; an encoder may have no filter."""
+    """Numerator of G_f, 1/s^2; other sensors may have no filter."""
     filter_denominator: tuple[Positive, NonNegative, Positive] | None = None
     """Coefficients of s^2, s and 1 in the denominator of G_f."""
 

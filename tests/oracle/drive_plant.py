@@ -2,9 +2,10 @@
 
 Owns an independent answer for current-controlled amplifiers, couplings, one or two stages, and a
 bench with a clock: command held, encoder or tachometer sampled, readings late, and a speed or
-position loop around all that. Nothing is linearised: counts are counted, and a delay is a wait. It
-must never import a module of the project but for the compiler's decorator, and takes a parsed unit
-file as it stands.
+position loop around all that; accelerometers and current sensors, continuous or sampled. Nothing is
+linearised: counts are counted, a delay is a wait, and an acceleration is the sum of torques over an
+inertia. It must never import a module of the project but for the compiler's decorator, and takes a
+parsed unit file as it stands.
 """
 
 from __future__ import annotations
@@ -18,7 +19,10 @@ from sim.engine.compiling import njit
 
 
 class Plant(NamedTuple):
-    """Every number; SI, half plays in rad. A missing coupling is locked, k = 0."""
+    """Every number; SI, half plays in rad. A missing coupling is locked, k = 0.
+
+    `sense`: 0 speed or angle, 1 acceleration, 2 current; `low`, `high`: corners, rad/s, 0 for none.
+    """
 
     current: bool
     L_a: float
@@ -59,6 +63,9 @@ class Plant(NamedTuple):
     a1: float
     a0: float
     at_load: bool
+    sense: int
+    low: float
+    high: float
 
 
 class Bench(NamedTuple):
@@ -138,12 +145,15 @@ def plant_of(document: dict[str, Any], ratio: float, **changed: float) -> tuple[
         **{k: d.get("damping", {}).get(k, 0.0) for k in ("B_L", "c_s1", "c_g1", "c_2")},
         "delta_1": math.radians(b1) / 2.0,
         "delta_2": math.radians(b2) / 2.0,
-        "k_ts": e["k_ts"],
+        "k_ts": e["k_ts"] * sensor.get("radius_m", 1.0),
         "filtered": "filter_numerator" in e,
         "num": e.get("filter_numerator", 1.0) / den[0],
         "a1": den[1] / den[0],
         "a0": den[2] / den[0],
         "at_load": sensor.get("at") == "load",
+        "sense": {"accelerometer": 1, "current": 2}.get(sensor["kind"], 0),
+        "low": 2.0 * math.pi * sensor.get("low_pass_hz", 0.0),
+        "high": 2.0 * math.pi * sensor.get("high_pass_hz", 0.0),
     }
     numbers.update(changed)
     encoder = sensor["kind"] == "encoder"
@@ -160,8 +170,9 @@ def plant_of(document: dict[str, Any], ratio: float, **changed: float) -> tuple[
     return Plant(**numbers), bench
 
 
-_N = 18
-# i, th_m, w_m, th_c, w_c, g1, wg1, s1, ws1, p2, wp2, h, wh, L, wL, V_o, dV_o, integral of the error
+_N = 20
+# i, th_m, w_m, th_c, w_c, g1, wg1, s1, ws1, p2, wp2, h, wh, L, wL, V_o, dV_o, integral of
+# the error, low-pass, high-pass
 
 
 @njit(cache=True)
@@ -218,8 +229,26 @@ def _slopes(m, u, fed, y, dy):
         arrives = Th
     dy[13] = y[14]
     dy[14] = (arrives - m.T_f_L * _sgn(y[14]) - m.B_L * y[14]) / m.J_L
-    dy[17] = 0.0
+    dy[17], dy[18], dy[19] = 0.0, 0.0, 0.0
+    if m.sense > 0:
+        fed = m.k_ts * (y[0] if m.sense == 2 else (dy[14] if m.at_load else dy[2]))
+        if m.low > 0.0:
+            dy[18] = m.low * (fed - y[18])
+            fed = y[18]
+        if m.high > 0.0:
+            dy[19] = m.high * (fed - y[19])
+            fed -= y[19]
     dy[15], dy[16] = y[16], m.num * fed - m.a1 * y[16] - m.a0 * y[15]
+
+
+@njit(cache=True)
+def _shown(m, y):
+    """What an analogue sensor and its filter, if any, give."""
+    if m.filtered:
+        return y[15]
+    if m.sense == 0:
+        return m.k_ts * (y[14] if m.at_load else y[2])
+    return (y[18] if m.low > 0.0 else m.k_ts * y[0]) - y[19]
 
 
 @njit(cache=True)
@@ -267,7 +296,7 @@ def _dwell(m, bench, loop, volts, hertz, settle, cycles, dt, clock, counter, y, 
             clock[1] = volts * math.sin(2.0 * math.pi * hertz * t)
             angle, before = y[13] if m.at_load else y[1], counter[0]
             if bench.kind == 0:
-                clock[2] = y[15]
+                clock[2] = _shown(m, y)
             else:
                 count = math.floor(angle * bench.counts / (2.0 * math.pi) + counter[1])
                 size = 2.0 * math.pi / bench.counts
@@ -297,7 +326,7 @@ def _dwell(m, bench, loop, volts, hertz, settle, cycles, dt, clock, counter, y, 
         clock[5] -= dt
         fed = clock[2]
         if not bench.samples or bench.held or (m.filtered and bench.kind > 0):
-            direct = clock[2] if bench.samples else y[15]
+            direct = clock[2] if bench.samples else _shown(m, y)
             value = y[15] if m.filtered and not (bench.samples and bench.kind == 0) else direct
             _add(normal, right, t + bench.delay_s, value, hertz, settle, cycles)
         held = bench.holds
@@ -385,7 +414,7 @@ def _by_signal(m, volts, dt, every, y, kept):
         for j in range(_N):
             y[j] += dt / 6.0 * (k[0, j] + 2.0 * (k[1, j] + k[2, j]) + k[3, j])
         if n % every == every - 1:
-            kept[n // every] = y[15] if m.filtered else m.k_ts * (y[14] if m.at_load else y[2])
+            kept[n // every] = _shown(m, y)
 
 
 def by_signal(

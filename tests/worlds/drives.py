@@ -14,6 +14,12 @@ COUPLINGS = {
     "load_coupling": {"k_cL": 3000.0, "c_cL": 0.1, "J_cL": 1e-4},
 }
 SAMPLED = {"rate_hz": 2000.0}
+MOTOR_ACCELEROMETER = {"kind": "accelerometer", "low_pass_hz": 500.0}
+LOAD_ACCELEROMETER = {
+    "kind": "accelerometer", "at": "load", "radius_m": 0.05, "low_pass_hz": 1000.0,
+    "high_pass_hz": 0.5,
+}  # fmt: skip
+"""Mounted tangentially; 0.0102 V per m/s^2 are 100 mV/g."""
 
 DRIVES = {
     "command held": {"sampling": SAMPLED},
@@ -32,6 +38,22 @@ DRIVES = {
     "tachometer sampled": {
         "sampling": {"rate_hz": 1000.0},
         "sensor": {"kind": "tachometer", "sampled": True},
+    },
+    "accelerometer at the load": {"sensor": LOAD_ACCELEROMETER, "electronics": {"k_ts": 0.0102}},
+    "accelerometer behind the filter": {
+        "sensor": {"kind": "accelerometer"},
+        "electronics": {"k_ts": 1e-4},
+    },
+    "accelerometer sampled": {
+        "sampling": SAMPLED,
+        "sensor": MOTOR_ACCELEROMETER | {"sampled": True, "delay_s": 2e-4},
+        "electronics": {"k_ts": 1e-4},
+        "filter": None,
+    },
+    "motor current": {
+        "sensor": {"kind": "current", "low_pass_hz": 2000.0, "high_pass_hz": 0.5},
+        "electronics": {"k_ts": 0.4},
+        "filter": None,
     },
     "current": {"amplifier": CURRENT, "electronics": {"k_a": 1.0}, "sampling": SAMPLED},
     "couplings": COUPLINGS,

@@ -19,6 +19,8 @@ Read = Callable[[], str]
 _PARTS = (
     ("amplifier", "the amplifier controls the current, not the voltage"),
     ("sensor", "an encoder is read, not a tachometer"),
+    ("accelerometer", "an accelerometer is read"),
+    ("motor_current", "the motor's current is read"),
     ("sampling", "a digital controller holds the command from sample to sample"),
     ("motor_coupling", "an elastic coupling behind the motor"),
     ("load_coupling", "an elastic coupling before the load"),
@@ -30,8 +32,11 @@ _OF_LOOP = (
     ("command", "the source is added behind the controller, not as its reference"),
 )
 _FIRST = (
-    "an encoder, a digital controller, a torque drive, couplings, known damping or a closed loop"
+    "an encoder, accelerometer or current sensor, a digital controller, a torque drive, couplings, "
+    "known damping or a closed loop"
 )
+_IN_PLACE = ("accelerometer", "motor_current")
+"""Sections that are one of ``[sensor]`` in place of the encoder's, each beginning with its gain."""
 _OF_VOLTAGE = ("L_a", "R_m", "k_b")
 _OF_FILTER = ("filter_numerator", "filter_denominator")
 
@@ -48,7 +53,14 @@ def ask_parts(say: Say, read: Read) -> tuple[str, ...]:
     """
     if not _yes(say, read, _FIRST):
         return ()
-    found = [name for name, words in _PARTS if _yes(say, read, words)]
+    found: list[str] = []
+    for name, words in _PARTS:
+        useless = name in _IN_PLACE and any(one in found for one in ("sensor", *_IN_PLACE))
+        useless = useless or (name == "motor_current" and "amplifier" in found)
+        # A loop controls what its sensor reads, a speed or position.
+        useless = useless or (name == "loop" and any(one in found for one in _IN_PLACE))
+        if not useless and _yes(say, read, words):
+            found.append(name)
     if "loop" in found:
         # A tachometer reads no position.
         asked = _OF_LOOP if "sensor" in found else _OF_LOOP[1:]
@@ -79,6 +91,11 @@ def with_parts(template: str, parts: str, names: Collection[str]) -> str:
         template = template.replace(
             "V at the motor per V at the amplifier's input", "A per V at the amplifier's input"
         )
+    for name in wanted.intersection(_IN_PLACE):
+        useless += _OF_FILTER
+        head, gain, rest = sections[name].split("\n", 2)
+        template = re.sub(r"(?m)^k_ts = .*$", gain, template)
+        sections[name] = f"{head.replace(name, 'sensor', 1)}\n{rest}"
     if "sensor" in wanted:
         useless += _OF_FILTER
         template = template.replace("tachometer gain;", "of the record, 1 where it is in rad/s;")
@@ -90,7 +107,8 @@ def with_parts(template: str, parts: str, names: Collection[str]) -> str:
 
 def commented(template: str, parts: str) -> str:
     """A template with all the sections at its end, as comments."""
-    lines = "\n".join(f"# {line}".rstrip() for line in parts.strip().splitlines())
+    told = "".join(text for name, text in _sections(parts) if name not in _IN_PLACE)
+    lines = "\n".join(f"# {line}".rstrip() for line in told.strip().splitlines())
     head = "# What a drive may have besides; take the signs # away from a section that yours has:"
     return f"{template.rstrip()}\n\n{head}\n\n{lines}\n"
 

@@ -18,9 +18,9 @@ UNITS = {name: drives.unit(sections) for name, sections in drives.DRIVES.items()
 }
 
 
-def swept(unit):
+def swept(unit, band=(0.6, 1.4)):
     modes = natural_frequencies(unit)
-    low, high = 0.6 * modes.anti_resonances_hz[0], 1.4 * modes.resonances_hz[0]
+    low, high = band[0] * modes.anti_resonances_hz[0], band[1] * modes.resonances_hz[0]
     plan = SweepPlan(
         tuple(np.geomspace(low, high, 16).tolist()),
         (0.4 * unit.limits.source_vpk, 0.8 * unit.limits.source_vpk),
@@ -42,3 +42,18 @@ def test_mistake_is_found_on_any_drive(name):
     response = swept(UNITS[name])
     turned = replace(response, gain=np.conj(response.gain))
     assert check_input(turned, UNITS[name]).mistake == "conjugate"
+
+
+@pytest.mark.parametrize(
+    ("name", "power", "words"),
+    [
+        ("accelerometer sampled", -1, "a velocity, not an acceleration"),
+        ("motor current", 1, "the derivative of a current, not a current"),
+    ],
+)
+def test_mistake_is_told_of_what_is_read(name, power, words):
+    """An accelerometer reads an acceleration, and a velocity is its integral."""
+    response = swept(UNITS[name], (0.25, 2.0))
+    swung = (2j * np.pi * response.frequency_hz / 400.0) ** power
+    found = check_input(replace(response, gain=response.gain * swung), UNITS[name])
+    assert words in found.words

@@ -61,6 +61,18 @@ PUBLISHED = {
     ("R_m", "kohm"): 1e3,
     ("start_hz", "kHz"): 1e3,
     ("start_hz", "rad/s"): 1.591549e-1,
+    ("radius_m", "mm"): 1e-3,
+    ("radius_m", "cm"): 1e-2,
+    ("radius_m", "in"): 2.54e-2,
+    ("k_acc", "V/(m/s^2)"): 1.0,
+    ("k_acc", "mV/(m/s^2)"): 1e-3,
+    ("k_acc", "V/g"): 1 / 9.80665,
+    ("k_acc", "mV/g"): 1e-3 / 9.80665,
+    ("k_angular", "V/(rad/s^2)"): 1.0,
+    ("k_angular", "mV/(rad/s^2)"): 1e-3,
+    ("k_angular", "mV/(deg/s^2)"): 1e-3 / 1.745329e-2,
+    ("k_current", "mV/A"): 1e-3,
+    ("k_current", "mV/mA"): 1.0,
     ("source_vpk", "mV"): 1e-3,
     ("source_vpk", "V rms"): 1.414214,
     ("source_vpk", "V pp"): 0.5,
@@ -79,7 +91,8 @@ def test_a_factor_is_the_published_one(symbol, name):
 def test_every_unit_matches_its_published_factor():
     same = {"k_t": ("T_f_m", "/A"), "k_ts": ("k_b", ""), "T_f_L": ("T_f_m", "")}
     for symbol in ("L_a", "R_m", "k_b", "k_t", "k_ts", "J_m", "B_m", "T_f_m", "k_s1", "b_t_deg",
-                   "start_hz", "source_vpk"):  # fmt: skip
+                   "start_hz", "source_vpk", "radius_m", "k_acc", "k_angular",
+                   "k_current"):  # fmt: skip
         first, *others = units_of(symbol)
         assert first.factor == 1.0
         as_symbol, ending = same.get(symbol, (symbol, ""))
@@ -105,6 +118,8 @@ def test_every_unit_matches_its_published_factor():
         ("k_b", "6e-4 V/(deg/s)", 0.03437747),
         ("B_m", "0.1 mNm/(rad/s)", 1e-4),
         ("R_m", "4.1 Ω", 4.1),
+        ("k_acc", "100 mV/g", 0.01019716),
+        ("k_acc", "10.2 mV/(m/s²)", 0.0102),
         ("L_a", "850 µH", 8.5e-4),
         ("b_t_deg", "4'", 4 / 60),
         ("b_t_deg", "0.1 °", 0.1),

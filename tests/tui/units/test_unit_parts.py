@@ -72,6 +72,37 @@ def test_part_values_use_catalogue_units():
     assert not any(one.startswith(("R_m", "corner_hz")) for one in said)
 
 
+@pytest.mark.parametrize(
+    ("name", "given", "k_ts"),
+    [("accelerometer", "100 mV/g", 0.0101972), ("motor_current", "400 mV/A", 0.4)],
+)
+def test_sensor_gain_is_asked_in_its_units(name, given, k_ts):
+    text = with_parts(template("one-stage"), template("parts"), (name, "damping"))
+    said = []
+
+    def read():
+        asks = said[-1].split(":", 1)[0].strip()
+        if asks == "k_ts" and "is no unit of k_ts" not in "".join(said):
+            return "0.4 V/krpm\n"
+        return {"k_ts": given, "radius_m": "50 mm"}.get(asks, "-") + "\n"
+
+    unit = unit_from_mapping(tomllib.loads(ask_for_values(text, said.append, read)), "asked")
+    assert unit.electronics.k_ts == pytest.approx(k_ts, rel=1e-4)
+    assert unit.electronics.filter_numerator is None
+    assert unit.sensor.kind == name.removeprefix("motor_")
+    assert unit.sensor.radius_m == (0.05 if name == "accelerometer" else None)
+    assert not find_impossible(unit)
+    assert "k_acc" not in "".join(said)
+
+
+def test_one_sensor_is_asked_for():
+    names, said = asked(["y", "no", "no", "yes"])
+    assert names == ("accelerometer",)
+    assert "current is read" not in said
+    # A torque drive's current tells nothing.
+    assert "motor's current" not in asked(["y", "yes", "no"])[1]
+
+
 @pytest.mark.parametrize("stages", ["1", "2"])
 def test_commented_parts_of_new_file_work(stages, tmp_path, capsys):
     path = tmp_path / "own.toml"
