@@ -18,7 +18,7 @@ from sim.engine.linear import smooth_response
 from sim.engine.system import PiecewiseLinearSystem
 from sim.unit import Unit
 
-__all__ = ["Landmarks", "draw_plan", "feature_sign", "landmarks", "reference_response"]
+__all__ = ["Landmarks", "draw_plan", "landmarks", "reference_response"]
 
 _SMOOTHING = 0.15
 """Loss factor of the reference response: wide enough that no resonance is sharp."""
@@ -28,6 +28,9 @@ _USUAL_LEVELS = (0.3, 0.5, 0.8)
 
 _PILOT_HZ = (0.15, 1.3)
 """Band in which features are looked for, as multiples of the linear resonance."""
+
+_WIDE_BAND = 10.0
+"""Corner of a sensor that has none, over the highest frequency: it turns no feature there."""
 
 _USUAL = 0.4
 """Share of training sweeps that are near the usual one: three levels, the band of both features."""
@@ -61,9 +64,18 @@ def reference_response(unit: Unit, frequency_hz: NDArray[np.float64]) -> NDArray
     return smooth_response(linear_system(unit), s)
 
 
-def feature_sign(unit: Unit) -> int:
-    """-1 where a resonance is a minimum of the gain, as of the motor's current; else 1."""
-    return -1 if unit.sensor is not None and unit.sensor.kind == "current" else 1
+def _seen_at_motor(unit: Unit) -> Unit:
+    """The unit with an accelerometer on the motor in place of one on the load or of a current.
+
+    There its features show: a load has no anti-resonance, and of a current it is a maximum.
+    """
+    sensor = unit.sensor
+    if sensor is None or sensor.kind not in ("accelerometer", "current"):
+        return unit
+    changed = {"kind": "accelerometer", "reads": "acceleration", "at": "motor"}
+    corner = sensor.low_pass_hz or _WIDE_BAND * unit.limits.stop_hz
+    there = sensor.model_copy(update={**changed, "low_pass_hz": corner})
+    return unit.model_copy(update={"sensor": there})
 
 
 def landmarks(unit: Unit) -> Landmarks:
@@ -72,9 +84,9 @@ def landmarks(unit: Unit) -> Landmarks:
     Per machine and level: the deepest point relative to the reference, and the highest above it.
     """
     closed = np.geomspace(unit.limits.start_hz, unit.limits.stop_hz, 2000)
+    unit = _seen_at_motor(unit)
     gain = np.abs(linear_system(unit).transfer(closed) / reference_response(unit, closed))
-    sign = feature_sign(unit)
-    highest = closed[int(np.argmax(sign * np.log(gain)))]
+    highest = closed[int(np.argmax(gain))]
     grid = np.geomspace(
         max(_PILOT_HZ[0] * highest, unit.limits.start_hz),
         min(_PILOT_HZ[1] * highest, unit.limits.stop_hz),
@@ -85,8 +97,7 @@ def landmarks(unit: Unit) -> Landmarks:
     ratios = [1.0] if unit.stages == 1 else np.linspace(0.05, 0.95, 5).tolist()
     servos = [Machine(ratio, seed).servo(unit) for seed, ratio in enumerate(ratios)]
     cycles = np.array(safe_cycles(servos, plan, workers=1))[..., 1].mean(axis=-1)
-    excess = sign * np.log(np.abs(cycles / reference_response(unit, grid)))
-    excess = excess.reshape(-1, len(grid))
+    excess = np.log(np.abs(cycles / reference_response(unit, grid))).reshape(-1, len(grid))
     valleys = np.argmin(excess, axis=1)
     peaks = [v + int(np.argmax(one[v:])) for v, one in zip(valleys, excess, strict=True)]
     return Landmarks(float(grid[valleys].min()), float(np.median(grid[peaks])))

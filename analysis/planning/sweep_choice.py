@@ -24,7 +24,7 @@ from analysis.commissioning.regression import Gaussian, expected_std
 from analysis.execution.blas import on_one_core
 from analysis.execution.executor import Executor
 from analysis.execution.progress import Progress, part_of
-from analysis.inference.plans import feature_sign, landmarks
+from analysis.inference.plans import landmarks
 from analysis.observation.observation import Observation, unread
 from analysis.observation.reading_noise import USUAL_NOISE_V
 from daq.errors import InputError
@@ -224,9 +224,12 @@ def plan_sweep(
     std, _, plan = min((one for one in found if one[0] <= _ENOUGH * least), key=lambda one: one[1])
     single = [std for std, _, one in found if len(one.levels_vpk) == 1]
     log_gain = drawn.y.reshape(len(drawn.z), 3, len(wide.levels_vpk), -1)[:, 0]
-    log_gain = feature_sign(unit) * log_gain
+    if unit.sensor is not None and unit.sensor.kind == "current":
+        # What is a maximum of the speed is a minimum of the current.
+        log_gain = -log_gain
     middle = log_gain[:, len(wide.levels_vpk) // 2]
-    arf, rf = _features(np.array(wide.frequencies_hz), middle)
+    grid = np.array(wide.frequencies_hz)
+    arf, rf = _features(grid, middle) if _shows_arf(unit) else (None, _highest(grid, middle))
     return Planned(
         unit.name, plan, plan.duration_s / 60.0, arf, rf, quantity, std, min(single, default=std),
         float(np.std(values)), _still(wide, log_gain), cut,
@@ -309,6 +312,20 @@ def _features(
             if high < last:
                 rf.append(frequency_hz[high])
     return _spread(arf, len(log_gain)), _spread(rf, len(log_gain))
+
+
+def _shows_arf(unit: Unit) -> bool:
+    """Whether its gain has a minimum at ARF: neither a load's has nor that of a current."""
+    return unit.sensor is None or not (unit.sensor.at == "load" or unit.sensor.kind == "current")
+
+
+def _highest(
+    frequency_hz: NDArray[np.float64], log_gain: NDArray[np.float64]
+) -> tuple[float, float, float] | None:
+    """Quantiles of the highest point of the gain."""
+    high = np.argmax(log_gain, axis=1)
+    inside = high[(high > 0) & (high < len(frequency_hz) - 1)]
+    return _spread(frequency_hz[inside].tolist(), len(log_gain))
 
 
 def _spread(found: list[float], drives: int) -> tuple[float, float, float] | None:

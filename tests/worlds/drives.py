@@ -3,6 +3,8 @@
 import copy
 import tomllib
 
+import numpy as np
+
 from daq.configs import config_path
 from sim.unit import unit_from_mapping
 
@@ -84,8 +86,9 @@ LOOPS = {
 
 def document(sections, base="adss", free=False):
     """The parsed unit file; `free`: without friction and play, so that it is linear."""
-    found = tomllib.loads(config_path("units", base).read_text(encoding="utf-8"))
-    del found["tolerance"]
+    kind = "templates" if base.endswith("-stage") else "units"
+    found = tomllib.loads(config_path(kind, base).read_text(encoding="utf-8"))
+    found.pop("tolerance", None)
     for name, section in copy.deepcopy(sections).items():
         if name == "filter":
             for key in ("filter_numerator", "filter_denominator"):
@@ -114,3 +117,10 @@ def finely(sections):
 def unit(sections, base="adss", free=False):
     """The unit of such a file."""
     return unit_from_mapping(document(sections, base, free), "drive.toml")
+
+
+def cycles(read):
+    """Gains (levels, points, cycles) of the plant as `sim.reading` takes them: one harmonic."""
+    found = np.zeros((*np.shape(read), 4), dtype=complex)
+    found[..., 1] = read
+    return found

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from worlds import drives
 
 from analysis.planning import plan_sweep
 from daq.configs import config_names
@@ -109,3 +110,14 @@ def test_load_frequency_scale_is_near_anti_resonance(name):
     unit = load_unit(name)
     scale = math.sqrt(shaft_at_load(unit) / unit.load.J_L) / (2.0 * math.pi)
     assert scale == pytest.approx(natural_frequencies(unit).anti_resonances_hz[0], rel=0.5)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["accelerometer at the load", "motor current"])
+def test_plan_names_what_the_sensor_shows(name):
+    """Neither a load nor a current shows ARF; RF lies where a tachometer has it, by the sensor."""
+    sections = drives.DRIVES[name]
+    unit = drives.unit(sections, "one-stage").with_tolerance({"default": 0.05})
+    found = plan_sweep(unit, 0.5)
+    assert found.arf_hz is None
+    assert 90.0 < found.rf_hz[1] < 105.0
