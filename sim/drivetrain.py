@@ -39,6 +39,11 @@ __all__ = [
 ]
 
 
+_MOST = 1e4
+"""Largest V or A of an amplifier in a loop whose unit file has no limit: no machine reaches it but
+one that a cause makes unstable, whose motion then has an end."""
+
+
 @dataclass(frozen=True, slots=True)
 class Drivetrain:
     """Named elements; an effect returns a new one with elements added or replaced."""
@@ -148,9 +153,11 @@ def shaft_dampers(unit: Unit, c_s1: float) -> dict[str, Element]:
 def _motor(unit: Unit) -> Motor:
     motor, current, sampling = unit.motor, unit.amplifier, unit.sampling
     hold_hz = sampling.rate_hz if sampling is not None and sampling.holds_command else 0.0
-    amplifier = Amplifier(unit.electronics.k_a, hold_hz=hold_hz, controller=_controller(unit))
+    most = None if unit.loop is None else _MOST
+    controller = _controller(unit)
+    amplifier = Amplifier(unit.electronics.k_a, V_sat=most, hold_hz=hold_hz, controller=controller)
     if current is not None:
-        amplifier = replace(amplifier, V_sat=current.current_limit_a)
+        amplifier = replace(amplifier, V_sat=current.current_limit_a or most)
         lag_s = 1.0 / (2.0 * math.pi * current.bandwidth_hz)
         return Motor("th_m", lag_s, 1.0, 0.0, motor.k_t, amplifier)
     assert motor.L_a is not None

@@ -99,6 +99,15 @@ def test_loop_moves_resonance_and_keeps_anti_resonance(where):
     assert closed.rf_hz > 1.005 * open_loop.rf_hz
 
 
+def test_loop_that_cause_makes_unstable_moves_within_bounds():
+    """So that it is one of the machines that a response is compared with."""
+    unit = drives.unit({"loop": SPEED | {"filtered": True, "K_p": 0.3}})
+    tenfold = [EffectSetting("amplifier-gain", {"k_a": 41.1})]
+    plan = SweepPlan((60.0,), (2.5,), settle_cycles=20, integrate_cycles=5)
+    plain, shown = (simulate(unit, 0.5, plan, effects=e).gain[0] for e in ([], tenfold))
+    assert 10.0 * abs(plain) < abs(shown) < 1e6
+
+
 def test_chain_is_told_with_its_loop():
     unit = drives.unit(POSITION | {"loop": POSITION["loop"] | {"computing_s": 2e-4}})
     text = "\n".join(describe_chain(unit))
