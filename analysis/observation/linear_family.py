@@ -20,7 +20,7 @@ from sim.engine.linear import chain_factor
 from sim.engine.nonlinearity import held
 from sim.unit import Unit
 
-__all__ = ["Family", "draw_machines", "neighbours"]
+__all__ = ["AT_REST", "Family", "draw_machines", "neighbours"]
 
 Vector = NDArray[np.float64]
 
@@ -72,7 +72,8 @@ _CAUSES = (
 )
 
 _ENDS = np.log(np.array(list(_RANGES.values())))
-_AT_REST = np.log(np.array([_NEUTRAL.get(name, 1.0) for name in _RANGES]))
+AT_REST = np.log(np.array([_NEUTRAL.get(name, 1.0) for name in _RANGES]))
+"""Logarithms (parameters,) of the datasheet's machine, hardly damped."""
 
 
 def draw_machines(count: int, rng: np.random.Generator) -> tuple[Vector, NDArray[np.bool_]]:
@@ -88,7 +89,7 @@ def draw_machines(count: int, rng: np.random.Generator) -> tuple[Vector, NDArray
             for part in parts:
                 free[having, names.index(part)] = True
     drawn = rng.uniform(_ENDS[:, 0], _ENDS[:, 1], free.shape)
-    return np.where(free, drawn, _AT_REST), free
+    return np.where(free, drawn, AT_REST), free
 
 
 def neighbours(
@@ -98,7 +99,7 @@ def neighbours(
     of = rng.integers(len(logs), size=count)
     moved = free[of] & (rng.random((count, logs.shape[1])) < 0.5)
     steps = rng.normal(size=moved.shape) * share * np.ptp(_ENDS, axis=1)
-    low, high = np.minimum(_ENDS[:, 0], _AT_REST), np.maximum(_ENDS[:, 1], _AT_REST)
+    low, high = np.minimum(_ENDS[:, 0], AT_REST), np.maximum(_ENDS[:, 1], AT_REST)
     return np.clip(logs[of] + steps * moved, low, high), free[of]
 
 

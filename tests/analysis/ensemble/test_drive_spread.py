@@ -34,16 +34,24 @@ def test_deviating_delay_delays_the_machine():
     np.testing.assert_allclose(turn[0].mean(axis=1), expected, rtol=1e-3)
 
 
-@pytest.mark.parametrize("name", drives.DRIVES)
+@pytest.mark.parametrize("name", [*drives.DRIVES, *drives.LOOPS])
 def test_every_toleranced_drive_value_may_deviate(name):
     """By 5 % of all, as an answer about it takes for granted: every way has a finite effect."""
-    unit = drives.unit(drives.DRIVES[name])
+    unit = drives.unit((drives.DRIVES | drives.LOOPS)[name])
     spread = spread_of(unit)
     assert 1 <= len(spread) <= 7
     assert np.all(np.isfinite(spread.ways))
     assert all(np.isfinite(feature_spread(unit)))
     shown = linear_response(unit, np.array([40.0, 120.0]), (1.5, 4.0))
     assert np.all(np.isfinite(shown))
+
+
+def test_gain_of_controller_belongs_to_datasheet_spread():
+    """It is exact unless it is named, and then changes a response."""
+    loop = drives.unit(drives.LOOPS["position"])
+    told = loop.with_tolerance({"default": 0.0, "K_v": 0.1})
+    assert spread_of(told).symbols == ("K_v",)
+    assert "K_v" not in spread_of(loop.with_tolerance({"default": 0.05})).symbols
 
 
 def test_coupling_stiffness_belongs_to_datasheet_spread():

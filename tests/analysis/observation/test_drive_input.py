@@ -7,9 +7,11 @@ import pytest
 from worlds import drives
 
 from analysis.observation.input_check import check_input
+from analysis.observation.linear_family import AT_REST, Family
 from daq.configs import config_names
 from daq.plan import SweepPlan
 from sim.datasheet import natural_frequencies
+from sim.drivetrain import paper_drivetrain
 from sim.response import simulate
 from sim.unit import load_unit
 
@@ -35,6 +37,22 @@ def test_a_true_response_is_taken(name):
     found = check_input(swept(UNITS[name]), UNITS[name])
     assert found.mistake is None, found.words
     assert not found.foreign
+
+
+@pytest.mark.parametrize("name", ["speed, command", "position"])
+def test_response_of_closed_loop_is_taken(name):
+    unit = drives.unit(drives.LOOPS[name])
+    found = check_input(swept(unit), unit)
+    assert found.mistake is None, found.words
+    assert not found.foreign
+
+
+@pytest.mark.parametrize("name", drives.LOOPS)
+def test_family_has_linear_response_of_loop(name):
+    unit, hertz = drives.unit(drives.LOOPS[name]), np.array([15.0, 40.0, 90.0, 250.0])
+    shown = np.exp(Family(unit).responses(AT_REST[None], hertz)[0])
+    exact = paper_drivetrain(unit, 0.5).system().transfer(hertz)
+    np.testing.assert_allclose(shown, exact, rtol=0.1)
 
 
 @pytest.mark.parametrize("name", ["encoder, speed", "current"])

@@ -8,6 +8,7 @@ from worlds import drives
 from daq.plan import SweepPlan
 from sim.datasheet import find_impossible
 from sim.drivetrain import paper_drivetrain
+from sim.engine.linear import smooth_response
 from sim.response import simulate
 
 LINEAR_HZ = (60.0, 140.0)
@@ -43,6 +44,15 @@ def test_closed_loop_follows_from_open_loop():
     for where, source in (("reference", control), ("command", 1.0)):
         closed = linear(train | {"loop": loop | {"excited": where}}, hertz)
         np.testing.assert_allclose(closed, source * plain / (1.0 + control * plain), rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", drives.LOOPS)
+def test_response_without_images_is_about_the_same(name):
+    """The one that a loop has at complex frequencies, too, for what is known without simulation."""
+    hertz = np.array([20.0, 60.0, 250.0])
+    system = paper_drivetrain(drives.unit(drives.LOOPS[name], free=True), 0.5).system()
+    smooth = smooth_response(system, 2j * np.pi * hertz)
+    np.testing.assert_allclose(smooth, system.transfer(hertz), rtol=0.02)
 
 
 @pytest.mark.parametrize("name", drives.LOOPS)

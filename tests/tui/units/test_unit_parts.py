@@ -55,6 +55,28 @@ def test_every_choice_of_parts_makes_a_unit(stages):
                 assert unit.sampling.holds_command == bool({"sampling", "loop"} & set(names))
 
 
+@pytest.mark.parametrize("stages", ["one-stage", "two-stage"])
+def test_every_kind_of_loop_makes_a_unit(stages):
+    for more in ((), ("position",), ("command",), ("position", "command")):
+        for beside in ((), ("sampling",), ("amplifier", "sampling")):
+            names = (*beside, *(["sensor"] if "position" in more else []), "loop", *more)
+            unit = unit_from_mapping(
+                tomllib.loads(with_parts(template(stages), template("parts"), names)), "parts"
+            )
+            assert not find_impossible(unit), names
+            assert (unit.loop.controls == "position") == ("position" in more)
+            assert (unit.loop.excited == "command") == ("command" in more)
+
+
+def test_loop_is_asked_for_what_it_is():
+    names, _ = asked(["y", "n", "y", *"nnnn", "y", "y", "y"])
+    assert names == ("sensor", "loop", "position", "command")
+    # A tachometer reads no position.
+    names, said = asked(["y", *"nnnnnn", "y", "n"])
+    assert names == ("loop",)
+    assert "position loop is around" not in said
+
+
 def test_part_values_use_catalogue_units():
     text = with_parts(template("two-stage"), template("parts"), ("amplifier", "sensor"))
     said = []
