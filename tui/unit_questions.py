@@ -32,7 +32,8 @@ Further answers: - takes the example, < goes back one question.
 _VALUE = re.compile(r"^(?P<symbol>\w+) = (?P<value>[\d.eE+-]+)(?P<gap> +)# (?P<comment>.*)$")
 _FILTER = ("filter_numerator", "filter_denominator")
 _SKIPPED = ("schema", *_FILTER, "default")
-_MAY_BE_ZERO = ("B_m", "T_f_m", "T_f_L", "b_t_deg", "source_offset_v", "c_cm", "c_cL", "delay_s")
+_MAY_BE_ZERO = ("B_m", "T_f_m", "T_f_L", "b_t_deg", "source_offset_v", "c_cm", "c_cL", "delay_s",
+                "computing_s")  # fmt: skip
 _CORNER, _DAMPING = "corner_hz", "damping"
 
 

@@ -31,7 +31,7 @@ def find_impossible(unit: Unit) -> list[str]:
 def find_unusual(unit: Unit) -> list[str]:
     """What is unusual in a unit's values and can be all the same, in the same form."""
     found = list(unusual_among(_values(unit))) or _resonances(unit, beyond=1.0)
-    return found + find_unstable(unit, MARGIN)
+    return [*found, *find_unstable(unit, MARGIN), *_misplaced_delay(unit)]
 
 
 def impossible_among(values: Values) -> Iterator[str]:
@@ -139,6 +139,18 @@ def _values(unit: Unit) -> dict[str, float]:
             "stop_hz": limits.stop_hz,
         }
     )
+
+
+def _misplaced_delay(unit: Unit) -> list[str]:
+    """A delay that the loop does not have, where nobody said what it has."""
+    if unit.loop is None or unit.sensor is None or not unit.sensor.delay_s:
+        return []
+    if unit.loop.computing_s is not None:
+        return []
+    return [
+        f"sensor.delay_s {unit.sensor.delay_s:g} s is outside the loop; give what the controller "
+        "waits from reading to command as loop.computing_s, or 0"
+    ]
 
 
 def _loop_values(unit: Unit) -> dict[str, float]:

@@ -31,10 +31,7 @@ _OF_LOOP = (
     ("position", "a position loop is around the speed loop"),
     ("command", "the source is added behind the controller, not as its reference"),
 )
-_FIRST = (
-    "an encoder, accelerometer or current sensor, a digital controller, a torque drive, couplings, "
-    "known damping or a closed loop"
-)
+_FIRST = "another sensor, controller, torque drive, coupling, damping or loop"
 _IN_PLACE = ("accelerometer", "motor_current")
 """Sections that are one of ``[sensor]`` in place of the encoder's, each beginning with its gain."""
 _OF_VOLTAGE = ("L_a", "R_m", "k_b")
@@ -79,6 +76,12 @@ def with_parts(template: str, parts: str, names: Collection[str]) -> str:
                 "holds_command = true ", "holds_command = false"
             )
         wanted.add("sampling")
+    if {"loop", "sensor"} <= wanted:
+        # What is late inside the loop is the controller's.
+        sections["sensor"] = re.sub(r"(?m)^delay_s.*\n", "", sections["sensor"])
+        sections["loop"] = sections["loop"].replace(
+            "# computing_s = 0.0005  ", "computing_s = 0.0005    "
+        )
     if "position" in wanted:
         sections["sensor"] = sections["sensor"].replace('reads = "speed"   ', 'reads = "position"')
         loop = sections["loop"].replace('controls = "speed"   ', 'controls = "position"')

@@ -171,6 +171,13 @@ def test_drive_without_loop_is_bit_identical(name):
     assert hashlib.sha256(linear_key(system)).hexdigest()[:16] == DIGESTS[name]
 
 
+def test_delay_outside_loop_is_told():
+    late = {"sensor": {"kind": "tachometer", "delay_s": 5e-4}, "loop": SPEED}
+    (text,) = find_unusual(drives.unit(late))
+    assert "sensor.delay_s 0.0005 s is outside the loop" in text
+    assert not find_unusual(drives.unit(late | {"loop": SPEED | {"computing_s": 0.0}}))
+
+
 def test_small_reference_of_loop_may_overcome_friction():
     """What the motor gets is the controller's command, not the source: so are ranges of effects."""
     limits = {"source_vpk": 0.05, "source_offset_v": 0.0}

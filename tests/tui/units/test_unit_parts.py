@@ -65,6 +65,8 @@ def test_every_kind_of_loop_makes_a_unit(stages):
             )
             assert not find_impossible(unit), names
             assert (unit.loop.controls == "position") == ("position" in more)
+            assert unit.loop.computing_s == (5e-4 if "sensor" in names else None)
+            assert unit.sensor is None or unit.sensor.delay_s is None
             assert (unit.loop.excited == "command") == ("command" in more)
 
 
