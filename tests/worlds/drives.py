@@ -72,7 +72,8 @@ LOOPS = {
     | {
         "amplifier": CURRENT,
         "electronics": {"k_a": 1.0},
-        "loop": SPEED | {"K_p": 0.3, "computing_s": 3e-4},
+        "sensor": ENCODER | {"delay_s": 5e-4, "counts": 65536.0},
+        "loop": SPEED | {"computing_s": 3e-4},
     },
     "position": {
         "sampling": SAMPLED,
