@@ -99,7 +99,7 @@ def test_loop_moves_resonance_and_keeps_anti_resonance(where):
     assert closed.rf_hz > 1.005 * open_loop.rf_hz
 
 
-def test_loop_that_cause_makes_unstable_moves_within_bounds():
+def test_unstable_loop_moves_within_bounds():
     """So that it is one of the machines that a response is compared with."""
     unit = drives.unit({"loop": SPEED | {"filtered": True, "K_p": 0.3}})
     tenfold = [EffectSetting("amplifier-gain", {"k_a": 41.1})]

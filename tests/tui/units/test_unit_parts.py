@@ -74,7 +74,7 @@ def test_loop_is_asked_for_what_it_is():
     names, _ = asked(["y", "n", "y", *"nnnn", "y", "y", "y"])
     assert names == ("sensor", "loop", "position", "command")
     # A tachometer reads no position.
-    names, said = asked(["y", *"nnnnnn", "y", "n"])
+    names, said = asked(["y", *"nnnnnnnn", "y", "n"])
     assert names == ("loop",)
     assert "position loop is around" not in said
 
