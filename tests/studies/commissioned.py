@@ -33,7 +33,7 @@ from sim.unit import load_unit, unit_from_mapping
 
 KINDS = ("adss", "walkman-b11", "edss", "r3-1", "feed-axis")
 TOLERANCE, CHANGE = 0.08, 0.10
-POINTS, SHARES = 16, (0.4, 0.8)
+POINTS, SHARES, CYCLES = 16, (0.4, 0.8), (6, 8)
 VISIBLE = CHANGE / 3.0
 """Standard deviation, the other values known, up to which a change is asked for: three of it."""
 
@@ -59,7 +59,7 @@ def commissioned(number):
     unit = load_unit(name).with_tolerance({"default": TOLERANCE})
     ratio = float(rng.uniform(0.1, 0.9)) if unit.stages == 2 else 1.0
     values = drawn_values(unit, rng)
-    response = measured(name, ratio, POINTS, number, of_plant(values), SHARES)[1]
+    response = measured(name, ratio, POINTS, number, of_plant(values), SHARES, CYCLES)[1]
     record = {"number": number, "unit": name, "true": {"ratio": ratio, **values}}
     try:
         found = commission_drive([response], unit)
@@ -88,7 +88,7 @@ def commissioned(number):
     changed = str(rng.choice(shown)) if number % 4 != 3 and shown else ""
     factor = 1.0 + CHANGE * float(rng.choice([-1.0, 1.0]))
     after = values | ({changed: factor * values[changed]} if changed else {})
-    later = measured(name, ratio, POINTS, 1000 + number, of_plant(after), SHARES)[1]
+    later = measured(name, ratio, POINTS, 1000 + number, of_plant(after), SHARES, CYCLES)[1]
     text = commissioned_unit_text(
         config_path("units", name).read_text(encoding="utf-8"), found, name.upper(), date.today()
     )

@@ -38,13 +38,12 @@ from daq.frf import (
 from sim.datasheet import natural_frequencies
 from sim.unit import load_unit
 
-CYCLES = 12, 12
 PAPER = ("adss", "edss")
 NOISE_V = 2e-4
 """Of the bench, per component of a reading."""
 
 
-def measured(name, ratio, points, seed, changed, shares=(0.3, 0.5, 0.8)):
+def measured(name, ratio, points, seed, changed, shares=(0.3, 0.5, 0.8), cycles=(12, 12)):
     """A sweep about ARF and RF as the plant shows it, at shares of the unit's highest level."""
     unit = load_unit(name)
     document = tomllib.loads(config_path("units", name).read_text(encoding="utf-8"))
@@ -52,27 +51,28 @@ def measured(name, ratio, points, seed, changed, shares=(0.3, 0.5, 0.8)):
     hertz = np.geomspace(0.6 * modes.anti_resonances_hz[0], 1.3 * modes.resonances_hz[0], points)
     levels = [share * unit.limits.source_vpk for share in shares]
     rng = np.random.default_rng(seed)
-    cycles = np.array(
+    each = np.array(
         [
-            drive_plant.sweep(document, ratio, hertz, v, *CYCLES, step_s=4e-6, seed=seed, **changed)
+            drive_plant.sweep(document, ratio, hertz, v, *cycles, step_s=4e-6, seed=seed, **changed)
             for v in levels
         ]
     )
-    noise = rng.normal(size=(2, *cycles.shape)) * NOISE_V * np.sqrt(CYCLES[1])
-    cycles = cycles + (noise[0] + 1j * noise[1]) / np.array(levels)[:, None, None]
-    mean = cycles.mean(axis=-1)
-    along = ((cycles - mean[..., None]) * np.conj(mean / np.abs(mean))[..., None]).real
-    std = along.std(axis=-1, ddof=1) / np.sqrt(CYCLES[1])
+    settle, kept = cycles
+    noise = rng.normal(size=(2, *each.shape)) * NOISE_V * np.sqrt(kept)
+    each = each + (noise[0] + 1j * noise[1]) / np.array(levels)[:, None, None]
+    mean = each.mean(axis=-1)
+    along = ((each - mean[..., None]) * np.conj(mean / np.abs(mean))[..., None]).real
+    std = along.std(axis=-1, ddof=1) / np.sqrt(kept)
     return unit, FrequencyResponse.from_arrays(
         np.tile(hertz, len(levels)),
         np.repeat(levels, points),
         mean.ravel(),
         unit=unit.name,
         gain_std_db=DB_PER_NEPER * (std / np.abs(mean)).ravel(),
-        settle_cycles=CYCLES[0],
-        integrate_cycles=CYCLES[1],
+        settle_cycles=settle,
+        integrate_cycles=kept,
         # Scatter along the gain alone: taken for that of both components it tells another ratio.
-        provenance={GAIN_STD_COMPONENTS: 1, GAIN_STD_IS: error_words(CYCLES[1])},
+        provenance={GAIN_STD_COMPONENTS: 1, GAIN_STD_IS: error_words(kept)},
     )
 
 
