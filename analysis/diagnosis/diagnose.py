@@ -305,8 +305,8 @@ def _warnings(diagnosis: Diagnosis) -> tuple[str, ...]:
         unasked = f", and did not ask for {', '.join(own)}" if own else ""
         found.append(
             f"no posterior was trained for unit {diagnosis.unit}: that of {diagnosis.lent_by} "
-            f"chose what was simulated, and may have missed the cause{unasked}; train its own: "
-            "lashbench prepare --unit FILE"
+            f"chose which causes were simulated together, and may have missed some{unasked}; train "
+            "its own: lashbench prepare --unit FILE"
         )
     if len(observation.levels) == 1:
         halves = len(observation.blocks) == 1

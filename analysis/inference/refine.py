@@ -117,7 +117,9 @@ def refine(
         # Chance of its own, so that asking changes no run.
         return log_odds(pool.found, posterior, pool.observation, log_prior, rng.spawn(1)[0])
 
-    look_at([*first, *_parts(sets, first[0]), sets.index[()]])
+    # A posterior of another unit may miss the cause: each single one is looked at.
+    single = _single_causes(sets, probability) if posterior.lent_by else ()
+    look_at([*first, *_parts(sets, first[0]), sets.index[()], *single])
     coarse.re_estimate_noise()
     leader = _leading(odds(coarse), 1, 0.0)[0]
     look_at(_parts(sets, sets.index[tuple(sorted(map(sets.effects.index, leader)))]))
@@ -165,6 +167,11 @@ def _parts(sets: CauseSets, number: int) -> list[int]:
     """Every part of a set, the empty one among them."""
     whole = sets.places[number]
     return [sets.index[one] for k in range(len(whole)) for one in combinations(whole, k)]
+
+
+def _single_causes(sets: CauseSets, probability: Vector) -> list[int]:
+    """Every set of one cause that is possible."""
+    return [i for i, one in enumerate(sets.places) if len(one) == 1 and probability[i] > 0.0]
 
 
 def _placed(hypothesis: Hypothesis, one: SetPosterior) -> tuple[Vector, Reach]:

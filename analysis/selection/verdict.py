@@ -16,7 +16,7 @@ import numpy as np
 from analysis.checking.cross_validation import HeldOut, hold_out
 from analysis.checking.equivalence import is_equivalent_at_load
 from analysis.checking.goodness_of_fit import judge_adequacy, judge_chance
-from analysis.checking.rejection import FEW, OUT_OF_SIGHT, UNLIKE, find_rejection
+from analysis.checking.rejection import FEW, OUT_OF_SIGHT, find_rejection
 from analysis.emulation.fitted_model import Effects, FittedModel
 from analysis.emulation.likelihood import TEMPERATURE
 from analysis.observation.observation import Observation
@@ -224,11 +224,12 @@ def judge_candidates(
     best = _leader(judged)
     (baseline,) = (one for one in judged if not one.effects)
     little = best.score < baseline.score + FALSE_ALARM
-    if little or _may_be_chance(baseline.candidate, best.candidate, baseline.misfit, rng):
-        if baseline.adequate and not little:
-            ahead = [one for one in judged if one.score > baseline.score]
-            judged = rank_behind(judged, ahead, baseline, BY_CHANCE)
-            (baseline,) = (one for one in judged if not one.effects)
+    if baseline.adequate and not little and _may_be_chance(baseline, best, rng):
+        ahead = [one for one in judged if one.score > baseline.score]
+        judged = rank_behind(judged, ahead, baseline, BY_CHANCE)
+        (baseline,) = (one for one in judged if not one.effects)
+        return Verdict("consistent", baseline, judged, baseline)
+    if little:
         if baseline.adequate:
             return Verdict("consistent", baseline, judged, baseline)
         tie = Verdict("ambiguous", best, judged, baseline)
@@ -246,12 +247,12 @@ def judge_candidates(
     return verdict
 
 
-def _may_be_chance(
-    simpler: FittedModel, best: FittedModel, misfit: float, rng: np.random.Generator
-) -> bool:
-    """Whether a set leads a simpler one of some misfit as it does in runs of that one's own."""
-    # Own runs say nothing about an observation that is unlike all of them.
-    return misfit <= UNLIKE and judge_chance(simpler, best, rng) > _BY_CHANCE
+def _may_be_chance(simpler: Judged, best: Judged, rng: np.random.Generator) -> bool:
+    """Whether a set leads a simpler one as it does in runs of that one's own.
+
+    These say nothing about an observation that is unlike them: the simpler one is adequate.
+    """
+    return judge_chance(simpler.candidate, best.candidate, rng) > _BY_CHANCE
 
 
 def _worth_judging(

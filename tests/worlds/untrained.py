@@ -25,10 +25,12 @@ SIZE, SIZE_STD = 0.5, 0.15
 class Untrained(Posterior):
     """Of an ADSS; `favoured` effects are e^5 times likelier in every set than others.
 
+    It may say that it was lent by another unit.
+
     Summaries are what a network makes of readings before any training: features by chance.
     """
 
-    def __init__(self, favoured: tuple[str, ...] = ()) -> None:
+    def __init__(self, favoured: tuple[str, ...] = (), lent_by: str = "") -> None:
         scales = Scales(Prior(load_unit("adss")), Landmarks(116.0, 150.0), 5.0)
         shape = scales.architecture(**SHAPE)
         weights = first_weights(shape, np.random.default_rng(0))
@@ -38,7 +40,7 @@ class Untrained(Posterior):
         weights["size.b"][shape.parameters :] = np.log(SIZE_STD)
         weights["single.b"][[scales.prior.effects.index(effect) for effect in favoured]] = 5.0
         checkpoint = Checkpoint("ADSS", 116.0, 150.0, 5.0, shape, weights, 0)
-        super().__init__(scales, checkpoint, flat)
+        super().__init__(scales, checkpoint, flat, lent_by)
 
 
 def flat(part: Observation) -> Nominal:

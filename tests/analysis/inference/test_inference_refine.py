@@ -68,6 +68,17 @@ def test_plain_model_gets_as_many_runs(world, seed):
     assert runs[()] == max(runs.values())
 
 
+@pytest.mark.parametrize("lent_by", ["", "EDSS"])
+def test_borrowed_posterior_misses_no_single_cause(world, lent_by):
+    """What another unit's network holds for impossible is simulated once."""
+    posterior, seen = Untrained((LAG, MESH), lent_by), observed((LOAD,), [0.8])
+    found = refine(posterior, seen, without=("filter-corner",), executor=world)
+    every = {(effect,) for effect in posterior.scales.prior.effects} - {("filter-corner",)}
+    assert ({key for key in found.log_prior if len(key) == 1} == every) == bool(lent_by)
+    if lent_by:
+        assert found.candidates[0].hypothesis.effects == (LOAD,)
+
+
 def test_withheld_cause_is_not_simulated(world):
     found = refine(
         Untrained((LAG, LOAD)), observed((LOAD,), [0.8]), without=(LOAD,), executor=world

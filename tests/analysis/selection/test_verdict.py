@@ -6,6 +6,7 @@ from worlds.judging import FITS, TRUE, WRONG, judge, likelihoods, odds, seen
 from worlds.synthetic import BASE, candidate, observation, read, shape
 
 import analysis.selection.verdict as rules
+from analysis.checking.goodness_of_fit import judge_chance
 from analysis.emulation.likelihood import TEMPERATURE
 from analysis.selection.verdict import BY_CHANCE, judge_candidates
 
@@ -69,6 +70,26 @@ def test_imitation_of_plain_branch_is_not_named(seed, monkeypatch):
     assert verdict.probability > 0.9
     (imitation,) = (one for one in verdict.judged if one.effects)
     assert verdict.remark(imitation) == BY_CHANCE
+
+
+def test_refused_plain_model_excuses_no_cause(monkeypatch):
+    """One in ten of its runs looks like a large cause. What is unlike all of its runs is not one."""
+    from worlds import synthetic
+
+    plain = synthetic.read
+
+    def straying(effects, place, rng, deviations=None, scatter=1.0):
+        strays = not effects and rng.uniform() < 0.1
+        value = plain(effects, place, rng, deviations, scatter)
+        return value + strays * 0.5 * synthetic.effect_slope(TRUE)
+
+    monkeypatch.setattr(synthetic, "read", straying)
+    observed = observation(plain(TRUE, np.array([0.5, 0.2]), np.random.default_rng(3)))
+    sets = [candidate(observed, effects, 3) for effects in (TRUE, ())]
+    assert judge_chance(*sets[::-1], np.random.default_rng(3)) > 0.04
+    verdict = judge_candidates(sets, observed, np.random.default_rng(3), odds(likelihoods(sets)))
+    assert verdict.baseline.refused
+    assert (verdict.word, verdict.best.effects) == ("explained", TRUE)
 
 
 @pytest.mark.parametrize("seed", range(5))
