@@ -73,7 +73,7 @@ def test_imitation_of_plain_branch_is_not_named(seed, monkeypatch):
 
 
 def test_refused_plain_model_excuses_no_cause(monkeypatch):
-    """One in ten of its runs looks like a large cause. What is unlike all of its runs is not one."""
+    """One in ten of its runs looks like a large cause; what was seen is unlike all of them."""
     from worlds import synthetic
 
     plain = synthetic.read
