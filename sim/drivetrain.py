@@ -39,7 +39,7 @@ __all__ = [
 ]
 
 
-_MOST = 1e4
+_MOST = 2e3
 """Largest V or A of an amplifier in a loop whose unit file has no limit: no machine reaches it but
 one that a cause makes unstable, whose motion then has an end."""
 

@@ -186,15 +186,16 @@ class Amplifier:
     def kinks(self) -> Iterator[tuple[str, float, float, float]]:
         """Name, weight, limit and centre of the `Law.EXCESS` that bend its characteristic."""
         clip = math.inf if self.V_sat is None else self.V_sat
+        far = max(_FAR, 4.0 * clip) if clip < math.inf else _FAR
         if self.V_d > 0.0:
             # What exceeds the dead zone comes through, and nothing else does.
             yield "amplifier_dead_zone", -1.0, self.V_d, 0.0
         if self.uneven != 1.0:
-            yield "amplifier_uneven", 1.0 - self.uneven, _FAR, self.V_d - _FAR
+            yield "amplifier_uneven", 1.0 - self.uneven, far, self.V_d - far
             if clip < math.inf:
                 above, below = self.V_d + clip / self.uneven, self.V_d + clip
-                yield "amplifier_above", self.uneven, _FAR, above - _FAR
-                yield "amplifier_below", 1.0, _FAR, _FAR - below
+                yield "amplifier_above", self.uneven, far, above - far
+                yield "amplifier_below", 1.0, far, far - below
         elif clip < math.inf:
             yield "amplifier", 1.0, self.V_d + clip, 0.0
 

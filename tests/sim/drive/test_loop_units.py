@@ -99,13 +99,29 @@ def test_loop_moves_resonance_and_keeps_anti_resonance(where):
     assert closed.rf_hz > 1.005 * open_loop.rf_hz
 
 
-def test_unstable_loop_moves_within_bounds():
+@pytest.mark.parametrize(
+    "effect", [("amplifier-gain", {"k_a": 41.1}), ("amplifier-unevenness", {"scale": 0.1})]
+)
+def test_unstable_loop_moves_within_bounds(effect):
     """So that it is one of the machines that a response is compared with."""
-    unit = drives.unit({"loop": SPEED | {"filtered": True, "K_p": 0.3}})
-    tenfold = [EffectSetting("amplifier-gain", {"k_a": 41.1})]
+    unit = drives.unit({"loop": SPEED | {"filtered": True, "K_p": 1.0}})
     plan = SweepPlan((60.0,), (2.5,), settle_cycles=20, integrate_cycles=5)
-    plain, shown = (simulate(unit, 0.5, plan, effects=e).gain[0] for e in ([], tenfold))
-    assert 10.0 * abs(plain) < abs(shown) < 1e6
+    shown = simulate(unit, 0.5, plan, effects=[EffectSetting(*effect)]).gain[0]
+    assert abs(shown) < 1e6
+
+
+def test_limit_of_loop_changes_no_uneven_amplifier():
+    """The amplifier of a loop has a limit, which nothing else reaches."""
+    uneven, plan = (
+        [EffectSetting("amplifier-unevenness", {"scale": 0.7})],
+        SweepPlan((60.0,), (2.5,)),
+    )
+    hardly = {"loop": SPEED | {"K_p": 1e-9, "excited": "command"}}
+    shown = [
+        simulate(drives.unit(sections, free=True), 0.5, plan, effects=uneven).gain[0]
+        for sections in (hardly, {})
+    ]
+    assert shown[0] == pytest.approx(shown[1], rel=1e-6)
 
 
 def test_chain_is_told_with_its_loop():
