@@ -5,6 +5,8 @@ import pytest
 from oracle import drive_plant
 from worlds import drives
 
+from daq.excitation.plan import ExcitedPlan
+from daq.excitation.signal import multisine
 from daq.plan import SweepPlan
 from sim.datasheet import find_impossible
 from sim.drivetrain import paper_drivetrain
@@ -31,6 +33,16 @@ def test_loop_without_backlash_is_linear(name):
     assert not find_impossible(unit)
     shown = simulate(unit, 0.5, plan(LINEAR_HZ, settle_cycles=40, integrate_cycles=20)).gain
     np.testing.assert_allclose(shown, linear(sections, LINEAR_HZ), rtol=2e-3)
+
+
+@pytest.mark.parametrize("name", ["speed, command", "position"])
+def test_loop_driven_by_multisine_is_linear(name):
+    hertz, sections = np.arange(60.0, 160.0, 10.0), drives.finely(drives.LOOPS[name])
+    signal = multisine(hertz, 0.2, "schroeder")
+    more = {"settle_cycles": 8, "integrate_cycles": 3, "excitation": signal}
+    unit = drives.unit(sections, free=True)
+    shown = simulate(unit, 0.5, ExcitedPlan(tuple(hertz), (2.0,), **more)).gain
+    np.testing.assert_allclose(shown, linear(sections, hertz), rtol=1e-3)
 
 
 def test_closed_loop_follows_from_open_loop():
