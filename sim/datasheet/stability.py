@@ -113,13 +113,14 @@ def loop_features(unit: Unit) -> LoopFeatures:
     gain = np.log(np.abs(paper_drivetrain(unit, 1.0).system().transfer(hertz)))
     ground = np.minimum(np.maximum.accumulate(gain), np.maximum.accumulate(gain[::-1])[::-1])
     low = int(np.argmax(ground - gain))
-    if not ground[low] > gain[low]:
-        return LoopFeatures(None, None, None)
+    at_load = unit.sensor is not None and unit.sensor.at == "load"
+    # What the load shows before its resonance is a hollow, and no anti-resonance.
+    arf = float(hertz[low]) if ground[low] > gain[low] and not at_load else None
     high = low + int(np.argmax(gain[low:]))
-    if high == len(hertz) - 1:
-        return LoopFeatures(float(hertz[low]), None, None)
+    if high in (0, len(hertz) - 1):
+        return LoopFeatures(arf, None, None)
     decibels = 20.0 / math.log(10.0) * float(gain[high])
-    return LoopFeatures(float(hertz[low]), float(hertz[high]), decibels)
+    return LoopFeatures(arf, float(hertz[high]), decibels)
 
 
 def _growing(

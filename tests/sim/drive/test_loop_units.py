@@ -24,6 +24,7 @@ from sim.unit import load_unit
 CLOCKED = drives.DRIVES["encoder, speed"]
 POSITION = drives.LOOPS["position"]
 SPEED = drives.SPEED
+EXAMPLE = Path(__file__).parents[3] / "docs" / "examples" / "loop.toml"
 
 WRONG = (
     ({"loop": SPEED | {"K_p": 0.0}}, "loop.K_p"),
@@ -77,6 +78,22 @@ def test_unstable_loop_is_refused_with_plausible_gain():
     assert not find_unusual(unit.with_parameters(K_p=most))
     assert find_unusual(unit.with_parameters(K_p=1.5 * most))
     assert not find_impossible(unit.with_parameters(K_p=1.5 * most))
+
+
+def test_file_with_unstable_loop_is_refused(tmp_path):
+    path = tmp_path / "fast.toml"
+    text = EXAMPLE.read_text(encoding="utf-8").replace("K_p = 2.0 ", "filtered = true\nK_p = 90.0 ")
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigurationError, match=r"fast\.toml: .*loop\.K_p 90: the closed loop is"):
+        load_unit(str(path))
+
+
+def test_loop_around_load_shows_resonance_alone():
+    """A speed of the load has no anti-resonance."""
+    load = {"sensor": {"kind": "tachometer", "at": "load"}, "loop": SPEED | {"K_p": 0.01}}
+    found = loop_features(drives.unit(load))
+    assert found.arf_hz is None
+    assert found.rf_hz == pytest.approx(155.0, rel=0.02)
 
 
 def test_loop_may_be_unstable_inside_the_play():
@@ -208,6 +225,6 @@ def test_small_reference_of_loop_may_overcome_friction():
 
 
 def test_example_of_loop_is_plausible():
-    unit = load_unit(str(Path(__file__).parents[3] / "docs" / "examples" / "loop.toml"))
+    unit = load_unit(str(EXAMPLE))
     assert not find_unusual(unit)
     assert unit.loop is not None
