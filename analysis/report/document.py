@@ -23,6 +23,7 @@ from analysis.report.certificate import Certificate, certificate_data
 from analysis.resonance import LevelFeatures
 from analysis.resonance.records import to_json
 from daq.frf import FrequencyResponse
+from sim.datasheet.chain import loop_words
 from sim.unit import Unit
 
 __all__ = ["FORMAT", "Origin", "data_hash", "report_data", "response_columns"]
@@ -71,11 +72,16 @@ def report_data(
     known = dict(response.provenance)
     configurations = {k: str(v) for k, v in dict(known.get("configurations") or {}).items()}
     columns = response_columns(response)
+    closed = {} if unit.loop is None else {"loop": "; ".join(loop_words(unit.loop))}
     content: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
         "made": made.isoformat(timespec="seconds"),
-        "unit": {"name": unit.name, "document": unit.model_dump(by_alias=True, mode="json")},
+        "unit": {
+            "name": unit.name,
+            "document": unit.model_dump(by_alias=True, mode="json"),
+            **closed,
+        },
         "origin": {"name": origin.name, **origin.facts},
         "simulated": known.get("kind") == "simulated",
         "measurement": {k: v for k, v in known.items() if k not in _APART},

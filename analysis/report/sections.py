@@ -83,6 +83,7 @@ def facts_section(data: Data) -> Markup:
         *head_rows(data),
         ("Address", words.get("address")),
         ("Source at the end", origin.get("source_state")),
+        ("Loop", data["unit"].get("loop")),
         ("Sweep", sweep),
         ("Source levels", ", ".join(f"{v:g}" for v in levels) + " V peak" if levels else None),
         ("DC offset", _with_unit(words.get("dc_offset_v"), "V")),

@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.datasheet.stability import gain_margin, loop_features
-from sim.drive.sections import Sensor
+from sim.drive.sections import Loop, Sensor
 from sim.drive.unit import Unit
 from sim.drivetrain import paper_drivetrain
 from sim.elements import Inertia, Mesh, Spring
 from sim.engine.system import Assembly
 
-__all__ = ["NaturalFrequencies", "describe_chain", "inertias_at_motor", "natural_frequencies"]
+__all__ = ["NaturalFrequencies", "describe_chain", "inertias_at_motor", "loop_words",
+           "natural_frequencies"]  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,15 +115,19 @@ def _drive_lines(unit: Unit) -> list[str]:
         read = "" if sensor.kind in ("accelerometer", "current") else f", {sensor.reads}"
         lines.append(f"sensor     {sensor.kind} {where}{read}{counts}{late}")
         lines += _band_lines(sensor)
-    if (loop := unit.loop) is not None:
-        outer = "" if loop.K_v is None else f"K_v {loop.K_v:.4g} 1/s, "
-        inner = "" if loop.T_i_s is None else f", T_i {loop.T_i_s:.4g} s"
-        late = f", {1e3 * loop.computing_s:g} ms to compute" if loop.computing_s else ""
-        lines += [
-            f"loop       {loop.controls}, {outer}K_p {loop.K_p:.4g}{inner}{late}",
-            f"           the source is {_EXCITED[loop.excited]}",
-        ]
+    if unit.loop is not None:
+        gains, source = loop_words(unit.loop)
+        lines += [f"loop       {gains}", f"           {source}"]
     return lines
+
+
+def loop_words(loop: Loop) -> tuple[str, str]:
+    """What a controller controls, with its gains, and where the source is added."""
+    outer = "" if loop.K_v is None else f"K_v {loop.K_v:.4g} 1/s, "
+    inner = "" if loop.T_i_s is None else f", T_i {loop.T_i_s:.4g} s"
+    late = f", {1e3 * loop.computing_s:g} ms to compute" if loop.computing_s else ""
+    gains = f"{loop.controls}, {outer}K_p {loop.K_p:.4g}{inner}{late}"
+    return gains, f"the source is {_EXCITED[loop.excited]}"
 
 
 _EXCITED = {"reference": "its reference", "command": "added to its command"}

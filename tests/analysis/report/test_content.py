@@ -29,6 +29,14 @@ def test_report_states_measurement_and_method(report):
     assert "SIMULATED" not in page.text
 
 
+def test_report_states_closed_loop(report):
+    """The response is then of the loop, not of the drive alone."""
+    document = makings.ADSS.model_dump(by_alias=True)
+    document["loop"] = {"controls": "speed", "K_p": 0.5, "T_i_s": 0.1}
+    _, page = report(unit=unit_from_mapping(document, "test"))
+    assert "Loop speed, K_p 0.5, T_i 0.1 s; the source is its reference" in page.text
+
+
 def test_features_and_estimate_have_words_and_numbers(report):
     _, page = report()
     assert "Adjust stage 2 first: 30 % of the backlash sits in stage 1" in page.text
