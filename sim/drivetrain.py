@@ -22,6 +22,7 @@ from sim.elements import (
     DryFriction,
     Element,
     Inertia,
+    LoadedFriction,
     Mesh,
     Motor,
     Spring,
@@ -131,15 +132,31 @@ def paper_drivetrain(unit: Unit, ratio: float) -> Drivetrain:
     if unit.stage2 is not None:
         twist = {"th_p2": 1.0 / unit.stage2.N, load_side(unit): -1.0}
         elements["mesh2"] = Mesh("mesh2", twist, unit.stage2.k_2, delta_2, damping.c_2 or 0.0)
-    elements |= {
-        "motor_friction": DryFriction("motor_friction", "th_m", motor.T_f_m),
-        "load_friction": DryFriction("load_friction", "th_L", load.T_f_L),
-    }
+    elements |= _frictions(unit)
     if damping.B_L is not None:
         elements["load_viscous"] = Damper({"th_L": 1.0}, damping.B_L)
     if damping.c_s1 is not None:
         elements |= shaft_dampers(unit, damping.c_s1)
     return Drivetrain(elements | _couplings(unit))
+
+
+def _frictions(unit: Unit) -> dict[str, Element]:
+    """Dry friction of motor and load, and in each mesh that loses torque, on its pinion."""
+    pinion, stage1, stage2 = motor_side(unit), unit.stage1, unit.stage2
+    found: dict[str, Element] = {
+        "motor_friction": DryFriction("motor_friction", "th_m", unit.motor.T_f_m)
+    }
+    if lost := _lost(stage1.eta_1, stage1.N_1):
+        name, T = ("motor_friction", unit.motor.T_f_m) if pinion == "th_m" else ("mesh1_loss", 0.0)
+        found[name] = LoadedFriction(name, pinion, "mesh1", lost, T)
+    if stage2 is not None and (lost := _lost(stage2.eta_2, stage2.N)):
+        found["mesh2_loss"] = LoadedFriction("mesh2_loss", "th_p2", "mesh2", lost)
+    return found | {"load_friction": DryFriction("load_friction", "th_L", unit.load.T_f_L)}
+
+
+def _lost(eta: float | None, N: float) -> float:
+    """Friction on a pinion over the torque at its gear."""
+    return 0.0 if eta is None else (1.0 / eta - 1.0) / N
 
 
 def shaft_dampers(unit: Unit, c_s1: float) -> dict[str, Element]:

@@ -24,6 +24,7 @@ __all__ = [
     "Element",
     "HardeningSpring",
     "Inertia",
+    "LoadedFriction",
     "Mesh",
     "Motor",
     "Spring",
@@ -140,6 +141,35 @@ class DryFriction:
             {self.coordinate: 1.0},
             {f"{self.coordinate}'": 1.0},
             parameters=(self.T, self.T_s, self.omega_s),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedFriction:
+    """Dry friction (T + m |F|) sign(w), F the torque that the mesh named `mesh` transmits.
+
+    It holds at rest what it can. The mesh must enter before it. With m = (1/eta - 1)/N on the
+    pinion of a stage of ratio N the stage has the efficiency eta while the pinion drives, and
+    2 - 1/eta while the gear does: up to 0.5 the gear cannot drive. Friction in proportion to the
+    tooth force, with sticking: C. Pelchen, C. Schweiger and M. Otter, "Modeling and Simulating the
+    Efficiency of Gearboxes and of Planetary Gearboxes", Modelica Conference 2002.
+    """
+
+    name: str
+    coordinate: str
+    mesh: str
+    m: float
+    T: float = 0.0
+
+    def enter(self, assembly: Assembly) -> None:
+        """Add the friction torque."""
+        assembly.add_law(
+            self.name,
+            Law.LOADED,
+            {self.coordinate: 1.0},
+            {f"{self.coordinate}'": 1.0},
+            parameters=(self.T, self.m),
+            loaded_by=self.mesh,
         )
 
 

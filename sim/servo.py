@@ -148,4 +148,6 @@ def linear_key(system: PiecewiseLinearSystem) -> bytes:
         stribeck = float(law.law is Law.FRICTION and law.parameters[1] != 0.0)
         fixed = np.array([law.law, law.feedthrough, law.stiffness, law.damping, stribeck, law.read])
         parts += [law.inlet, law.outlet, fixed, np.array(law.hears).ravel()]
+        if law.law is Law.LOADED:
+            parts.append(np.array(law.loaded_by))
     return b"".join(np.ascontiguousarray(part, dtype=float).tobytes() for part in parts)

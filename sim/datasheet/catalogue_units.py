@@ -172,6 +172,7 @@ _QUANTITIES: Mapping[str, tuple[CatalogueUnit, ...]] = {
     **dict.fromkeys(("T_f_m", "T_f_L"), _TORQUE),
     **dict.fromkeys(("k_g1", "k_s1", "k_2", "k_cm", "k_cL"), _STIFFNESS),
     "b_t_deg": _PLAY,
+    **dict.fromkeys(("eta_1", "eta_2"), _of("", {"%": 1e-2})),
     **dict.fromkeys(("start_hz", "stop_hz", "corner_hz", "rate_hz"), _FREQUENCY),
     **dict.fromkeys(("bandwidth_hz", "low_pass_hz", "high_pass_hz"), _FREQUENCY),
     "radius_m": _LENGTH,
@@ -250,7 +251,7 @@ def parse_quantity(symbol: str, text: str) -> tuple[float, CatalogueUnit]:
         return _ratio(value, rest, text), _PURE[0]
     unit = choices[0] if not rest else _named(rest, choices)
     if unit is None:
-        known = ", ".join(choice.name for choice in choices)
+        known = ", ".join(choice.name for choice in choices if choice.name)
         raise ValueError(f"{rest!r} is no unit of {shown_symbol(symbol)}; use one of: {known}")
     converted = unit.convert(value)
     if not math.isfinite(converted):

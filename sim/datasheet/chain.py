@@ -76,10 +76,12 @@ def describe_chain(unit: Unit) -> list[str]:
         lines.append(f"  coupling k_cm {coupling.k_cm:.4g} N.m/rad")
     lines += [
         f"  stage 1  {stage1.N_1:.5g} : 1, mesh k_g1 {stage1.k_g1:.4g} N.m/rad",
+        *_efficiency(stage1.eta_1),
         f"shaft 1    k_s1 {stage1.k_s1:.4g} N.m/rad",
     ]
     if stage2 is not None:
         lines.append(f"  stage 2  {stage2.N:.5g} : 1, mesh k_2 {stage2.k_2:.4g} N.m/rad")
+        lines += _efficiency(stage2.eta_2)
     if (last := unit.load_coupling) is not None:
         lines.append(f"  coupling k_cL {last.k_cL:.4g} N.m/rad")
     lines.append(f"load       J_L {unit.load.J_L:.4g} kg.m^2")
@@ -96,6 +98,14 @@ def describe_chain(unit: Unit) -> list[str]:
         *([] if unit.loop is None else _loop_lines(unit)),
     ]
     return lines
+
+
+def _efficiency(eta: float | None) -> list[str]:
+    """That of a stage, where it is stated; up to 0.5 its gear cannot drive its pinion."""
+    if eta is None:
+        return []
+    locks = ", self-locking: its gear cannot drive it" if eta <= 0.5 else ""
+    return [f"           efficiency {eta:.3g}{locks}"]
 
 
 def _drive_lines(unit: Unit) -> list[str]:

@@ -20,8 +20,8 @@ Values = Mapping[str, float]
 _SECTIONS = {
     "motor": ("L_a", "R_m", "k_b", "k_t", "J_m", "B_m", "T_f_m"),
     "electronics": ("k_a", "k_ts", "filter_numerator", "filter_denominator"),
-    "stage1": ("N_1", "k_g1", "J_g1", "k_s1", "J_s1", "J_p2"),
-    "stage2": ("N", "k_2"),
+    "stage1": ("N_1", "k_g1", "J_g1", "k_s1", "J_s1", "J_p2", "eta_1"),
+    "stage2": ("N", "k_2", "eta_2"),
     "load": ("J_L", "T_f_L"),
     "backlash": ("b_t_deg",),
     "limits": ("source_vpk", "source_offset_v", "start_hz", "stop_hz"),
@@ -101,6 +101,7 @@ SINGLES = (
     _single("J_p2", (0.0, 1e5), (0.0, 1e9)),
     _single("N", *_STAGE, remedy=f"{_TURNED}; a drive with one stage has no [stage2]"),
     _single("k_2", *_STIFFNESS),
+    *(_single(symbol, (0.3, 1.0), (0.2, 1.0)) for symbol in ("eta_1", "eta_2")),
     _single("J_L", (1e-10, 1e7), (1e-16, 1e10)),
     _single("T_f_L", (0.0, 1e5), (0.0, 1e8)),
     _single("b_t_deg", (0.0, 3.0), (0.0, 45.0)),

@@ -27,6 +27,7 @@ from sim.drive.sections import (
     Sensor,
     find_contradiction,
 )
+from sim.drive.stages import Stage1, Stage2
 from sim.own_effects.sources import EffectSource, OwnEffects, announce
 from sim.tolerance import Share, believed_shares, find_fault
 
@@ -76,32 +77,6 @@ class Electronics(_Section):
     """Numerator of G_f, 1/s^2; other sensors may have no filter."""
     filter_denominator: tuple[Positive, NonNegative, Positive] | None = None
     """Coefficients of s^2, s and 1 in the denominator of G_f."""
-
-
-class Stage1(_Section):
-    """First gear stage and shaft 1, equations (5) to (10)."""
-
-    N_1: Positive
-    """Gear ratio."""
-    k_g1: Positive
-    """Mesh stiffness at gear 1, N.m/rad."""
-    J_g1: Positive
-    """Gear 1, kg.m^2."""
-    k_s1: Positive
-    """Stiffness of shaft 1, N.m/rad; each half is 2 k_s1."""
-    J_s1: Positive
-    """Lumped inertia in the middle of shaft 1, kg.m^2."""
-    J_p2: Positive | None = None
-    """Pinion 2, kg.m^2; left out where there is no second stage."""
-
-
-class Stage2(_Section):
-    """Second gear stage, equations (10) to (13)."""
-
-    N: Positive
-    """Revolution ratio seen by pinion 2: N_2 + 1 where gear 2 is fixed, else N_2."""
-    k_2: Positive
-    """Mesh stiffness at the output, N.m/rad (with shaft 2 in series where there is one)."""
 
 
 class Load(_Section):

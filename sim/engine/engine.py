@@ -351,6 +351,7 @@ def program_of(
         steady=steady,
         # The states of stiff springs hardly differ: their differences need all digits.
         single=moving.single and not propagator.whole,
+        loads=tuple(law.loaded_by for law in laws),
     )
     parts = [
         propagator.carry,

@@ -240,12 +240,11 @@ class Program:
             together = [j, j + 1] if kinds[j] == PAIR else [j]
             others = [i for i in range(m) if i not in together]
             ahead = [self._felt(k, free[k], force, others, some) for k in together]
-            for k, solved in zip(together, self._force(j, ahead, force, some), strict=True):
-                newest[k] = solved
+            newest[j : j + len(together)] = self._force(j, ahead, free, force, some)
         return newest
 
     def _force(
-        self, j: int, ahead: Sequence[Lanes], last: Sequence[Lanes], some: Sequence[int]
+        self, j: int, ahead: list[Lanes], free: list[Lanes], last: list[Lanes], some: Sequence[int]
     ) -> Sequence[Lanes]:
         """The force of law j, or of a pair of them, in some vectors."""
         kind, m = self._structure.kinds[j], self._layout.m
@@ -259,13 +258,18 @@ class Program:
         beta, per_beta = fixed[:2]
         if kind == Law.FRICTION:
             return [laws.friction_force(y0, ahead[0], a(), b(), per_beta)]
-        if kind == STRIBECK:
-            w = ((beta * last[j] + ahead[0] + y0) * 0.5).lanes()
-            most = laws.peaked_friction(w, a(), b(), c())
+        if kind in (STRIBECK, Law.LOADED):
+            if kind == STRIBECK:
+                w = ((beta * last[j] + ahead[0] + y0) * 0.5).lanes()
+                most = laws.peaked_friction(w, a(), b(), c())
+            else:
+                i = self._structure.loads[j]
+                ends = self._load("seen", i, some), self._felt(i, free[i], last, range(m), some)
+                over_step = [self._take("law", 7 * i + k, some) for k in range(2)]
+                most = abs(laws.transmitted(*ends, last[i], *over_step)) * b() + a()
             return [laws.friction_force(y0, ahead[0], most, (beta * most).lanes(), per_beta)]
         if kind == Law.EXCESS:
-            centre = b()
-            return [laws.excess_force(y0 - centre, ahead[0] - centre, a())]
+            return [laws.excess_force(y0 - b(), ahead[0] - b(), a())]
         if kind == Law.CUBIC:
             return [laws.cubic_force(y0, ahead[0], last[j], a(), beta)]
         pair = [self._take("gain", k * m + i, some) for k in (j, j + 1) for i in (j, j + 1)]
@@ -333,8 +337,7 @@ class Program:
         self._store("sums", 0, self._load("sums", 0, self._all) + output, self._all)
         for k in range(SUMS - 1):
             share = self._wave(at, k, self._all) * output
-            more = share + self._load("sums", k + 1, self._all)
-            self._store("sums", k + 1, more, self._all)
+            self._store("sums", k + 1, share + self._load("sums", k + 1, self._all), self._all)
         largest = self._load("peak", 0, self._all)
         self._store("peak", 0, greatest(abs(output), largest), self._all)
 
@@ -375,8 +378,7 @@ class Program:
         return self._vector_at(self._lanes, _INT(place))
 
     def _load(self, name: str, i: int, vectors: Sequence[int]) -> Lanes:
-        load = self._emit.load
-        found = [load(self._lane_row(name, i, v), align=VECTOR_BYTES) for v in vectors]
+        found = [self._emit.load(self._lane_row(name, i, v), align=VECTOR_BYTES) for v in vectors]
         return Lanes(self._code, found)
 
     def _store(self, name: str, i: int, value: Lanes, vectors: Sequence[int]) -> None:

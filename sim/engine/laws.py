@@ -26,6 +26,7 @@ __all__ = [
     "friction_force",
     "peaked_friction",
     "play_force",
+    "transmitted",
 ]
 
 _CORRECTIONS = 2
@@ -120,6 +121,12 @@ def friction_force(w0: Lanes, ahead: Lanes, most: Lanes, holds: Lanes, per_beta:
         return slides.choose(sliding, stops.choose(ahead * per_beta, turned))
 
     return w0.code.short_cut(not_turning, any_way)
+
+
+def transmitted(y0: Lanes, y1: Lanes, force: Lanes, half_k: Lanes, per_step: Lanes) -> Lanes:
+    """Mean torque in the mesh of a play over the step; `force` is that of the play."""
+    closed = half_k * (y0 + y1) + (per_step * (y1 - y0)).lanes()
+    return closed - force
 
 
 def peaked_friction(w: Lanes, T: Lanes, T_s: Lanes, w_s: Lanes) -> Lanes:

@@ -41,7 +41,8 @@ class Structure:
     them, those of one group side by side, with the newest forces of all others. `turning`: which
     pairs of coordinates turn into each other, the others decay alone; empty where each feels
     every other. `heard` (p,): which coordinates the laws see, or else the output alone.
-    `steady`: whether anything constant acts. `single`: precision.
+    `steady`: whether anything constant acts. `single`: precision. `loads` (m,): number of the play
+    that loads each friction of kind `Law.LOADED`, -1 of other laws.
     """
 
     kinds: tuple[int, ...]
@@ -50,6 +51,7 @@ class Structure:
     heard: tuple[bool, ...]
     steady: bool
     single: bool
+    loads: tuple[int, ...]
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,9 @@ class Law(IntEnum):
     """p = y at the last tick in whole counts. Parameters: rate, size of a count."""
     COUNT_RATE = 8
     """p = rate times the change of the counts from tick to tick. Parameters: rate, size."""
+    LOADED = 9
+    """p = -(T + m \\|F\\|) sign(y), set-valued at rest, F what the mesh of a play transmits.
+    Parameters T, m."""
 
 
 SAMPLED = frozenset({Law.HOLD, Law.COUNT, Law.COUNT_RATE})
@@ -46,7 +49,8 @@ class Nonlinearity:
     `inlet` is g, `outlet` is c (both shape (n,)), `feedthrough` is d;
     `stiffness` and `damping` are those of a play when it is closed. `read` is r, what the output
     takes of p; `smooth` (n,) what a sampled law would see without a clock and without counts;
-    `hears`: numbers of earlier laws whose forces are part of y, with their coefficients.
+    `hears`: numbers of earlier laws whose forces are part of y, with their coefficients;
+    `loaded_by`: number of the play that loads a friction.
     """
 
     name: str
@@ -60,6 +64,7 @@ class Nonlinearity:
     read: float = 0.0
     smooth: NDArray[np.float64] | None = None
     hears: tuple[tuple[int, float], ...] = ()
+    loaded_by: int = -1
 
 
 @dataclass(frozen=True, slots=True)

@@ -96,6 +96,7 @@ class Assembly:
     _laws: list[_KnownLaw] = field(default_factory=list)
     _reads: dict[str, float] = field(default_factory=dict)
     _hears: dict[str, tuple[tuple[int, float], ...]] = field(default_factory=dict)
+    _loaded_by: dict[str, int] = field(default_factory=dict)
 
     def add_inertia(self, coordinate: str, J: float) -> None:
         """Add a coordinate with inertia J in kg.m^2."""
@@ -142,17 +143,20 @@ class Assembly:
         parameters: tuple[float, ...] = (),
         read: float = 0.0,
         hears: Along | None = None,
+        loaded_by: str = "",
     ) -> None:
         """Add a scalar law from a combination of states to torques or signal rates.
 
         `looks_at` and `acts_on` are over state names; in `acts_on` a coordinate
         means a torque, a signal means its rate. For `Law.PLAY` the closed
         stiffness and damping are added along the same direction. `read`: what the
-        output takes of it; `hears`: what it sees of laws that were added before.
+        output takes of it; `hears`: what it sees of laws that were added before; `loaded_by`:
+        the play, added before, that loads a friction.
         """
         places = {known: i for i, (known, *_) in enumerate(self._laws)}
         self._reads[name] = read
         self._hears[name] = tuple((places[k], c) for k, c in (hears or {}).items())
+        self._loaded_by[name] = places.get(loaded_by, -1)
         if law is Law.PLAY:
             self.add_torque(looks_at, stiffness, damping)
         self._laws.append(
@@ -200,6 +204,7 @@ class Assembly:
                 if law in SAMPLED
                 else None,
                 hears=self._hears[name],
+                loaded_by=self._loaded_by[name],
             )
             for name, law, acts, looks, feedthrough, stiffness, damping, parameters in self._laws
         )

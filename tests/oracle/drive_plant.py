@@ -21,6 +21,7 @@ from sim.engine.compiling import njit
 class Plant(NamedTuple):
     """Every number; SI, half plays in rad. A missing coupling is locked, k = 0.
 
+    `loss_1`, `loss_2`: torque lost on a pinion over that which the mesh passes on to it.
     `sense`: 0 speed or angle, 1 acceleration, 2 current; `low`, `high`: corners, rad/s, 0 for none.
     """
 
@@ -66,6 +67,8 @@ class Plant(NamedTuple):
     sense: int
     low: float
     high: float
+    loss_1: float
+    loss_2: float
 
 
 class Bench(NamedTuple):
@@ -153,6 +156,8 @@ def plant_of(document: dict[str, Any], ratio: float, **changed: float) -> tuple[
         "at_load": sensor.get("at") == "load",
         "sense": {"accelerometer": 1, "current": 2}.get(sensor["kind"], 0),
         "low": 2.0 * math.pi * sensor.get("low_pass_hz", 0.0),
+        "loss_1": 1.0 / s1.get("eta_1", 1.0) - 1.0,
+        "loss_2": 1.0 / s2.get("eta_2", 1.0) - 1.0 if s2 else 0.0,
         "high": 2.0 * math.pi * sensor.get("high_pass_hz", 0.0),
     }
     numbers.update(changed)
@@ -199,14 +204,15 @@ def _slopes(m, u, fed, y, dy):
     # The motor, and pinion 1 on it or behind a coupling.
     pin, wpin = (y[3], y[4]) if m.k_cm > 0.0 else (y[1], y[2])
     T1 = _dead(m.k_g1, m.c_g1, pin / m.N_1 - y[5], wpin / m.N_1 - y[6], m.delta_1)
+    L1 = T1 / m.N_1 + m.loss_1 * abs(T1) / m.N_1 * _sgn(wpin)
     drive = m.k_t * y[0] - m.B_m * y[2] - m.T_f_m * _sgn(y[2])
     dy[1], dy[3], dy[4] = y[2], 0.0, 0.0
     if m.k_cm > 0.0:
         Tc = m.k_cm * (y[1] - y[3]) + m.c_cm * (y[2] - wpin)
         dy[2] = (drive - Tc) / m.J_m
-        dy[3], dy[4] = y[4], (Tc - T1 / m.N_1) / m.J_cm
+        dy[3], dy[4] = y[4], (Tc - L1) / m.J_cm
     else:
-        dy[2] = (drive - T1 / m.N_1) / m.J_m
+        dy[2] = (drive - L1) / m.J_m
     # Gear 1 and the first half of the shaft.
     Ta = 2.0 * (m.k_s1 * (y[5] - y[7]) + m.c_s1 * (y[6] - y[8]))
     dy[5], dy[6] = y[6], (T1 - Ta) / m.J_g1
@@ -214,7 +220,7 @@ def _slopes(m, u, fed, y, dy):
     if m.two:
         Tb = 2.0 * (m.k_s1 * (y[7] - y[9]) + m.c_s1 * (y[8] - y[10]))
         T2 = _dead(m.k_2, m.c_2, y[9] / m.N - last, y[10] / m.N - wlast, m.delta_2)
-        dy[9], dy[10] = y[10], (Tb - T2 / m.N) / m.J_p2
+        dy[9], dy[10] = y[10], (Tb - T2 / m.N - m.loss_2 * abs(T2) / m.N * _sgn(y[10])) / m.J_p2
         arrives = T2
     else:
         Tb = 2.0 * (m.k_s1 * (y[7] - last) + m.c_s1 * (y[8] - wlast))

@@ -32,6 +32,7 @@ SERVO = Structure(
     heard=(True,) * 8 + (False,) * 2 + (True,) * 3,
     steady=False,
     single=False,
+    loads=(-1,) * 4,
 )
 """Of the paper's units: two plays, two frictions, four turning pairs of modes, and the filter's two
 that only the output sees."""

@@ -37,6 +37,8 @@ _NAMES = {
     "c_s1": "damping of shaft 1",
     "computing_s": "computing time",
     "delay_s": "delay of the loop",
+    "eta_1": "efficiency of stage 1",
+    "eta_2": "efficiency of stage 2",
     "f_p": "payload frequency",
     "h": "hardening",
     "high_pass_hz": "lower corner of the sensor",

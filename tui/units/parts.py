@@ -25,6 +25,7 @@ _PARTS = (
     ("motor_coupling", "an elastic coupling behind the motor"),
     ("load_coupling", "an elastic coupling before the load"),
     ("damping", "known damping of shaft or load"),
+    ("efficiency", "a worm, harmonic or planetary stage of known efficiency"),
     ("loop", "a speed or position loop stays closed while it is measured"),
 )
 _OF_LOOP = (
@@ -88,6 +89,8 @@ def with_parts(template: str, parts: str, names: Collection[str]) -> str:
         sections["loop"] = loop.replace("# K_v = 30.0  ", "K_v = 30.0    ")
     if "command" in wanted:
         sections["loop"] = sections["loop"].replace('"reference"  ', '"command"    ')
+    if "efficiency" in wanted:
+        template = re.sub(r"(?m)^# (eta_[12] = \S+)", r"\1  ", template)
     useless: tuple[str, ...] = ()
     if "amplifier" in wanted:
         useless += _OF_VOLTAGE

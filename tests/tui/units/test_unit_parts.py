@@ -71,10 +71,10 @@ def test_every_kind_of_loop_makes_a_unit(stages):
 
 
 def test_loop_is_asked_for_what_it_is():
-    names, _ = asked(["y", "n", "y", *"nnnn", "y", "y", "y"])
+    names, _ = asked(["y", "n", "y", *"nnnnn", "y", "y", "y"])
     assert names == ("sensor", "loop", "position", "command")
     # A tachometer reads no position.
-    names, said = asked(["y", *"nnnnnnnn", "y", "n"])
+    names, said = asked(["y", *"nnnnnnnnn", "y", "n"])
     assert names == ("loop",)
     assert "position loop is around" not in said
 
@@ -140,3 +140,16 @@ def test_commented_parts_of_new_file_work(stages, tmp_path, capsys):
     told = capsys.readouterr().out
     assert "controls the current" in told
     assert "encoder at the motor" in told
+
+
+@pytest.mark.parametrize("stages", ["one-stage", "two-stage"])
+def test_efficiency_is_asked_in_per_cent(stages):
+    text = with_parts(template(stages), template("parts"), ("efficiency",))
+    said = []
+
+    def read():
+        return {"eta_1": "45 %"}.get(said[-1].split(":", 1)[0].strip(), "-") + "\n"
+
+    unit = unit_from_mapping(tomllib.loads(ask_for_values(text, said.append, read)), "asked")
+    assert unit.stage1.eta_1 == 0.45
+    assert unit.stage2 is None or unit.stage2.eta_2 == 0.9
