@@ -31,7 +31,7 @@ def find_impossible(unit: Unit) -> list[str]:
 def find_unusual(unit: Unit) -> list[str]:
     """What is unusual in a unit's values and can be all the same, in the same form."""
     found = list(unusual_among(_values(unit))) or _resonances(unit, beyond=1.0)
-    return [*found, *find_unstable(unit, MARGIN), *_misplaced_delay(unit)]
+    return [*found, *find_unstable(unit, MARGIN), *_misplaced_delay(unit), *_insensitive(unit)]
 
 
 def impossible_among(values: Values) -> Iterator[str]:
@@ -139,6 +139,16 @@ def _values(unit: Unit) -> dict[str, float]:
             "stop_hz": limits.stop_hz,
         }
     )
+
+
+def _insensitive(unit: Unit) -> list[str]:
+    """A sensor that hardly shows what is looked for."""
+    if unit.sensor is None or unit.sensor.kind != "current" or unit.stages == 1:
+        return []
+    return [
+        "sensor.kind current: R_m limits it, and the contribution ratio shows near RF alone: "
+        "estimates may be off by 0.3; read a speed or acceleration to tell the stages apart"
+    ]
 
 
 def _misplaced_delay(unit: Unit) -> list[str]:

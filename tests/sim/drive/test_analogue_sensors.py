@@ -114,11 +114,16 @@ def test_sensor_effects_act_on_acceleration():
     ],
 )
 def test_catalogue_unit_explains_implausible_sensor_value(name, changed, remedy):
-    unit = drives.unit(drives.DRIVES[name])
+    unit = drives.unit(drives.DRIVES[name], "one-stage")
     assert not [*find_impossible(unit), *find_unusual(unit)]
     (said, *_) = find_unusual(unit.with_parameters(**changed))
     assert remedy in said
     assert "k_acc" not in said
+
+
+def test_current_of_two_stages_is_warned_of():
+    (said,) = find_unusual(drives.unit(drives.DRIVES["motor current"]))
+    assert "read a speed or acceleration" in said
 
 
 def test_chain_description_names_mounting_and_band():
