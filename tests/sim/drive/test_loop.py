@@ -83,3 +83,12 @@ def test_loop_with_backlash_matches_independent_plant(name):
     scatter = ours.std(axis=0) / np.abs(ours.mean(axis=0)) * np.sqrt(1 / 4 + 1 / theirs_count)
     # As of drives without a loop (`test_drive_response`): Student's t of four seeds.
     assert np.all(np.abs(off) < 5.5 * scatter + 0.03), (off, scatter)
+
+
+@pytest.mark.parametrize("name", drives.LOOPS)
+def test_integral_holds_mean_at_its_reference(name):
+    """A constant that is added behind the controller is taken out again."""
+    swept = plan((60.0,), 1.5, settle_cycles=40, integrate_cycles=10, dc_offset_v=0.5)
+    expected = 0.0 if name == "speed, command" else 0.5
+    (mean,) = simulate(drives.unit(drives.LOOPS[name]), 0.3, swept).dc_v
+    assert mean == pytest.approx(expected, abs=0.02)
