@@ -332,14 +332,7 @@ def _sentence(diagnosis: Diagnosis) -> str:
     word, names = diagnosis.verdict.word, " with ".join(c.effect for c in diagnosis.causes)
     where = " and ".join(_WHERE[site] for site in diagnosis.sites)
     if word == "consistent":
-        plain = diagnosis.verdict.baseline
-        likelier = [
-            one for one in diagnosis.verdict.judged if one.adequate and one.score > plain.score
-        ]
-        chance = (
-            f"; {_either(likelier)} is likelier by no more than chance brings" if likelier else ""
-        )
-        return f"Nothing beyond tolerance is needed to explain this response{chance}."
+        return "Nothing beyond tolerance is needed to explain this response."
     if word == "unexplained":
         return "Something is missing that no cause known here explains."
     explains = f"{names} ({where}) explains it with probability {diagnosis.verdict.probability:.2f}"

@@ -1,7 +1,7 @@
 """How sure it is of what it names: whether enough is believed of that, and of few enough causes.
 
-Owns from which probability on something is named without a rival. What is near the best in score,
-and says something else, is a rival by itself (`analysis.selection.verdict`). It simulates nothing.
+Owns from which probability on something is named without a rival, and who the rivals are. It
+changes no probability and simulates nothing.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ def require_credible_set(verdict: Verdict) -> Verdict:
     """
     if verdict.word != "explained":
         return verdict
-    also = _best_part(verdict) if len(verdict.best.effects) > FEW else _who_shares(verdict)
-    return replace(verdict, word="ambiguous", also=(*verdict.also, *also)) if also else verdict
+    rivals = _best_part(verdict) if len(verdict.best.effects) > FEW else _who_shares(verdict)
+    return replace(verdict, word="ambiguous", rivals=rivals) if rivals else verdict
 
 
 def _best_part(verdict: Verdict) -> tuple[Judged, ...]:

@@ -18,7 +18,6 @@ from analysis.emulation.fitted_model import Effects
 from analysis.emulation.parameter_posterior import ParameterPosterior
 from analysis.ensemble.model import Hypothesis
 from analysis.selection.verdict import (
-    FALSE_ALARM,
     WITHIN_TOLERANCE,
     Judged,
     Verdict,
@@ -70,12 +69,7 @@ def compare_with_datasheet(verdict: Verdict, found: ParameterPosterior) -> Verdi
         return verdict
     if rest:
         return _with_part(verdict, rest)
-    baseline = verdict.baseline
-    least = baseline.score + FALSE_ALARM
-    if any(one.effects and one.score > least for one in verdict.rivals):
-        # It may be what is missing.
-        return verdict
-    judged = rank_behind(verdict.judged, [best], baseline, AS_THE_DATASHEET)
+    judged = rank_behind(verdict.judged, [best], verdict.baseline, AS_THE_DATASHEET)
     baseline = _among(judged, ())
     word: Word = "consistent" if baseline.adequate else "unexplained"
     return Verdict(word, baseline, judged, baseline)
@@ -95,14 +89,14 @@ def _with_part(verdict: Verdict, rest: Effects) -> Verdict:
     if part.adequate and part.score >= max(one.score for one in others):
         judged = rank_behind(judged, [best], part, AS_THE_DATASHEET)
         baseline = _among(judged, ())
-        apart = (one for one in verdict.also if not set(one.effects) > set(rest))
-        also = tuple(_among(judged, one.effects) for one in apart)
-        named = Verdict("explained", _among(judged, rest), judged, baseline, also)
-        return replace(named, word="ambiguous") if named.rivals else named
+        apart = (one for one in verdict.rivals if not set(one.effects) > set(rest))
+        rivals = tuple(_among(judged, one.effects) for one in apart)
+        word: Word = "ambiguous" if rivals else "explained"
+        return Verdict(word, _among(judged, rest), judged, baseline, rivals)
     rival = replace(part, objection="")
     judged = tuple(rival if one is part else one for one in judged)
-    also = tuple(_among(judged, one.effects) for one in (*verdict.also, rival))
-    return Verdict("ambiguous", best, judged, _among(judged, ()), also)
+    rivals = tuple(_among(judged, one.effects) for one in (*verdict.rivals, rival))
+    return Verdict("ambiguous", best, judged, _among(judged, ()), rivals)
 
 
 def _among(judged: Sequence[Judged], effects: Effects) -> Judged:

@@ -1,8 +1,8 @@
-"""From candidates to a verdict: consistent, explained, ambiguous or unexplained.
+"""From candidates to a verdict: consistent, explained or unexplained.
 
-Owns how sets are compared: the posterior odds of each, the best one, the lead that it needs, and
-its rivals. `analysis.checking.rejection` owns what speaks against one
-set. It simulates nothing.
+Owns how sets are compared: the posterior odds of each, the likeliest one, and what must hold of it
+to be named. `analysis.checking.rejection` owns what speaks against one set, and
+`analysis.selection.credible_set` who are its rivals. It simulates nothing.
 """
 
 from __future__ import annotations
@@ -16,14 +16,13 @@ import numpy as np
 from analysis.checking.cross_validation import HeldOut, hold_out
 from analysis.checking.equivalence import is_equivalent_at_load
 from analysis.checking.goodness_of_fit import judge_adequacy, judge_chance
-from analysis.checking.rejection import FEW, OUT_OF_SIGHT, find_rejection
+from analysis.checking.rejection import OUT_OF_SIGHT, find_rejection
 from analysis.emulation.fitted_model import Effects, FittedModel
 from analysis.emulation.likelihood import TEMPERATURE
 from analysis.observation.observation import Observation
 
 __all__ = [
     "BY_CHANCE",
-    "FALSE_ALARM",
     "WITHIN_TOLERANCE",
     "Judged",
     "Verdict",
@@ -35,33 +34,13 @@ __all__ = [
 
 Word = Literal["consistent", "explained", "ambiguous", "unexplained"]
 
-_RARE = TEMPERATURE * float(np.log(10.0))
-"""Lead of a common cause over a rare one: it is taken for ten times less likely. That
-says which of two that do alike is named first. The less common one stays a rival."""
-
-FALSE_ALARM = 20.0
-"""By so much must a cause beat the baseline."""
-
-_SURE = 3.0 * TEMPERATURE
-"""While it leads by less than this, that nothing is hidden has a twentieth of its probability or
-more, and is a rival: causes that nobody thought of are blamed on others by leads like these.
-Sets further behind are not held against runs of their own, which takes seconds and changes
-nothing; the baseline always is, and so are parts of the leader."""
+_FAR = 3.0 * TEMPERATURE
+"""Sets this far behind the first have a twentieth of its probability or less. They are not held
+against runs of their own, which takes seconds and changes nothing; the baseline always is, and so
+are parts of the first."""
 
 _BY_CHANCE = 0.04
 """In at most this share of replicates of the plain model may causes gain as much."""
-
-_TIE = 20.0
-"""The scores of two sets that say the same about everything differ by about as much, as each has
-runs of its own."""
-
-_RIVAL, _RARE_RIVAL = 2.0 * TEMPERATURE, TEMPERATURE
-"""Within so much of the best, a set is a rival; and a rare one, but for being rare. Of seventeen
-rare causes that were hidden two stood behind the leader but for that, by 6 at most."""
-
-_LIKELY = 0.5
-"""Where less than this is believed of the best and of all that hold it, those that are refused, and
-are believed in its place, are rivals: of 142 sets drawn and named so two had less, both wrong."""
 
 _JUDGED = 6
 
@@ -108,32 +87,14 @@ class Judged:
 class Verdict:
     """The word, the best set, every set judged (best first), and the baseline among them.
 
-    `also`: rivals whatever their scores, as a further cause of the best set may be none, or too
-    little is believed of it.
+    `rivals`: sets that may be the explanation in place of the best one, which is then "ambiguous".
     """
 
     word: Word
     best: Judged
     judged: tuple[Judged, ...]
     baseline: Judged
-    also: tuple[Judged, ...] = ()
-
-    @property
-    def rivals(self) -> tuple[Judged, ...]:
-        """Sets near the best one that say something else, and might be the explanation.
-
-        Among them that nothing is hidden, which has a wider margin, and is one though refused where
-        the best leads it by less than it takes to be named. A set that would be no explanation if
-        it led is none as a rival, nor is one that is equivalent, with more parameters: what is
-        believed of that counts for the best. One that is refused though it leads is: the best is
-        then likeliest only among what is left. So is any near the best where more is believed of
-        others than of that.
-        """
-        said = [self.best.score, *(one.score for one in self.judged if self.is_equivalent(one))]
-        believed = TEMPERATURE * float(np.logaddexp.reduce(np.array(said) / TEMPERATURE))
-        return tuple(
-            one for one in self.judged if one in self.also or self._is_rival(one, believed)
-        )
+    rivals: tuple[Judged, ...] = ()
 
     @property
     def probability(self) -> float:
@@ -171,33 +132,6 @@ class Verdict:
         may = one.adequate or one.objection == OUT_OF_SIGHT
         return may and is_equivalent_at_load(one.candidate, self.best.candidate)
 
-    def _is_led_by(self, one: Judged) -> bool:
-        """Whether a refused set does better by little, so that the best stands in its place."""
-        return one.refused and self.best.score < one.score < self.best.score + _TIE
-
-    def _is_likely(self) -> bool:
-        """Whether more is believed of the best, and of sets that hold it, than of all others.
-
-        It never is of more than `FEW` causes, which stood for what nobody knew before.
-        """
-        if len(self.best.effects) > FEW:
-            return False
-        return self.probability >= _LIKELY
-
-    def _is_rival(self, one: Judged, believed: float) -> bool:
-        behind, best = believed - one.score, set(self.best.effects)
-        if not one.effects and best:
-            lead = self.best.score - one.score
-            # Refused it is no explanation, and what leads it by little has hardly earned its name.
-            return lead < _SURE if one.adequate else one.refused and 0.0 < lead < FALSE_ALARM
-        other = not set(one.effects) <= best and not set(one.effects) >= best
-        if self._is_led_by(one) or one.refused and behind < _RIVAL and not self._is_likely():
-            return other and not is_equivalent_at_load(one.candidate, self.best.candidate)
-        rarer = one.candidate.hypothesis.rare > self.best.candidate.hypothesis.rare
-        if not other or not one.adequate or behind >= (_RARE + _RARE_RIVAL if rarer else _RIVAL):
-            return False
-        return not self.is_equivalent(one)
-
 
 def judge_candidates(
     candidates: Sequence[FittedModel],
@@ -221,30 +155,24 @@ def judge_candidates(
     chosen = _worth_judging(candidates, scores)
     judged = _ranked([_unasked(c, observation, scores[c.hypothesis.effects]) for c in chosen])
     judged = _ask(judged, rng)
-    best = _leader(judged)
+    best = _simplest(judged)
     (baseline,) = (one for one in judged if not one.effects)
-    little = best.score < baseline.score + FALSE_ALARM
-    if baseline.adequate and not little and _may_be_chance(baseline, best, rng):
+    if best.effects and baseline.adequate and _may_be_chance(baseline, best, rng):
         ahead = [one for one in judged if one.score > baseline.score]
         judged = rank_behind(judged, ahead, baseline, BY_CHANCE)
-        (baseline,) = (one for one in judged if not one.effects)
-        return Verdict("consistent", baseline, judged, baseline)
-    if little:
-        if baseline.adequate:
-            return Verdict("consistent", baseline, judged, baseline)
-        tie = Verdict("ambiguous", best, judged, baseline)
-        enough = any(one.adequate or one is baseline for one in tie.rivals)
-        if best.effects and best.adequate and enough:
-            # Something is missing, too little of it to say which of several it is, or to be sure
-            # of the one that there is.
-            return tie
-        return Verdict("unexplained", baseline, judged, baseline)
-    verdict = Verdict("explained", best, judged, baseline)
+        best = baseline = next(one for one in judged if not one.effects)
     if not best.adequate:
         return Verdict("unexplained", best, judged, baseline)
-    if verdict.rivals:
-        return Verdict("ambiguous", best, judged, baseline)
-    return verdict
+    return Verdict("explained" if best.effects else "consistent", best, judged, baseline)
+
+
+def _simplest(judged: Sequence[Judged]) -> Judged:
+    """The first set, or what says the same with fewer sizes and may be the explanation."""
+    first = judged[0]
+    alike = (one for one in judged if one.adequate)
+    return next(
+        (one for one in alike if is_equivalent_at_load(first.candidate, one.candidate)), first
+    )
 
 
 def _may_be_chance(simpler: Judged, best: Judged, rng: np.random.Generator) -> bool:
@@ -278,7 +206,7 @@ def _ask(judged: Sequence[Judged], rng: np.random.Generator) -> tuple[Judged, ..
     asked = []
     for one in judged:
         part = set(one.effects) < set(first.effects) or not one.effects
-        near = one.score > first.score - _SURE - _RARE * one.candidate.hypothesis.rare
+        near = one.score > first.score - _FAR
         if one.objection != _NOT_ASKED or not (part or near):
             asked.append(one)
             continue
@@ -290,25 +218,11 @@ def _ask(judged: Sequence[Judged], rng: np.random.Generator) -> tuple[Judged, ..
     return tuple(asked)
 
 
-def _leader(judged: Sequence[Judged]) -> Judged:
-    """The best set.
-
-    If something speaks against the first and nothing against another within `_TIE`, that one leads.
-    So does one that says the same with fewer sizes.
-    """
-    tied = [one for one in judged if one.score > judged[0].score - _TIE and one.adequate]
-    best = tied[0] if tied else judged[0]
-    for one in tied:
-        if is_equivalent_at_load(best.candidate, one.candidate):
-            best = one
-    return best
-
-
 def rank_behind(
     judged: Sequence[Judged], ahead: Sequence[Judged], part: Judged, objection: str
 ) -> tuple[Judged, ...]:
     """Put sets that owe their lead to chance far behind the part that does as well."""
-    least = part.score - _SURE
+    least = part.score - _FAR
     return _ranked(
         [
             replace(one, score=min(one.score, least), objection=objection) if one in ahead else one

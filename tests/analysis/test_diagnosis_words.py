@@ -78,7 +78,8 @@ def test_rival_at_another_site_is_marked(explained):
         for one in explained.verdict.judged
         if one.effects
     )
-    verdict = replace(explained.verdict, word="ambiguous", judged=judged)
+    others = tuple(one for one in judged if one is not best)
+    verdict = replace(explained.verdict, word="ambiguous", judged=judged, rivals=others)
     said = replace(explained, verdict=verdict).summary()[0]
     assert "amplifier-gain (in the measuring chain)" in said
     assert "shaft-stiffness or" in said or "or shaft-stiffness." in said
@@ -195,7 +196,9 @@ def judged(explained, *objections):
         replace(one, score=best.score - 1.0 - i, objection=objection)
         for i, (one, objection) in enumerate(zip(others, objections, strict=True))
     ]
-    return replace(explained.verdict, word="ambiguous", judged=(best, *rivals), also=tuple(rivals))
+    return replace(
+        explained.verdict, word="ambiguous", judged=(best, *rivals), rivals=tuple(rivals)
+    )
 
 
 @pytest.mark.parametrize(
@@ -292,16 +295,3 @@ def test_named_cause_states_possible_further_ones(monkeypatch):
         "  sizes of further causes that this sweep cannot exclude, one cause at a time:"
     )
     assert told[at + 1] == f"    {list_unseen(document)[0]}"
-
-
-def test_likely_cause_is_stated_beside_consistent_verdict(monkeypatch):
-    plain = makings.diagnosis(monkeypatch, (), [LOAD, STIFF])
-    assert plain.summary()[0].endswith("is needed to explain this response.")
-    judged = tuple(
-        replace(one, score=plain.verdict.best.score + 20.0, objection="")
-        if one.effects == LOAD
-        else one
-        for one in plain.verdict.judged
-    )
-    said = replace(plain, verdict=replace(plain.verdict, judged=judged)).summary()[0]
-    assert said.endswith("; load-inertia is likelier by no more than chance brings.")

@@ -7,6 +7,7 @@ import pytest
 from worlds.judging import likelihoods, odds
 from worlds.synthetic import candidate, observation, read, thinned
 
+from analysis.selection.credible_set import require_credible_set
 from analysis.selection.verdict import judge_candidates
 
 TRUE, WRONG = ("load-inertia",), ("shaft-stiffness",)
@@ -22,7 +23,9 @@ def judge(seed, step=1, scatter=1.0):
         candidate(seen, effects, 10 * seed + number, scatter=scatter)
         for number, effects in enumerate(((), TRUE, WRONG))
     ]
-    verdict = judge_candidates(found, seen, np.random.default_rng(seed), odds(likelihoods(found)))
+    scores = odds(likelihoods(found))
+    verdict = judge_candidates(found, seen, np.random.default_rng(seed), scores)
+    verdict = require_credible_set(verdict)
     (true,) = (one for one in verdict.judged if one.effects == TRUE)
     return SimpleNamespace(
         ahead=true.score - verdict.baseline.score, probability=true.probability, word=verdict.word

@@ -9,7 +9,7 @@ from worlds.synthetic import ADSS, FREQUENCIES
 
 from analysis.checking.equivalence import is_equivalent_at_load
 from analysis.ensemble.model import Hypothesis
-from analysis.selection import verdict as rules
+from analysis.selection.verdict import Judged, Verdict
 
 J_L = ADSS.load.J_L
 SWINGING, BRAKED, HEAVY, TIED = (
@@ -70,38 +70,16 @@ def test_sets_with_equal_sizes_are_not_equivalent():
     assert not is_equivalent_at_load(believed(BRAKED), believed(HEAVY))
 
 
-@pytest.mark.parametrize(("alike", "rivals"), [(True, []), (False, [SWINGING])])
-def test_larger_equivalent_set_is_marked_not_rival(monkeypatch, alike, rivals):
-    verdict = standing([(BRAKED, 0.0), (SWINGING, -10.0), ((), -300.0)])
-    payload = verdict.judged[1]
-    monkeypatch.setattr(
-        rules, "is_equivalent_at_load", lambda one, _: alike and one is payload.candidate
-    )
-    assert [one.effects for one in verdict.rivals] == rivals
-    said = ["", "equivalent, with more parameters" if alike else "", ""]
-    assert [verdict.remark(one) for one in verdict.judged] == said
-    refused = replace(payload, objection="needs a size outside its plausible range")
-    assert verdict.remark(refused) == refused.objection
-
-
 @pytest.mark.parametrize(
-    ("behind", "alike", "named"),
-    [(19.0, True, BRAKED), (21.0, True, SWINGING), (19.0, False, SWINGING)],
+    ("payload", "said"), [(FAR_BELOW, "equivalent, with more parameters"), (AMID, "")]
 )
-def test_simpler_equivalent_set_is_named_in_tie(monkeypatch, behind, alike, named):
-    monkeypatch.setattr(
-        rules,
-        "is_equivalent_at_load",
-        lambda one, other: alike and one.hypothesis.d > other.hypothesis.d,
-    )
-    judged = standing([(SWINGING, 0.0), (BRAKED, -behind), ((), -300.0)]).judged
-    assert rules._leader(judged).effects == named
-
-
-def standing(scores):
-    """A verdict over sets with such scores, all of them adequate."""
+def test_larger_equivalent_set_is_marked(payload, said):
     judged = tuple(
-        rules.Judged(believed(effects), SimpleNamespace(missed=0.8), score, 0.0, 0.0, 0.0, "")
-        for effects, score in scores
+        Judged(believed(effects, at), SimpleNamespace(), 0.0, 0.0, 0.0, p, "")
+        for effects, at, p in ((BRAKED, None, 0.5), (SWINGING, payload, 0.4), ((), None, 0.1))
     )
-    return rules.Verdict("explained", judged[0], judged, judged[-1])
+    verdict = Verdict("explained", judged[0], judged, judged[-1])
+    assert [verdict.remark(one) for one in judged] == ["", said, ""]
+    assert verdict.probability == pytest.approx(0.9 if said else 0.5)
+    refused = replace(judged[1], objection="needs a size outside its plausible range")
+    assert verdict.remark(refused) == refused.objection

@@ -73,7 +73,7 @@ def test_likely_adequate_model_remains_beside_plain_model(consistent):
 
 def test_tied_models_are_sized_and_none_accepted(explained):
     also = tuple(one for one in explained.verdict.judged if one.effects in (STIFF, ()))
-    models = left(explained, word="ambiguous", also=also)
+    models = left(explained, word="ambiguous", rivals=also)
     assert {model.causes for model in models[1:]} >= {STIFF, ()}
     assert models[0].causes == LOAD
     (plain,) = (model for model in models if not model.causes)
@@ -91,7 +91,7 @@ def test_likely_model_remains_in_tie_without_rival(explained):
     (stiff,) = (one for one in others if one.effects == STIFF)
     for probability, kept in ((0.08, [LOAD, STIFF]), (0.02, [LOAD])):
         one = replace(stiff, probability=probability, objection="", score=best.score - 100.0)
-        models = left(explained, word="ambiguous", judged=(best, one), also=())
+        models = left(explained, word="ambiguous", judged=(best, one), rivals=())
         assert [model.causes for model in models] == kept
 
 

@@ -29,7 +29,8 @@ def tied(explained, lead, objection, effects=STIFF):
     (other,) = (one for one in explained.verdict.judged if one.effects == effects)
     other = replace(other, score=best.score + lead, probability=0.48, objection=objection)
     judged = tuple(sorted([best, other], key=lambda one: -one.score))
-    return replace(explained, verdict=replace(explained.verdict, word="ambiguous", judged=judged))
+    verdict = replace(explained.verdict, word="ambiguous", judged=judged, rivals=(other,))
+    return replace(explained, verdict=verdict)
 
 
 @pytest.mark.parametrize(
@@ -130,7 +131,7 @@ def test_remaining_causes_are_sized_and_tested_alike(monkeypatch):
         if verdict.best.effects == load:
             return verdict
         part = next(one for one in verdict.judged if one.effects == load)
-        return replace(verdict, word="ambiguous", best=part, also=(verdict.best,))
+        return replace(verdict, word="ambiguous", best=part, rivals=(verdict.best,))
 
     monkeypatch.setattr(makings.diagnosis_module, "compare_with_datasheet", held)
     found = makings.diagnosis(monkeypatch, braked, [braked, load])

@@ -25,10 +25,9 @@ def told(best, *others, word="explained"):
 
 @pytest.fixture(autouse=True)
 def alike(monkeypatch):
-    """Likeness is not asked of what has no surface, nor who is near: that has tests of its own."""
+    """Likeness is not asked of what has no surface: that has tests of its own."""
     same = set()
     monkeypatch.setattr(Verdict, "is_equivalent", lambda _, one: one.effects in same)
-    monkeypatch.setattr(Verdict, "_is_rival", lambda *_: False)
     return same
 
 

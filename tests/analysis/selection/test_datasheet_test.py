@@ -37,19 +37,6 @@ def told(effects, sigmas, word="explained", objections=(), others=()):
     )
 
 
-@pytest.fixture(autouse=True)
-def rivals(monkeypatch):
-    """Rivals are the parts, and what is near; likeness is not asked of what has no surface."""
-    near = []
-
-    def found(verdict):
-        sets = [one.effects for one in near]
-        return tuple(one for one in verdict.judged if one in verdict.also or one.effects in sets)
-
-    monkeypatch.setattr(Verdict, "rivals", property(found))
-    return near
-
-
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize(("sigmas", "sure"), [(1.9, False), (2.1, True), (0.0, False)])
 def test_single_value_must_differ_from_datasheet(sigmas, sign, sure):
@@ -80,17 +67,6 @@ def test_value_unknown_to_datasheet_differs_from_it():
 def test_verdict_without_cause_is_unchanged():
     verdict, found = told((SHAFT,), [0.0], word="unexplained")
     assert compare_with_datasheet(verdict, found) is verdict
-
-
-@pytest.mark.parametrize(("ahead", "may_be"), [(20.1, True), (19.9, False), (-5.0, False)])
-def test_rival_ahead_of_plain_model_may_explain(rivals, ahead, may_be):
-    """Not one that would not be named for so little: a shaft was left standing by soft teeth."""
-    load = standing((LOAD,), ahead)
-    verdict, found = told((SHAFT,), [0.0], word="ambiguous", others=(load,))
-    rivals += [load, verdict.baseline]
-    held = compare_with_datasheet(verdict, found)
-    assert held.word == ("ambiguous" if may_be else "consistent")
-    assert (held is verdict) == may_be
 
 
 @pytest.mark.parametrize("word", ["explained", "ambiguous"])
@@ -133,10 +109,10 @@ def test_containing_set_does_not_precede_remaining_causes(score):
     assert (held.word, held.best.effects) == ("explained", (LOAD,))
 
 
-def test_rival_of_whole_set_stays_for_rest(rivals):
-    rivals.append(standing((BRAKE,), 49.0))
-    verdict, found = told((LOAD, SHAFT), [5.0, 0.0], others=tuple(rivals))
-    held = compare_with_datasheet(verdict, found)
+def test_rival_of_whole_set_stays_for_rest():
+    brake = standing((BRAKE,), 49.0)
+    verdict, found = told((LOAD, SHAFT), [5.0, 0.0], word="ambiguous", others=(brake,))
+    held = compare_with_datasheet(replace(verdict, rivals=(brake,)), found)
     assert (held.word, held.best.effects) == ("ambiguous", (LOAD,))
     assert [one.effects for one in held.rivals] == [(BRAKE,)]
 
@@ -190,7 +166,7 @@ def test_unexamined_rest_is_no_rival():
 
 @pytest.mark.parametrize("word", ["explained", "ambiguous"])
 @pytest.mark.parametrize(("off", "named"), [(0.9, False), (1.12, False), (0.7, True), (1.4, True)])
-def test_value_within_tolerance_is_not_named(off, named, word, rivals):
+def test_value_within_tolerance_is_not_named(off, named, word):
     """Though the plain model does worse than runs of the value, and another such value as well."""
     unit = ADSS.with_tolerance({"default": 0.05})
 
@@ -200,9 +176,9 @@ def test_value_within_tolerance_is_not_named(off, named, word, rivals):
 
     best, other = judged((SHAFT,), 100.0), judged((LOAD,), 90.0)
     baseline = judged((), 0.0, "leaves structure")
-    rivals.append(other)
     place = best.candidate.hypothesis.place(0.5, [off * unit.stage1.k_s1])
-    verdict = Verdict(word, best, (best, other, baseline), baseline)
+    near = (other,) if word == "ambiguous" else ()
+    verdict = Verdict(word, best, (best, other, baseline), baseline, near)
     held = compare_with_datasheet(verdict, ParameterPosterior(place, 0.01**2 * np.eye(2)))
     if named:
         assert held is verdict
