@@ -6,9 +6,6 @@ the cause is another then. It simulates nothing and passes no verdict.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from analysis.emulation.fitted_model import FittedModel
 from analysis.emulation.likelihood import TEMPERATURE
 from sim.catalogue import CATALOGUE
@@ -52,15 +49,11 @@ def is_pressed(candidate: FittedModel) -> bool:
     return False
 
 
-def is_out_of_sight(candidate: FittedModel, place: NDArray[np.float64] | None = None) -> bool:
-    """Whether what it is told by is a resonance far outside all that was measured.
-
-    At a place (d,), that of its best fit if not given.
-    """
+def is_out_of_sight(candidate: FittedModel) -> bool:
+    """Whether what its best fit is told by is a resonance far outside all that was measured."""
     hypothesis, measured = candidate.hypothesis, candidate.surface.observation.frequency_hz
     low, high = measured.min() / _IN_SIGHT, measured.max() * _IN_SIGHT
-    there = candidate.best.place if place is None else place
-    values = zip(hypothesis.parameters, hypothesis.values(there), strict=True)
+    values = zip(hypothesis.parameters, hypothesis.values(candidate.best.place), strict=True)
     return any(
         CATALOGUE[effect].resonance == parameter.name and not low < value < high
         for (effect, parameter), value in values

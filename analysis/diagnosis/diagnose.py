@@ -41,7 +41,6 @@ from analysis.observation.observation import Observation, observe
 from analysis.observation.rounding import settled
 from analysis.observation.stated_error import error_doubts
 from analysis.observation.thinning import thin_responses
-from analysis.selection.cancellation import UNDOING, confirm_causes
 from analysis.selection.credible_set import require_credible_set
 from analysis.selection.datasheet_test import compare_with_datasheet
 from analysis.selection.verdict import Judged, Verdict, judge_candidates
@@ -186,10 +185,7 @@ def _diagnose(
             record.verdict = held
         with record.stage("criticise"):
             # Last, as what shares its probability is no reason to name what is the datasheet's.
-            held = require_credible_set(held)
-            # Chance of its own: where nothing is refused all comes out as if it were not asked.
-            verdict = confirm_causes(held, sharp.mean, observation, rng.spawn(1)[0], executor)
-            record.verdict = verdict
+            verdict = record.verdict = require_credible_set(held)
         sharp = None if verdict.word == "unexplained" else sharp
     named = verdict.word in ("explained", "ambiguous")
     base = widen_if_open(base, verdict.baseline.candidate, observation, rng)
@@ -290,12 +286,6 @@ def _warnings(diagnosis: Diagnosis) -> tuple[str, ...]:
         found.append(
             "the contribution ratio is that of the plain model, which does not explain what was "
             "measured: it may be off by far more than its error"
-        )
-    if diagnosis.verdict.best.objection == UNDOING:
-        found.append(
-            f"{' and '.join(diagnosis.verdict.best.effects)} would explain it together, though "
-            "each alone takes the model further off: measure them by themselves, or look for "
-            "something else that does what they leave"
         )
     near = (is_usually_off(s.value, s.datasheet) for c in diagnosis.causes for s in c.sizes)
     if trusts_much(diagnosis.believed) and (diagnosis.verdict.word == "unexplained" or any(near)):

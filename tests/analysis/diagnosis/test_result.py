@@ -10,7 +10,6 @@ from outputs import report_makings as makings
 from analysis.diagnosis.diagnose import _causes
 from analysis.emulation.parameter_posterior import ParameterPosterior
 from analysis.ensemble.model import Hypothesis
-from analysis.selection import cancellation as second_thoughts
 from analysis.selection import credible_set as certainty
 from sim.unit import load_unit
 
@@ -139,26 +138,6 @@ def test_remaining_causes_are_sized_and_tested_alike(monkeypatch):
     document = found.to_json()
     assert [cause["effect"] for cause in document["causes"]] == [*load]
     assert [*braked] in [rival["causes"] for rival in document["rivals"]]
-
-
-@pytest.mark.parametrize(("left", "named"), [(0.5, False), (0.9, True)])
-def test_cancelling_causes_are_not_named(monkeypatch, left, named):
-    """An operator is told which, and what to do; the ratio is not that of such a tale."""
-    monkeypatch.setattr(second_thoughts, "cancellation_ratio", lambda *_: left)
-    braked = ("load-inertia", "load-viscous-damping")
-    found = makings.diagnosis(monkeypatch, braked, [braked])
-    document = found.to_json()
-    told = [text for text in document["warnings"] if "each alone takes the model" in text]
-    assert bool(document["causes"]) == named
-    assert (found.ratio_extended == found.ratio_baseline) != named
-    if named:
-        assert (document["verdict"], told) == ("explained", [])
-        return
-    assert document["verdict"] == "unexplained"
-    (warning,) = told
-    assert "load-inertia and load-viscous-damping would" in warning
-    assert any(warning in line for line in found.summary())
-    assert any("cancel each other" in line for line in found.summary())
 
 
 @pytest.mark.parametrize(("asked", "word"), [(0.0, "explained"), (2.0, "ambiguous")])
