@@ -297,6 +297,9 @@ def _dwell(m, bench, loop, volts, hertz, settle, cycles, dt, clock, counter, y, 
     normal, right = np.zeros((cycles, 3, 3)), np.zeros((cycles, 3))
     for n in range(steps):
         t = n * dt
+        if loop.K_p > 0.0 and loop.digital and clock[5] <= 0.5 * dt:
+            # A command that takes a whole period comes when the next one is begun.
+            clock[6] = clock[4]
         if bench.rate_hz > 0.0 and clock[0] <= 0.5 * dt:
             clock[0] += period
             clock[1] = volts * math.sin(2.0 * math.pi * hertz * t)
@@ -392,6 +395,7 @@ def sweep(
     """
     m, bench = plant_of(document, ratio, **changed)
     loop = loop_of(document)
+    assert loop.computing_s * bench.rate_hz < 1.0 + 1e-9
     rng = np.random.default_rng(seed)
     period = 1.0 / bench.rate_hz if bench.rate_hz else 0.0
     clock = np.array([rng.random() * period, *[0.0] * 6])

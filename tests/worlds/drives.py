@@ -73,7 +73,7 @@ LOOPS = {
         "amplifier": CURRENT,
         "electronics": {"k_a": 1.0},
         "sensor": ENCODER | {"delay_s": 5e-4, "counts": 65536.0},
-        "loop": SPEED | {"computing_s": 3e-4},
+        "loop": SPEED | {"computing_s": 5e-4},
     },
     "position": {
         "sampling": SAMPLED,
