@@ -1,7 +1,7 @@
 """Whether an observation looks like one of a hypothesis's own runs.
 
-Owns the tests behind "unexplained" (does it fit, does it predict levels that
-it was not fitted to, as own runs do) and the one behind "consistent": whether
+Owns the tests behind "unexplained" (does it fit, as own runs do, and leave no more structure) and
+the one behind "consistent": whether
 what a cause explains better is more than it would explain by chance where
 nothing is hidden. All take a hypothesis's own runs as if they had been
 observed. It ranks no hypotheses.
@@ -14,13 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.checking.cross_validation import HeldOut, hold_out_surface
-from analysis.checking.lack_of_fit import credited, judge_structure
-from analysis.checking.replicates import FEWEST_RUNS, MOST_RUNS, Replicate, replicates_of
+from analysis.checking.lack_of_fit import judge_structure
+from analysis.checking.replicates import FEWEST_RUNS, Replicate, replicates_of
 from analysis.emulation.fitted_model import FittedModel
 from analysis.execution.executor import side_by_side
 
-__all__ = ["Adequacy", "judge_adequacy", "judge_chance", "misses_alike"]
+__all__ = ["Adequacy", "judge_adequacy", "judge_chance"]
 
 _TRIES = 2
 
@@ -42,8 +41,7 @@ def judge_adequacy(candidate: FittedModel, rng: np.random.Generator) -> Adequacy
     """Compare the fit of the observation with the fits of runs of the same hypothesis.
 
     The runs are given reading noise; each is fitted by the half of the others that deviates
-    otherwise (`analysis.checking.replicates`). In both numbers the lowest level has a credit (see
-    `analysis.checking.lack_of_fit.credited`).
+    otherwise (`analysis.checking.replicates`).
     """
     fits = side_by_side(
         lambda run: run.alone.climb(run.place, tries=1), replicates_of(candidate, rng)
@@ -54,10 +52,6 @@ def judge_adequacy(candidate: FittedModel, rng: np.random.Generator) -> Adequacy
     surface, best = candidate.surface, candidate.best
     own = [fit.log_likelihood for fit in fits]
     sigma = _worse([best.log_likelihood, *own])
-    lowest, *others = surface.observation.levels
-    if others:
-        above = [np.sum(fit.density[:, lowest.stop :]) for fit in [best, *fits]]
-        sigma = credited(sigma, _worse(above))
     structure = judge_structure(best, fits, surface.observation, surface.sigmas)
     return Adequacy(sigma, structure)
 
@@ -88,19 +82,3 @@ def judge_chance(simpler: FittedModel, alleged: FittedModel, rng: np.random.Gene
     if len(gains) < FEWEST_RUNS:
         return 0.0
     return float(np.mean(np.array(gains) >= seen))
-
-
-def misses_alike(
-    candidate: FittedModel, held_out: HeldOut, share: float, rng: np.random.Generator
-) -> bool:
-    """Whether more than a share of a hypothesis's own runs miss levels not fitted by as much."""
-    observation = candidate.surface.observation
-    asked, alike = 0, 0
-    for run in replicates_of(candidate, rng):
-        asked += 1
-        missed = hold_out_surface(run.alone, run.place, observation).missed
-        alike += missed >= held_out.missed
-        # Each takes a second or so: no more are asked than decide.
-        if alike > share * MOST_RUNS:
-            return True
-    return alike > share * asked

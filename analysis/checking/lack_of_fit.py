@@ -17,13 +17,7 @@ from scipy.special import chdtrc, ndtri
 from analysis.emulation.emulator import Fit
 from analysis.observation.observation import Observation
 
-__all__ = ["credited", "judge_structure"]
-
-_CREDIT = 5.0
-"""Standard deviations that the lowest level is credited with, where there are others. At low drive
-a motion may leave its branch later than nearly all runs do, and every point after that is off: the
-true cable of a practice set left 3 to 6 and fitted up to 5 worse, at other levels 1 and 0. What
-false causes leave they leave at other levels, too; beyond this the lowest counts by itself."""
+__all__ = ["judge_structure"]
 
 _BANDS = 6
 """Into which the frequencies of a level of a sweep are parted."""
@@ -46,9 +40,9 @@ def judge_structure(
     0 where there are too few of them to tell.
 
     The sum over bands of the squared mean residual, gain and phase, each in units of what own
-    runs leave there, is compared with theirs, with a credit for the lowest level (see `credited`);
-    that is joined with the probability of the datasheet values (S. A. Stouffer et al., "The
-    American Soldier", 1949: the mean of two normal scores, times the root of two).
+    runs leave there, is compared with theirs. That is joined with the probability of the datasheet
+    values (S. A. Stouffer et al., "The American Soldier", 1949: the mean of two normal scores,
+    times the root of two).
 
     Parameters
     ----------
@@ -65,19 +59,11 @@ def judge_structure(
     fits, blocks = [seen, *own], observation.blocks
     by_block = np.stack([_structure(fits, block) for block in blocks], axis=1)
     left = _more_than_others(by_block.mean(axis=1))
-    above = [block.start >= observation.levels[0].stop for block in blocks]
-    if any(above):
-        left = credited(left, _more_than_others(by_block[:, above].mean(axis=1)))
     if not len(sigmas):
         return left
     off = np.sum((seen.deviations[: len(sigmas)] / sigmas) ** 2)
     unlikely = -float(ndtri(np.clip(chdtrc(len(sigmas), off), 1e-12, 1.0 - 1e-12)))
     return float((left + unlikely) / np.sqrt(2.0))
-
-
-def credited(everywhere: float, elsewhere: float) -> float:
-    """Standard deviations that count, of those at all levels and those without the lowest one."""
-    return min(everywhere, max(elsewhere, everywhere - _CREDIT))
 
 
 def _more_than_others(sums: NDArray[np.float64]) -> float:

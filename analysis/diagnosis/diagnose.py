@@ -178,10 +178,8 @@ def _diagnose(
         with record.stage("sharpen"):
             sharp = sharpened(verdict.best)
             held = compare_with_datasheet(verdict, sharp)
-            while held.best is not verdict.best and held.word != "unexplained":
-                # What is left of several causes, or none, is sized and asked the same.
-                verdict, sharp = held, sharpened(held.best)
-                held = compare_with_datasheet(verdict, sharp)
+            if held.best is not verdict.best:
+                sharp = sharpened(held.best)
             record.verdict = held
         with record.stage("criticise"):
             # Last, as what shares its probability is no reason to name what is the datasheet's.

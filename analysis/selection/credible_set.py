@@ -1,4 +1,4 @@
-"""How sure it is of what it names: whether enough is believed of that, and of few enough causes.
+"""How sure it is of what it names: whether enough is believed of that.
 
 Owns from which probability on something is named without a rival, and who the rivals are. It
 changes no probability and simulates nothing.
@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.checking.rejection import FEW
 from analysis.selection.verdict import Judged, Verdict
 
 __all__ = ["require_credible_set"]
@@ -26,19 +25,12 @@ def require_credible_set(verdict: Verdict) -> Verdict:
     """A verdict, or with what shares its probability as rivals, where it names something for sure.
 
     Those are the fewest that with the best set, and with sets that hold its causes and more and do
-    no better, hold nearly all that is believed, whether or not something speaks against them. More
-    than `FEW` causes, which can fit nearly anything and stood for what nobody knew before, have
-    their best part for a rival, or the plain model.
+    no better, hold nearly all that is believed, whether or not something speaks against them.
     """
     if verdict.word != "explained":
         return verdict
-    rivals = _best_part(verdict) if len(verdict.best.effects) > FEW else _who_shares(verdict)
+    rivals = _who_shares(verdict)
     return replace(verdict, word="ambiguous", rivals=rivals) if rivals else verdict
-
-
-def _best_part(verdict: Verdict) -> tuple[Judged, ...]:
-    whole = set(verdict.best.effects)
-    return tuple([one for one in verdict.judged if set(one.effects) < whole][:1])
 
 
 def _who_shares(verdict: Verdict) -> tuple[Judged, ...]:

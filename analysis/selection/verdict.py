@@ -211,7 +211,7 @@ def _ask(judged: Sequence[Judged], rng: np.random.Generator) -> tuple[Judged, ..
             asked.append(one)
             continue
         fitted = judge_adequacy(one.candidate, rng)
-        objection = find_rejection(one.candidate, one.held_out, fitted, rng)
+        objection = find_rejection(one.candidate, one.held_out, fitted)
         asked.append(
             replace(one, misfit=fitted.sigma, structure=fitted.structure, objection=objection)
         )

@@ -6,11 +6,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from worlds.judging import FITS, TRUE, WRONG
+from worlds.synthetic import ADSS, observation, read
 
 from analysis.checking import rejection as objection
 from analysis.checking.plausibility import is_pressed
+from analysis.ensemble.model import Hypothesis
 
-THREE = (*TRUE, *WRONG, "shaft-damping")
+
+def read_plain():
+    return read((), np.array([0.5]), np.random.default_rng(0))
 
 
 @pytest.mark.parametrize(
@@ -33,34 +37,26 @@ def test_size_at_range_end_is_rejected(monkeypatch, size, steep, pressed):
     held_out = SimpleNamespace(missed=1.0)
     for hidden, otherwise in ((False, ""), (True, "resonates outside the measured band")):
         monkeypatch.setattr(objection, "is_out_of_sight", lambda _, hidden=hidden: hidden)
-        against = objection.find_rejection(one, held_out, FITS, np.random.default_rng(0))
+        against = objection.find_rejection(one, held_out, FITS)
         assert against == ("needs a size outside its plausible range" if pressed else otherwise)
 
 
+@pytest.mark.parametrize("effects", [(), TRUE, TRUE + WRONG])
 @pytest.mark.parametrize(
-    ("effects", "missed", "share", "adequate"),
+    ("missed", "fitted", "against"),
     [
-        ((), 1.9, 0.04, True), ((), 1.9, 0.02, False), ((), 2.1, 1.0, False),
-        (TRUE, 1.4, 0.0, True), (TRUE, 1.6, 0.08, True), (TRUE, 1.6, 0.02, False),
-        (TRUE, 2.1, 1.0, False), (TRUE + WRONG, 0.9, 0.0, True),
-        (TRUE + WRONG, 1.1, 0.0, False), (TRUE + WRONG, 1.4, 0.02, True),
-        (TRUE + WRONG, 1.6, 1.0, False), (THREE, 0.9, 0.0, True), (THREE, 1.1, 1.0, False),
+        (1.4, FITS, ""),
+        (1.6, FITS, "does not predict held-out levels"),
+        (1.4, replace(FITS, sigma=3.9), ""),
+        (1.4, replace(FITS, sigma=4.1), "fits worse than replicates of this model"),
+        (1.4, replace(FITS, structure=2.4), ""),
+        (1.4, replace(FITS, structure=2.6), "leaves a residual pattern that replicates do not"),
     ],
-)  # fmt: skip
-def test_rejection_compares_misses_with_replicates(effects, missed, share, adequate, monkeypatch):
-    monkeypatch.setattr(objection, "is_out_of_sight", lambda _: False)
-    monkeypatch.setattr(objection, "misses_alike", lambda one, held, least, rng: share > least)
-    best = SimpleNamespace(place=np.full(1 + len(effects), 0.5))
-    hypothesis = SimpleNamespace(effects=effects, amid=[])
-    candidate = SimpleNamespace(hypothesis=hypothesis, best=best, surface=SimpleNamespace(fit=None))
-    rng = np.random.default_rng(0)
+)
+def test_poor_fit_or_prediction_is_rejected(effects, missed, fitted, against):
+    hypothesis = Hypothesis(ADSS, effects)
+    best = SimpleNamespace(place=np.full(hypothesis.d, 0.5), log_likelihood=0.0)
+    surface = SimpleNamespace(fit=lambda place: best, observation=observation(read_plain()))
+    candidate = SimpleNamespace(hypothesis=hypothesis, best=best, surface=surface)
     held_out = SimpleNamespace(missed=missed)
-    against = "" if adequate else "does not predict held-out levels"
-    assert objection.find_rejection(candidate, held_out, FITS, rng) == against
-    limit = 2.0 if effects == THREE else 4.0
-    alike = objection.find_rejection(candidate, held_out, replace(FITS, sigma=limit - 0.1), rng)
-    assert alike == against
-    unlike = objection.find_rejection(candidate, held_out, replace(FITS, sigma=limit + 0.1), rng)
-    assert unlike == "fits worse than replicates of this model"
-    shaped = objection.find_rejection(candidate, held_out, replace(FITS, structure=2.6), rng)
-    assert shaped == "leaves a residual pattern that replicates do not"
+    assert objection.find_rejection(candidate, held_out, fitted) == against

@@ -121,25 +121,6 @@ def test_cause_at_datasheet_value_is_not_named(monkeypatch, explained):
     assert "load-inertia" in line
 
 
-def test_remaining_causes_are_sized_and_tested_alike(monkeypatch):
-    """A part that is named in place of the whole is told by runs of its own."""
-    braked, load, asked = ("load-inertia", "load-viscous-damping"), ("load-inertia",), []
-
-    def held(verdict, found):
-        asked.append((verdict.best.effects, len(found.mean)))
-        if verdict.best.effects == load:
-            return verdict
-        part = next(one for one in verdict.judged if one.effects == load)
-        return replace(verdict, word="ambiguous", best=part, rivals=(verdict.best,))
-
-    monkeypatch.setattr(makings.diagnosis_module, "compare_with_datasheet", held)
-    found = makings.diagnosis(monkeypatch, braked, [braked, load])
-    assert asked == [(braked, 3), (load, 2)]
-    document = found.to_json()
-    assert [cause["effect"] for cause in document["causes"]] == [*load]
-    assert [*braked] in [rival["causes"] for rival in document["rivals"]]
-
-
 @pytest.mark.parametrize(("asked", "word"), [(0.0, "explained"), (2.0, "ambiguous")])
 def test_set_sharing_the_probability_is_rival(monkeypatch, asked, word):
     monkeypatch.setattr(certainty, "_SURE", asked)

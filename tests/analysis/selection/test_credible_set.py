@@ -87,13 +87,3 @@ def test_equivalent_set_adds_to_best_probability(alike):
 def test_only_explained_verdict_needs_credible_set(word):
     verdict = told(standing((LOAD,), 0.5), standing((SHAFT,), 0.5), word=word)
     assert require_credible_set(verdict) is verdict
-
-
-def test_three_causes_have_their_best_part_beside():
-    """Three of the chain, of friction and of play made up for a tachometer's gain, with 1.00."""
-    three, part = (BRAKE, LOAD, SHAFT), standing((BRAKE, SHAFT), 1e-9, "leaves structure")
-    verdict = told(standing(three, 1.0), part, standing((BRAKE,), 1e-12))
-    held = require_credible_set(verdict)
-    assert (held.word, rivals(held)) == ("ambiguous", [(BRAKE, SHAFT)])
-    # Where no part was looked at it is the plain model.
-    assert rivals(require_credible_set(told(standing(three, 1.0)))) == [()]
