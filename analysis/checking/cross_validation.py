@@ -15,13 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.emulation.emulator import Emulator, Fit
+from analysis.emulation.emulator import Fit
 from analysis.emulation.fitted_model import FittedModel
 from analysis.execution.executor import side_by_side
 from analysis.observation.observation import Observation
 from daq.frf import DB_PER_NEPER
 
-__all__ = ["HeldOut", "hold_out", "hold_out_surface"]
+__all__ = ["HeldOut", "hold_out"]
 
 _JUMPS = 0.01
 """Share of readings that no branch of the motion makes: where it goes over from one to another the
@@ -82,14 +82,8 @@ class HeldOut:
 
 
 def hold_out(candidate: FittedModel, observation: Observation) -> HeldOut:
-    """Predict every fold from the others."""
-    return hold_out_surface(candidate.surface, candidate.best.place, observation)
-
-
-def hold_out_surface(
-    surface: Emulator, start: NDArray[np.float64], observation: Observation
-) -> HeldOut:
-    """Predict every fold from the others, by fits on the way up from a place (d,)."""
+    """Predict every fold from the others, by fits on the way up from the best place."""
+    surface, start = candidate.surface, candidate.best.place
     shape = (3, len(observation))
     residual, std = np.full(shape, np.nan), np.full(shape, np.nan)
     score = 0.0

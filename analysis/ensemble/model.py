@@ -71,11 +71,6 @@ class Hypothesis:
         low, high = self.logs[:, 0], self.logs[:, 1]
         return np.concatenate([[ratio], (np.log(np.asarray(values)) - low) / (high - low)])
 
-    def part(self, effects: tuple[str, ...], place: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Coordinates at a place (d,) of the hypothesis that holds some of the effects alone."""
-        kept = [effect in effects for effect, _ in self.parameters]
-        return np.asarray(place)[[True, *kept]]
-
     def settings(self, place: NDArray[np.float64]) -> tuple[EffectSetting, ...]:
         """The effects with their values at a place (d,)."""
         found: dict[str, dict[str, float]] = {effect: {} for effect in self.effects}
@@ -142,11 +137,6 @@ class Hypothesis:
         within = zip(self.parameters, wide, self.within_tolerance(place), strict=True)
         beyond = {effect for (effect, _), one, near in within if not (one and near)}
         return tuple(effect for effect in self.effects if effect in beyond)
-
-    @property
-    def rare(self) -> int:
-        """How many of its effects nobody would suspect first."""
-        return sum(CATALOGUE[effect].rare for effect in self.effects)
 
     @property
     def sites(self) -> tuple[str, ...]:

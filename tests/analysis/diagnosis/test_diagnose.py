@@ -141,7 +141,7 @@ def judge_practice(number, response, cache, folder):
     found = diagnose_response(response, unit, cache=cache)
     document = json.loads(json.dumps(found.to_json(), allow_nan=False))
     rivals = found.verdict.rivals
-    assert all(one.candidate.hypothesis.rare for one in rivals)
+    assert all(any(CATALOGUE[effect].rare for effect in one.effects) for one in rivals)
     likely = "ambiguous" if rivals else "explained"
     assert document["verdict"] == (likely if truth["effects"] else "consistent")
     named = {cause["effect"]: cause["parameters"] for cause in document["causes"]}
