@@ -171,7 +171,7 @@ def periodic_response(record: TimeRecord, period: int, lines: float = 1e-3) -> P
     Raises
     ------
     AnalysisError
-        If fewer than three periods are left.
+        If fewer than three periods are left, or all of the input lies at half the sampling rate.
     """
     # Whole periods, the last ones: what comes before them settles.
     count = len(record) // period
@@ -190,6 +190,11 @@ def periodic_response(record: TimeRecord, period: int, lines: float = 1e-3) -> P
     keep = size > lines * size[1:].max()
     keep[0] = False
     keep[-1] = keep[-1] and period % 2 == 1
+    if not keep.any():
+        raise AnalysisError(
+            f"the input lies at half the sampling rate, {record.rate_hz / 2.0:g} Hz, where samples "
+            "tell no phase; sample it faster"
+        )
     x, y, size = x[:, keep], y[:, keep], size[keep]
     frequency = np.flatnonzero(keep) * record.rate_hz / period
     gain = y.mean(axis=0) / x.mean(axis=0)
