@@ -69,7 +69,9 @@ def smooth_parts(system: LinearParts) -> tuple[Real, Real, Real]:
     return A, b, o
 
 
-def parts_at(system: LinearParts, s: NDArray[Any]) -> tuple[Real, Real, Real, Complex]:
+def parts_at(
+    system: LinearParts, s: NDArray[Any]
+) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], Complex]:
     """Matrix, input and output row at s, and a factor (F,) on the response; no images.
 
     Shapes (n, n), (n,) and (n,). Of a closed loop with a clock they differ from frequency to
@@ -149,7 +151,7 @@ def poles(system: LinearParts) -> Complex:
             whole[:n, place] = -gain * push
             whole[place, :n] = law.outlet
     z = _eigenvalues(whole)
-    return np.asarray(np.log(np.where(z == 0.0, 1e-300, z)) / period)
+    return np.asarray(np.log(np.where(z == 0.0, 1e-300, z)) / period, dtype=complex)
 
 
 def _closed_response(system: LinearParts, s: NDArray[Any]) -> Complex:
