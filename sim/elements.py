@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from sim.drive.controller import Controller, Feed
+from sim.drive.controller import Controller, Feed, add_late
 from sim.drive.sensors import add_filter, read_late
 from sim.engine.system import Assembly, Law
 
@@ -296,11 +296,4 @@ class Tachometer:
         if self.delay_s > 0.0:
             read_late(assembly, self.delay_s)
         if self.T_d > 0.0:
-            # exp(-s T) = 1 - s T / (1 + s T/2 + (s T)^2/12); what is taken off is T times the rate.
-            assembly.add_signal("V_T")
-            assembly.add_signal("V_T'")
-            assembly.add_coupling("V_T", "V_T'", 1.0)
-            assembly.add_coupling("V_T'", "V_o", 12.0 / self.T_d**2)
-            assembly.add_coupling("V_T'", "V_T", -12.0 / self.T_d**2)
-            assembly.add_coupling("V_T'", "V_T'", -6.0 / self.T_d)
-            assembly.output["V_T'"] = -self.T_d
+            assembly.output |= add_late(assembly, Feed({"V_o": 1.0}), self.T_d, "V_T")

@@ -178,7 +178,7 @@ def _diagnose(
         with record.stage("sharpen"):
             sharp = sharpened(verdict.best)
             held = compare_with_datasheet(verdict, sharp)
-            if held.best is not verdict.best:
+            if held.best is not verdict.best and held.word != "unexplained":
                 sharp = sharpened(held.best)
             record.verdict = held
         with record.stage("criticise"):

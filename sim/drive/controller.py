@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 
 from sim.engine.system import Assembly, Law
 
-__all__ = ["Controller", "Feed"]
+__all__ = ["Controller", "Feed", "add_late"]
 
 
 @dataclass(slots=True)
@@ -48,6 +48,21 @@ class Feed:
             assembly.let_act(law, signal, gain * share)
 
 
+def add_late(assembly: Assembly, source: Feed, delay_s: float, signal: str) -> dict[str, float]:
+    """Pade's approximation of second order of a delay, with two signals; what to add to a source.
+
+    exp(-s T) = 1 - s T / (1 + s T/2 + (s T)^2/12); what is taken off is T times the rate.
+    """
+    rate = f"{signal}'"
+    assembly.add_signal(signal)
+    assembly.add_signal(rate)
+    assembly.add_coupling(signal, rate, 1.0)
+    source.into(assembly, rate, 12.0 / delay_s**2)
+    assembly.add_coupling(rate, signal, -12.0 / delay_s**2)
+    assembly.add_coupling(rate, rate, -6.0 / delay_s)
+    return {rate: -delay_s}
+
+
 @dataclass(frozen=True, slots=True)
 class Controller:
     """A controller with gains K_p, T_i_s, K_v (see `sim.drive.sections.Loop`).
@@ -74,7 +89,7 @@ class Controller:
         source = 1.0 if self.is_reference else 0.0
         found = self._sampled(assembly, source) if self.rate_hz else self._smooth(assembly, source)
         if self.computing_s:
-            found = self._late(assembly, found)
+            found.states |= add_late(assembly, found, self.computing_s, "V_D")
         if not self.is_reference:
             if self.rate_hz:
                 found.laws["command"] = found.laws.get("command", 0.0) + 1.0
@@ -117,14 +132,3 @@ class Controller:
         else:
             found.states["V_I"] = self.K_p / self.T_i_s
         return found
-
-    def _late(self, assembly: Assembly, command: Feed) -> Feed:
-        """The same later, by Pade's approximation of second order, as in `sim.elements`."""
-        assembly.add_signal("V_D")
-        assembly.add_signal("V_D'")
-        assembly.add_coupling("V_D", "V_D'", 1.0)
-        command.into(assembly, "V_D'", 12.0 / self.computing_s**2)
-        assembly.add_coupling("V_D'", "V_D", -12.0 / self.computing_s**2)
-        assembly.add_coupling("V_D'", "V_D'", -6.0 / self.computing_s)
-        command.states["V_D'"] = -self.computing_s
-        return command

@@ -22,7 +22,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from studies.drives import drawn_values, interval, measured, of_plant
+from studies.drives import drawn_values, interval, measured, of_plant, put_down
 
 from analysis.commissioning import commission_drive, commissioned_unit_text
 from analysis.commissioning.commission import DETERMINED
@@ -187,14 +187,9 @@ def main():
     elif told.every:
         every(told.every, told.drives)
     else:
-        if told.judge:
-            line = json.dumps(judged(lines_of(told.out)[0][told.one]))
-        else:
-            line = json.dumps(commissioned(told.one))
-        print(line)  # noqa: T201
-        if told.out:
-            with told.out.open("a", encoding="utf-8") as file:
-                file.write(line + "\n")
+        judge = told.judge
+        one = judged(lines_of(told.out)[0][told.one]) if judge else commissioned(told.one)
+        put_down(one, told.out)
 
 
 if __name__ == "__main__":

@@ -206,6 +206,15 @@ def table(path):
     return [f"{what}: {interval(sum(hits), len(hits))}" for what, hits in counted.items()]
 
 
+def put_down(one, path):
+    """Print a record, and add it to a file, if one is given."""
+    line = json.dumps(one)
+    print(line)  # noqa: T201
+    if path:
+        with path.open("a", encoding="utf-8") as file:
+            file.write(line + "\n")
+
+
 def main():
     """Measure, estimate, diagnose, and say what came of it."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -229,11 +238,7 @@ def main():
     one = answered(
         told.unit, told.cause, told.ratio, told.points, told.seed, told.tolerance, told.drawn
     )
-    line = json.dumps(one)
-    print(line)  # noqa: T201
-    if told.out:
-        with told.out.open("a", encoding="utf-8") as file:
-            file.write(line + "\n")
+    put_down(one, told.out)
 
 
 if __name__ == "__main__":
