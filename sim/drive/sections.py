@@ -7,7 +7,7 @@ equations: `sim.drivetrain` does.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import (
     BaseModel,
@@ -25,7 +25,10 @@ __all__ = [
     "LoadCoupling",
     "Loop",
     "MotorCoupling",
+    "NonNegative",
+    "Positive",
     "Sampling",
+    "Section",
     "Sensor",
     "find_contradiction",
 ]
@@ -45,11 +48,19 @@ OPTIONAL_SECTIONS = (
 """Sections of a unit that are not there where a drive is like the paper's."""
 
 
-class _Section(BaseModel):
+class Section(BaseModel):
+    """A section of a unit file: no key but its own, no value of another type."""
+
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+    LATER: ClassVar[tuple[str, ...]] = ()
+    """Keys that are no part of a unit's physics where they are not given: older units lack them."""
+
+    @model_serializer(mode="wrap")
+    def _without_later_keys(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return {k: v for k, v in handler(self).items() if v is not None or k not in self.LATER}
 
 
-class Damping(_Section):
+class Damping(Section):
     """Damping that the datasheet knows of; the paper's units have none between motor and load."""
 
     B_L: Positive | None = None
@@ -62,7 +73,7 @@ class Damping(_Section):
     """Damping of mesh 2 while its teeth touch, N.m.s/rad."""
 
 
-class CurrentAmplifier(_Section):
+class CurrentAmplifier(Section):
     """An amplifier that controls the current; without it the amplifier controls the voltage.
 
     ``electronics.k_a`` is then in A per V. The back-EMF, the resistance and the inductance of the
@@ -76,7 +87,7 @@ class CurrentAmplifier(_Section):
     """Largest current, A; none where it is left out."""
 
 
-class Sampling(_Section):
+class Sampling(Section):
     """A clock that the command, the sensor or both are sampled by."""
 
     rate_hz: Annotated[float, Field(gt=0, le=1e5)]
@@ -91,12 +102,12 @@ _READS = {"accelerometer": "acceleration", "current": "current"}
 _GAIN_UNITS = {"position": "V/rad", "acceleration": "V.s^2/rad", "current": "V/A"}
 
 _ANALOGUE = ("low_pass_hz", "high_pass_hz")
-_LATER = ("radius_m", *_ANALOGUE)
-"""Keys that are no part of a unit's physics where they are not given: older units lack them."""
 
 
-class Sensor(_Section):
+class Sensor(Section):
     """What the bench reads; without it a tachometer on the motor, read continuously."""
+
+    LATER = ("radius_m", *_ANALOGUE)
 
     kind: Literal["tachometer", "encoder", "accelerometer", "current"]
     at: Literal["motor", "load"] = "motor"
@@ -158,10 +169,6 @@ class Sensor(_Section):
             raise ValueError(f"sensor.high_pass_hz {low:g} is not below low_pass_hz {high:g}")
         return self
 
-    @model_serializer(mode="wrap")
-    def _without_later_keys(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return {k: v for k, v in handler(self).items() if v is not None or k not in _LATER}
-
     @property
     def is_sampled(self) -> bool:
         """Whether it is sampled by the clock."""
@@ -175,7 +182,7 @@ class Sensor(_Section):
         return _GAIN_UNITS.get(self.reads, "V.s/rad")
 
 
-class MotorCoupling(_Section):
+class MotorCoupling(Section):
     """An elastic coupling between motor and pinion 1; J_m is then that of the motor side."""
 
     k_cm: Positive
@@ -186,7 +193,7 @@ class MotorCoupling(_Section):
     """Inertia of pinion 1 with its half of the coupling, kg.m^2."""
 
 
-class LoadCoupling(_Section):
+class LoadCoupling(Section):
     """An elastic coupling between the last gear (or shaft 1 of one stage) and the load."""
 
     k_cL: Positive
@@ -197,7 +204,7 @@ class LoadCoupling(_Section):
     """Inertia of the last gear with its half of the coupling, kg.m^2."""
 
 
-class Loop(_Section):
+class Loop(Section):
     """A controller that is closed around the drive while it is measured.
 
     It acts on the volts that `Sensor` gives before a filter. With a command that a clock holds it

@@ -5,33 +5,21 @@ Owns their names, units and bounds. It builds no equations: `sim.drivetrain` doe
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    SerializerFunctionWrapHandler,
-    model_serializer,
-)
+from pydantic import Field
+
+from sim.drive.sections import Positive, Section
 
 __all__ = ["Stage1", "Stage2"]
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Efficiency = Annotated[float, Field(ge=0.2, le=1.0)]
 
 
-class _Stage(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
-
-    @model_serializer(mode="wrap")
-    def _without_later_keys(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        # They are no part of a unit's physics where they are not given: older units lack them.
-        return {k: v for k, v in handler(self).items() if v is not None or not k.startswith("eta")}
-
-
-class Stage1(_Stage):
+class Stage1(Section):
     """First gear stage and shaft 1, equations (5) to (10)."""
+
+    LATER = ("eta_1",)
 
     N_1: Positive
     """Gear ratio."""
@@ -49,8 +37,10 @@ class Stage1(_Stage):
     """Efficiency while the motor drives; 1 where it is left out."""
 
 
-class Stage2(_Stage):
+class Stage2(Section):
     """Second gear stage, equations (10) to (13)."""
+
+    LATER = ("eta_2",)
 
     N: Positive
     """Revolution ratio seen by pinion 2: N_2 + 1 where gear 2 is fixed, else N_2."""

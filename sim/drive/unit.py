@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
+from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
 from daq.errors import ConfigurationError
 from sim.acceptance import Acceptance
@@ -23,7 +23,10 @@ from sim.drive.sections import (
     LoadCoupling,
     Loop,
     MotorCoupling,
+    NonNegative,
+    Positive,
     Sampling,
+    Section,
     Sensor,
     find_contradiction,
 )
@@ -33,9 +36,6 @@ from sim.tolerance import Share, believed_shares, find_fault
 
 __all__ = ["StageBacklash", "Unit", "stage_backlash", "unit_from_mapping"]
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-
 NO_PHYSICS = {
     "schema_", "schema", "name", "limits", "acceptance", "tolerance", "commissioning",
     "own_effects",
@@ -43,11 +43,7 @@ NO_PHYSICS = {
 """Sections of a unit that do not decide how it moves."""
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
-
-
-class Motor(_Section):
+class Motor(Section):
     """Armature circuit and rotor, equations (2) and (5)."""
 
     L_a: Positive | None = None
@@ -66,7 +62,7 @@ class Motor(_Section):
     """Dry friction of the rotor, N.m."""
 
 
-class Electronics(_Section):
+class Electronics(Section):
     """Amplifier, tachometer and filter, equations (1), (3) and (4)."""
 
     k_a: Positive
@@ -79,7 +75,7 @@ class Electronics(_Section):
     """Coefficients of s^2, s and 1 in the denominator of G_f."""
 
 
-class Load(_Section):
+class Load(Section):
     """The load, equation (14)."""
 
     J_L: Positive
@@ -88,14 +84,14 @@ class Load(_Section):
     """Dry friction, N.m."""
 
 
-class Backlash(_Section):
+class Backlash(Section):
     """Play of the whole gear train."""
 
     b_t_deg: NonNegative
     """Total backlash seen at the output, full angular play, degrees."""
 
 
-class Limits(_Section):
+class Limits(Section):
     """What this unit may be driven with; a bench may tighten it."""
 
     source_vpk: Positive
@@ -108,7 +104,7 @@ class Limits(_Section):
     """Most backlash of stage 2 that is acceptable, degrees."""
 
 
-class Unit(_Section):
+class Unit(Section):
     """A geared servo under test. Symbols are the paper's; SI units, degrees for backlash."""
 
     # Not Literal[1]: true equals 1 there.
