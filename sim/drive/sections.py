@@ -56,7 +56,7 @@ class Section(BaseModel):
     """Keys that are no part of a unit's physics where they are not given: older units lack them."""
 
     @model_serializer(mode="wrap")
-    def _without_later_keys(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+    def _without_later_keys(self, handler: SerializerFunctionWrapHandler) -> dict[str, object]:
         return {k: v for k, v in handler(self).items() if v is not None or k not in self.LATER}
 
 
