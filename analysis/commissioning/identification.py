@@ -116,10 +116,10 @@ def simulate_drives(
     gain = np.prod(coordinates.factors(np.where(only, z, 0.0))[:, only], axis=1)
     noise = observation.noise
     # What an analyser adds to each reading is drawn: it is part of what the regression leaves. So
-    # is what it makes of that in the scatter, which few cycles tell roughly.
+    # is what few cycles tell of the scatter, and of it one component alone.
     disturbed = mean * (gain[:, None] + noise * _complex_normal(rng, mean.shape))
-    told = noise * np.exp(observation.scatter_sampling * rng.standard_normal(mean.shape))
-    y = channels_of_readings(disturbed, variance, told, observation.floor)
+    told = np.exp(observation.scatter_sampling * rng.standard_normal(mean.shape))
+    y = channels_of_readings(disturbed, variance * told**2, noise * told, observation.floor)
     angles = np.repeat([name == "phase" for name in CHANNELS], y.shape[-1])
     return Round(z, np.repeat(np.arange(families), _LANES), y.reshape(len(z), -1), angles)
 
