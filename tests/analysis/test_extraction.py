@@ -93,7 +93,7 @@ def test_coarse_log_grid_keeps_deep_valley():
     "name",
     [
         pytest.param("low-pass at 1.1 RF, zeta 1", marks=pytest.mark.long),
-        "low-pass at RF, zeta 0.7",
+        pytest.param("low-pass at RF, zeta 0.7", marks=pytest.mark.long),
         pytest.param("zeta 0.3 / 0.3", marks=pytest.mark.long),
         pytest.param("mode above the band", marks=pytest.mark.long),
         "constant noise above the valley's depth",

@@ -157,7 +157,7 @@ def same_features(left, right, hz=1.0, gain_db=0.0):
 def test_noise_widens_the_bars_of_any_pair():
     ratios = []
     f = np.linspace(20, 110, 181)
-    for seed in range(30):
+    for seed in range(18):
         rng = np.random.default_rng(seed)
         zero, pole = rng.uniform(30, 60), rng.uniform(65, 100)
         zetas = rng.uniform(0.01, 0.2, 2)
@@ -172,7 +172,7 @@ def test_noise_widens_the_bars_of_any_pair():
         for a, b in ((quiet.arf, loud.arf), (quiet.rf, loud.rf)):
             if a is not None and b is not None:
                 ratios.append(b.std_hz / a.std_hz)
-    assert len(ratios) > 50
+    assert len(ratios) > 30
     assert 5 < np.median(ratios) < 7
     assert np.mean(np.array(ratios) > 2) > 0.95
 

@@ -95,6 +95,7 @@ def test_engine_reproduces_the_shipped_runs(name):
     assert p > 1e-4, f"seed {seed}: simulate them anew, python tests/usual_runs.py"
 
 
+@pytest.mark.parametrize("name", ["adss", pytest.param("edss", marks=pytest.mark.long)])
 def test_changed_engine_would_differ_from_shipped_runs(name):
     seed, p = again(name, J_L=1.05)
     assert p <= 1e-3, f"seed {seed}"

@@ -7,6 +7,7 @@ cannot bend towards (its `blind` coordinates) is what tells it from another.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -31,13 +32,16 @@ SIGMAS = SPREAD.sigmas
 SCATTER = np.array([0.02, 0.02, 0.2])[:, None]
 
 
+@cache
 def shape(seed: int) -> np.ndarray:
-    """A smooth curve over the rows for each channel (3, rows)."""
+    """A smooth curve over the rows for each channel (3, rows); each is asked for again and again."""
     rng = np.random.default_rng(seed)
     x = np.tile(np.linspace(0.0, 1.0, len(FREQUENCIES)), len(LEVELS))
     level = np.repeat([0.7, 1.3], len(FREQUENCIES))
     waves = [np.sin(2 * np.pi * (k * x + rng.uniform())) * rng.normal() for k in (0.5, 1.0, 1.5)]
-    return np.stack([sum(waves) * rng.uniform(0.5, 1.0) * level for _ in range(3)])
+    curves = np.stack([sum(waves) * rng.uniform(0.5, 1.0) * level for _ in range(3)])
+    curves.flags.writeable = False
+    return curves
 
 
 BASE, RATIO_SLOPE = shape(1), shape(2)

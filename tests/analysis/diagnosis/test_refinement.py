@@ -121,7 +121,7 @@ def test_refinement_keeps_its_simulation_budget(share, rounds):
     assert len(looking.world.rounds) == rounds
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.long) for n in (1, 2, 3))])
 def test_more_runs_do_not_worsen_the_answer(seed):
     looking = Looking(scatter=1.0, seed=seed)
     before, after = looking.before(), looking.after()

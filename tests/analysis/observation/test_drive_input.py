@@ -19,6 +19,9 @@ UNITS = {name: drives.unit(sections) for name, sections in drives.DRIVES.items()
     name: load_unit(name) for name in config_names("units")
 }
 
+SEVERAL = ("irb", "r3-2", "r3-3", "srv02-torsion", "walkman-2300")
+"""Drives of the same form as others here."""
+
 
 def swept(unit, band=(0.6, 1.4)):
     modes = natural_frequencies(unit)
@@ -32,7 +35,10 @@ def swept(unit, band=(0.6, 1.4)):
     return simulate(unit, 1.0 if unit.stages == 1 else 0.4, plan, seed=3)
 
 
-@pytest.mark.parametrize("name", UNITS)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(one, marks=pytest.mark.long) if one in SEVERAL else one for one in UNITS],
+)
 def test_a_true_response_is_taken(name):
     found = check_input(swept(UNITS[name]), UNITS[name])
     assert found.mistake is None, found.words

@@ -9,7 +9,7 @@ from worlds.linear_truths import NOTED, TWO_PERCENT, Truth, pair
 from analysis.resonance import extract
 from daq.frf import DB_PER_NEPER, FrequencyResponse
 
-DRAWS = 60
+DRAWS = 40
 
 
 def readings(truth, noise, draws=DRAWS, **how):
@@ -88,7 +88,7 @@ def test_twice_the_noise_power_stays_within_bounds():
 
 def test_gain_alone_is_read_with_wider_bars():
     off, std = readings(NOTED, TWO_PERCENT, phase=False)
-    _, std_with_phase = readings(NOTED, TWO_PERCENT, draws=20)
+    _, std_with_phase = readings(NOTED, TWO_PERCENT, draws=10)
     covered = np.mean(np.abs(off) < 1.96 * std, axis=0)
     assert np.all(covered >= 0.85), covered
     assert np.mean(covered) < 0.99
@@ -147,7 +147,7 @@ def cramer_rao(truth, noise):
 def test_errors_approach_the_cramer_rao_bound(truth):
     off, std = readings(truth, TWO_PERCENT)
     least = cramer_rao(truth, TWO_PERCENT)
-    # 60 draws know a standard deviation to 9 %.
+    # 40 draws know a standard deviation to 11 %.
     assert np.all(rms(off)[:2] < 1.3 * least), (rms(off)[:2], least)
     assert np.all(rms(off)[:2] > 0.75 * least), (rms(off)[:2], least)
     covered = np.mean(np.abs(off) < 1.96 * std, axis=0)
@@ -156,7 +156,7 @@ def test_errors_approach_the_cramer_rao_bound(truth):
 
 
 def test_bars_grow_with_noise():
-    widths = [rms(readings(NOTED, noise, draws=8)[1])[0] for noise in (0.005, 0.02, 0.05)]
+    widths = [rms(readings(NOTED, noise, draws=4)[1])[0] for noise in (0.005, 0.02, 0.05)]
     assert widths[1] / widths[0] == pytest.approx(4, rel=0.1)
     assert widths[2] / widths[1] == pytest.approx(2.5, rel=0.1)
 

@@ -12,7 +12,12 @@ from analysis.selection.credible_set import require_credible_set as named
 from analysis.selection.verdict import BY_CHANCE, judge_candidates
 
 
-@pytest.mark.parametrize("seed", range(5))
+def daily(few, every):
+    """Seeds, of which `make long` takes all."""
+    return [*range(few), *(pytest.param(n, marks=pytest.mark.long) for n in range(few, every))]
+
+
+@pytest.mark.parametrize("seed", daily(3, 5))
 def test_present_cause_is_named(seed):
     verdict = judge(seen(TRUE, seed), seed=10 * seed)
     assert (verdict.word, verdict.best.effects) == ("explained", TRUE)
@@ -41,14 +46,14 @@ def test_parts_of_leader_are_always_judged():
     assert unasked == [("cable-stiffness",)]
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", daily(4, 10))
 def test_plain_response_names_no_cause(seed):
     verdict = judge(seen((), seed, size=0.0), seed=10 * seed)
     assert verdict.word == "consistent"
     assert verdict.best is verdict.baseline
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", daily(2, 5))
 def test_imitation_of_plain_branch_is_not_named(seed, monkeypatch):
     from worlds import synthetic
 
@@ -93,7 +98,7 @@ def test_refused_plain_model_excuses_no_cause(monkeypatch):
     assert (verdict.word, verdict.best.effects) == ("explained", TRUE)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", daily(2, 5))
 def test_unknown_cause_is_not_replaced_by_another(seed):
     values = read((), np.array([0.5]), np.random.default_rng(seed)) + 0.3 * shape(77)
     verdict = judge(observation(values), seed=10 * seed)
@@ -119,7 +124,7 @@ def test_two_equivalent_causes_are_both_named(monkeypatch):
     plain = synthetic.effect_slope
     same = {WRONG: plain(TRUE) + 0.002}
     monkeypatch.setattr(synthetic, "effect_slope", lambda e: same.get(e, plain(e)))
-    verdicts = [named(judge(seen(TRUE, seed), ((), TRUE, WRONG), seed)) for seed in range(6)]
+    verdicts = [named(judge(seen(TRUE, seed), ((), TRUE, WRONG), seed)) for seed in range(3)]
     for verdict in verdicts:
         assert {one.effects for one in verdict.judged[:2]} == {TRUE, WRONG}
     assert all(verdict.word == "ambiguous" for verdict in verdicts)
@@ -140,7 +145,7 @@ def test_rare_equivalent_set_is_rival(monkeypatch, chance):
     assert [one.effects for one in verdict.rivals] == [rare]
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", daily(2, 4))
 def test_second_cause_needs_a_gain(seed):
     """The pair does all that the single cause does; the network holds it for less likely."""
     pair = tuple(sorted((*TRUE, *WRONG)))
