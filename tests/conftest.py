@@ -16,6 +16,8 @@ from hypothesis import settings
 
 # Before anything loads numpy; what a test starts inherits it.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# A screen that scrolls smoothly is drawn ten times, and waited for.
+os.environ.setdefault("TEXTUAL_ANIMATIONS", "none")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 gc.disable()  # until all tests are collected

@@ -16,6 +16,8 @@ QUIET = {"c_s1": 0.02, "c_g1": 0.8, "c_2": 2.0}
 
 BASE = ["shaft-damping:c_s1=0.02", "mesh1-damping:c_g1=0.8", "mesh2-damping:c_2=2"]
 UNIT, RATIO, LEVEL, FREQUENCY_HZ = ADSS.with_parameters(b_t_deg=0.02), 0.25, 2.5, 125.0
+SETTLED = 80
+"""Cycles after which the motion repeats itself."""
 
 CASES = {
     "load-viscous-damping:B_L=0.2": {"B_L": 0.2},
@@ -64,17 +66,17 @@ def oracle_with(extras):
     unit = UNIT.with_parameters(**{k: v for k, v in changed.items() if k != "filter_numerator"})
     added = {k: v for k, v in extras.items() if k not in changed or k == "filter_numerator"}
     kept, _ = rk4.simulate_cycles(
-        unit.parameters, *half_plays(unit, RATIO), LEVEL, FREQUENCY_HZ, 155, 1e-6, None,
+        unit.parameters, *half_plays(unit, RATIO), LEVEL, FREQUENCY_HZ, SETTLED + 5, 1e-6, None,
         QUIET | added,
     )  # fmt: skip
-    return kept[150:]
+    return kept[SETTLED:]
 
 
 def engine_with(*texts):
     ids = {identifier(text) for text in texts}
     base = [text for text in BASE if identifier(text) not in ids]
     effects = [parse_effect(text) for text in (*base, *texts)]
-    return engine_gain(UNIT, RATIO, FREQUENCY_HZ, LEVEL, 150, 5, effects)
+    return engine_gain(UNIT, RATIO, FREQUENCY_HZ, LEVEL, SETTLED, 5, effects)
 
 
 @pytest.fixture(scope="module")

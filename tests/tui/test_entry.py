@@ -65,8 +65,10 @@ def beside(folder, *names):
         (folder / f"{name}.py").write_text(f"open({str(folder / 'ran')!r}, 'a').write({name!r})\n")
 
 
-@pytest.mark.parametrize("command", [CONSOLE, MODULE])
-@pytest.mark.parametrize("added", [None, ".", ":/nowhere", "{cwd}"])
+@pytest.mark.parametrize(
+    ("command", "added"),
+    [(CONSOLE, None), (MODULE, None), (CONSOLE, "."), (CONSOLE, ":/nowhere"), (MODULE, "{cwd}")],
+)
 def test_working_directory_module_is_not_run(tmp_path, command, added):
     beside(tmp_path, *NAMES)
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}

@@ -32,6 +32,11 @@ SILENT_S = 60.0
 """More than any session is silent before it is taken over, on a busy machine, too."""
 
 EVERY_WIRE = [(driver.scheme, wire) for driver in DRIVERS for wire in wires_of(driver.scheme)]
+ONCE = [
+    pair for n, pair in enumerate(EVERY_WIRE)
+    if pair[1] not in [wire for _, wire in EVERY_WIRE[:n]]
+    or pair[0] not in [driver for driver, _ in EVERY_WIRE[:n]]
+]  # fmt: skip
 needs_holding = pytest.mark.skipif(not can_be_held(), reason="needs seccomp on Linux")
 
 
@@ -383,7 +388,11 @@ def measured(tmp_path_factory):
     return db
 
 
-@pytest.mark.parametrize(("driver", "wire"), EVERY_WIRE)
+@pytest.mark.parametrize(
+    ("driver", "wire"),
+    # Each driver and each wire once; `make long` takes all combinations.
+    [pair if pair in ONCE else pytest.param(*pair, marks=pytest.mark.long) for pair in EVERY_WIRE],
+)
 def test_watchdog_loads_no_module_when_needed(measured, db, driver, wire):
     shutil.copy(measured, db)
     with served(simulated(driver, LinearPlant(known_gain)), wire, driver) as url:

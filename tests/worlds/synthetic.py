@@ -34,7 +34,7 @@ SCATTER = np.array([0.02, 0.02, 0.2])[:, None]
 
 @cache
 def shape(seed: int) -> np.ndarray:
-    """A smooth curve over the rows for each channel (3, rows); each is asked for again and again."""
+    """A smooth curve over the rows for each channel (3, rows)."""
     rng = np.random.default_rng(seed)
     x = np.tile(np.linspace(0.0, 1.0, len(FREQUENCIES)), len(LEVELS))
     level = np.repeat([0.7, 1.3], len(FREQUENCIES))

@@ -27,8 +27,17 @@ except LashbenchError as error:
 """
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".h5", ".mat", ".uff"])
-@pytest.mark.parametrize("limit", [0, 8192])
+@pytest.mark.parametrize(
+    ("suffix", "limit"),
+    [
+        (".csv", 0),
+        (".h5", 8192),
+        (".mat", 8192),
+        (".uff", 8192),
+        *(pytest.param(suffix, 0, marks=pytest.mark.long) for suffix in (".h5", ".mat", ".uff")),
+        pytest.param(".csv", 8192, marks=pytest.mark.long),
+    ],
+)
 def test_full_disk_keeps_old_file_with_message(tmp_path, suffix, limit):
     pytest.importorskip("resource")
     path = tmp_path / f"lim{suffix}"

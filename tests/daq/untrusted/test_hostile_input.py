@@ -94,7 +94,7 @@ def test_any_bytes_raise_only_reader_errors(readers, name):
     whole = seeds(name)
 
     @settings(
-        max_examples=3 if name in APART else 8 if name in SLOW else 40,
+        max_examples=2 if name in APART else 4 if name in SLOW else 20,
         deadline=None,
         suppress_health_check=list(HealthCheck),
     )

@@ -14,7 +14,7 @@ from sim.engine.linear import smooth_response
 from sim.response import simulate
 
 LINEAR_HZ = (60.0, 140.0)
-PLAYED_HZ = (63.0, 211.0)
+PLAYED_HZ = (97.0, 211.0)
 
 
 def plan(hertz, level=2.5, **more):

@@ -30,15 +30,16 @@ DAMPERS = {"c_s1": "shaft-damping", "c_g1": "mesh1-damping", "c_2": "mesh2-dampi
 @pytest.mark.parametrize(
     ("case", "frequency_hz"),
     [(LIGHT, 60.0), (LIGHT, 130.0), (LOSSY, 110.0), (LOSSY, 180.0), (SPLIT, 110.0), (SPLIT, 150.0)]
-    + [(ELEVATION, f) for f in (60.0, 80.0, 95.0)],
+    + [pytest.param(ELEVATION, 80.0, marks=pytest.mark.long)]
+    + [(ELEVATION, f) for f in (60.0, 95.0)],
 )
 def test_periodic_motion_agrees_with_oracle(case, frequency_hz):
     unit, ratio, extras, step_s = case
     effects = [parse_effect(f"{DAMPERS[c]}:{c}={value}") for c, value in extras.items()]
     # Both from zeros: where several motions are stable, the start decides.
-    expected = oracle_gain(unit, ratio, frequency_hz, 2.5, 250, 5, extras, step_s=step_s)[:, 1]
+    expected = oracle_gain(unit, ratio, frequency_hz, 2.5, 160, 5, extras, step_s=step_s)[:, 1]
     assert np.ptp(np.abs(expected)) < 1e-3 * abs(expected[0])
-    got = engine_gain(unit, ratio, frequency_hz, 2.5, 250, 5, effects)[:, 1]
+    got = engine_gain(unit, ratio, frequency_hz, 2.5, 160, 5, effects)[:, 1]
     decibel, degree = departure(got.mean(), expected.mean())
     assert decibel < 0.02
     assert degree < 0.2
@@ -77,8 +78,8 @@ def oracle_runs(unit, ratio, f, rng, step_s):
 
 
 BANDS = {
-    "adss": (ADSS, 0.25, np.linspace(100.0, 165.0, 12)),
-    "edss": (EDSS, 0.5, np.linspace(40.0, 117.0, 12)),
+    "adss": (ADSS, 0.25, np.linspace(100.0, 165.0, 8)),
+    "edss": (EDSS, 0.5, np.linspace(40.0, 117.0, 8)),
 }
 
 

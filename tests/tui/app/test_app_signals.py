@@ -273,7 +273,7 @@ def test_blocked_terminal_delays_no_signal_and_redraws(tmp_path, on_terminal):
         terminal.look_away()
         terminal.seen = b""
         crowd.touch()
-        time.sleep(4.0)
+        time.sleep(2.5)
         crowd.unlink()
         if not told_to_end:
             terminal.look()

@@ -56,7 +56,14 @@ def test_exit_code_separates_failure_from_note(spoilt, capsys):
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="no bash, which tells each exit code")
-@pytest.mark.parametrize(("words", "reader"), [("", "head -n 1"), ("", "true"), ("--json", "true")])
+@pytest.mark.parametrize(
+    ("words", "reader"),
+    [
+        ("", "head -n 1"),
+        pytest.param("", "true", marks=pytest.mark.long),
+        ("--json", "true"),
+    ],
+)
 def test_closed_pipe_does_not_hide_failure(tmp_path, words, reader):
     """Through a real pipe: who is gone before the first line, and who leaves after it."""
     (tmp_path / "file").write_text("")

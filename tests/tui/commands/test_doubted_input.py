@@ -119,7 +119,6 @@ def test_extract_passes_no_noise_or_half_sweep(loose, tmp_path, capsys):
         ({"excitation": "noise"}, 7),
         ({"state": "interrupted"}, 7),
         ({"state": "complete"}, 0),
-        ({}, 0),
     ]:
         write_response(replace(whole, provenance={**whole.provenance, **said}), path)
         assert cli.main(["extract", str(path), "--judge", loose]) == code, said

@@ -88,7 +88,15 @@ def ended(program, terminal, seconds=60.0):
     return program.returncode
 
 
-@pytest.mark.parametrize("driver", [driver.scheme for driver in CHECKED])
+@pytest.mark.parametrize(
+    "driver",
+    [
+        driver.scheme
+        if driver is CHECKED[0]
+        else pytest.param(driver.scheme, marks=pytest.mark.long)
+        for driver in CHECKED
+    ],
+)
 def test_driving_source_ends_the_checks_at_once(tmp_path, driver):
     box = simulated(driver, LinearPlant(known_gain))
     with served(box, driver=driver) as url, first_day(url, tmp_path) as (program, terminal):
@@ -114,7 +122,7 @@ def test_driving_source_ends_the_checks_at_once(tmp_path, driver):
     assert "| safe-off | **differs** |" in report
 
 
-@pytest.mark.parametrize("signals", [1, 3])
+@pytest.mark.parametrize("signals", [pytest.param(1, marks=pytest.mark.long), 3])
 def test_interrupt_while_driving_ends_safe_with_report(tmp_path, signals):
     box = simulated("sr785", LinearPlant(known_gain))
     with (

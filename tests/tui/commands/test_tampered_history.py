@@ -220,7 +220,10 @@ print(code, peak.split()[1])
 """
 
 
-@pytest.mark.parametrize("statement", SIZES)
+@pytest.mark.parametrize(
+    "statement",
+    [*SIZES[::2], *(pytest.param(one, marks=pytest.mark.long) for one in SIZES[1::2])],
+)
 def test_absurd_sizes_cost_bounded_memory(whole, tmp_path, statement):
     path = tmp_path / "bench.db"
     path.write_bytes(whole)

@@ -39,6 +39,12 @@ def record(words, seed=0, noise=0.02, input_noise=0.0):
     )
 
 
+def short_record():
+    """For what is refused or not by its columns and options alone."""
+    rng = np.random.default_rng(0)
+    return TimeRecord(known.RATE, *known.driven(known.multisine(4, 1.0), rng, noise=0.02))
+
+
 def off(response):
     """Readings off the truth, in their standard errors, shape (2, points)."""
     share = response.gain / known.truth(response.frequency_hz) - 1
@@ -168,7 +174,7 @@ def test_written_response_is_read_by_other_verbs(kind, tmp_path, capsys):
     ],
 )
 def test_inconsistent_options_are_refused_in_one_line(change, said, tmp_path, capsys):
-    path, words = written(tmp_path, "csv", record("a periodic signal"))
+    path, words = written(tmp_path, "csv", short_record())
     out = tmp_path / "out.csv"
     for option, value in zip(change[::2], change[1::2], strict=True):
         if option in words:
@@ -194,7 +200,7 @@ def test_inconsistent_options_are_refused_in_one_line(change, said, tmp_path, ca
     ],
 )
 def test_columns_without_record_are_refused(columns, said, tmp_path, capsys):
-    path, _ = written(tmp_path, "csv", record("a periodic signal"))
+    path, _ = written(tmp_path, "csv", short_record())
     out = tmp_path / "out.csv"
     assert main(["frf", str(path), *columns, "--time", "time", "--out", str(out)]) == 2
     assert said in capsys.readouterr().err
@@ -217,7 +223,7 @@ def test_columns_without_record_are_refused(columns, said, tmp_path, capsys):
     ],
 )
 def test_rate_contradicting_time_column_is_refused(header, scale, rate, refused, tmp_path, capsys):
-    one = record("a periodic signal")
+    one = short_record()
     path, out = tmp_path / "record.csv", tmp_path / "out.csv"
     rows = np.column_stack([np.arange(len(one)) / one.rate_hz * scale, one.input_v, one.output_v])
     np.savetxt(path, rows, delimiter=",", header=header or "", comments="")

@@ -26,8 +26,8 @@ def measuring(db, *words, points, instrument="sim:", **streams):
     program = subprocess.Popen(
         [
             sys.executable, "-m", "tui.cli", "measure", "--unit", "adss",
-            "--instrument", instrument, "--level", "2", "--start", "60", "--stop", "400",
-            "--points", str(points), "--settle-cycles", "4", "--integrate-cycles", "4",
+            "--instrument", instrument, "--level", "2", "--start", "200", "--stop", "450",
+            "--points", str(points), "--settle-cycles", "2", "--integrate-cycles", "2",
             "--db", str(db), *words,
         ],
         **streams,
@@ -53,7 +53,7 @@ def test_blocked_terminal_delays_neither_session_nor_signal(tmp_path, stalled):
     db, out = tmp_path / "bench.db", tmp_path / "out.json"
     with (
         out.open("w") as file,
-        measuring(db, "--json", points=15_000, stdout=file, stderr=stalled) as program,
+        measuring(db, "--json", points=4000, stdout=file, stderr=stalled) as program,
     ):
         end = time.monotonic() + 60.0
         while True:

@@ -92,7 +92,10 @@ def test_all_wires_of_drivers_give_equal_points(tmp_path):
             np.testing.assert_allclose(response.gain, found[0].gain, rtol=1e-6)
 
 
-@pytest.mark.parametrize("driver", [driver.scheme for driver in DRIVERS])
+@pytest.mark.parametrize(
+    "driver",
+    ["", *(pytest.param(one.scheme, marks=pytest.mark.long) for one in DRIVERS if one.scheme)],
+)
 def test_adapter_with_late_eoi_measures(tmp_path, driver):
     """Its instrument sees no EOI: a line feed must end each message."""
     box = simulated(driver, LinearPlant(known_gain))
@@ -101,7 +104,7 @@ def test_adapter_with_late_eoi_measures(tmp_path, driver):
     assert box.driven_v == 0.0
 
 
-@pytest.mark.parametrize("flow", ["hardware", "software"])
+@pytest.mark.parametrize("flow", ["hardware", pytest.param("software", marks=pytest.mark.long)])
 def test_flow_control_follows_the_address(tmp_path, flow):
     with served(simulated("sr785", LinearPlant(known_gain)), "serial_pty", "sr785") as url:
         assert measure(tmp_path / "bench.db", f"{url}?baud=19200&flow={flow}") == 0
@@ -189,7 +192,7 @@ def test_watchdog_continues_after_unproven_source_off(tmp_path, monkeypatch, cap
             assert source_state(url) is SourceState.CONFIRMED_OFF
 
 
-@pytest.mark.parametrize("wire", ["prologix_pty", "tcp"])
+@pytest.mark.parametrize("wire", ["prologix_pty", pytest.param("tcp", marks=pytest.mark.long)])
 def test_returning_adapter_is_found_again(tmp_path, capsys, wire):
     """It breaks off, is away for a while, has lost its settings, and is another device then."""
     db, away = tmp_path / "bench.db", "link-away:point=3,seconds=3"

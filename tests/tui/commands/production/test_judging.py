@@ -61,9 +61,14 @@ def run(capsys):
         ("arf_hz = { lower = 132 }", UNDECIDED),
         ("rf_hz = { lower = 154.5, level_vpk = 4 }", UNDECIDED),
         ("arf_damping = [{ upper = 0.02, level_vpk = 4 }, { upper = 1, level_vpk = 1.5 }]", PASS),
-        ("arf_hz = { lower = 120 }\nb1_deg = { upper = 9 }", UNDECIDED),
-        ("arf_hz = { lower = 150 }\nb1_deg = { upper = 9 }", FAIL),
-        ("arf_hz = { lower = 132 }\ncoverage_factor = 0.05", FAIL),
+        *(
+            pytest.param(*one, marks=pytest.mark.long)
+            for one in (
+                ("arf_hz = { lower = 120 }\nb1_deg = { upper = 9 }", UNDECIDED),
+                ("arf_hz = { lower = 150 }\nb1_deg = { upper = 9 }", FAIL),
+                ("arf_hz = { lower = 132 }\ncoverage_factor = 0.05", FAIL),
+            )
+        ),
     ],
 )  # fmt: skip
 def test_extract_gives_verdict_by_exit_code(run, limits, table, code):
@@ -178,8 +183,10 @@ def history(tmp_path_factory):
         ("b1_deg = { upper = 0.3 }", PASS),
         ("b1_deg = { upper = 0.1 }", FAIL),
         ("b1_deg = { upper = 0.21 }", UNDECIDED),
-        ("b1_deg = { upper = 0.3 }\narf_hz = { upper = 50 }", FAIL),
-        ("causes_not_tolerated = ['load-inertia']", UNDECIDED),
+        pytest.param(
+            "b1_deg = { upper = 0.3 }\narf_hz = { upper = 50 }", FAIL, marks=pytest.mark.long
+        ),
+        pytest.param("causes_not_tolerated = ['load-inertia']", UNDECIDED, marks=pytest.mark.long),
     ],
 )
 def test_history_and_report_judge_stored_results(run, limits, history, tmp_path, table, code):
