@@ -195,7 +195,9 @@ def test_late_instrument_is_awaited(driver, fault):
 
 
 @every_driver
-@pytest.mark.parametrize("skip", range(1, 30, 4))
+@pytest.mark.parametrize(
+    "skip", [pytest.param(n, marks=[pytest.mark.long] * (n % 8 != 1)) for n in range(1, 30, 4)]
+)
 def test_lost_command_gives_no_wrong_point(driver, skip):
     """The message that meets the silence is lost; what follows is heard."""
     instrument, analyser = prepared(
@@ -312,7 +314,9 @@ def test_session_measures_all_points_source_ends_off(driver, store):
 
 
 @every_driver
-@pytest.mark.parametrize("after", [0, 1, 12, 20])
+@pytest.mark.parametrize(
+    "after", [0, 12, *(pytest.param(n, marks=pytest.mark.long) for n in (1, 20))]
+)
 def test_ended_session_is_resumed(driver, store, after):
     instrument, analyser = bench(driver)
     control = SessionControl()

@@ -170,7 +170,10 @@ def test_silent_watchdog_allows_no_driving(db):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("driver", [driver.scheme for driver in DRIVERS])
+@pytest.mark.parametrize(
+    "driver",
+    ["", *(pytest.param(one.scheme, marks=pytest.mark.long) for one in DRIVERS if one.scheme)],
+)
 def test_stopped_session_loses_bench_and_learns_it(db, driver):
     instrument = simulated(driver, LinearPlant(known_gain))
     with served(instrument, driver=driver) as url, measuring(url, db) as process:

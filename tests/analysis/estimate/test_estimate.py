@@ -126,7 +126,8 @@ def test_driven_dc_offset_is_no_backlash():
 
 
 @pytest.mark.parametrize(
-    ("level_vpk", "seed"), [(0.25, 1), (0.5, 2), pytest.param(0.5, 3, marks=pytest.mark.long)]
+    ("level_vpk", "seed"),
+    [(0.5, 2), *(pytest.param(*one, marks=pytest.mark.long) for one in ((0.25, 1), (0.5, 3)))],
 )
 def test_uninformative_sweep_leaves_ratio_open(level_vpk, seed, cache):
     """The motor is held by friction, or moves within its play: every ratio shows the same.

@@ -83,7 +83,7 @@ def test_interpreter_bound_tasks_use_few_cores(cores):
     assert 1 < max(side_by_side(work, range(40))) <= 4
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.long) for n in (1, 2))])
 def test_judgement_does_not_depend_on_cores(cores, seed):
     """To the last bit: all that is drawn is drawn before the work is shared out."""
     cause = ("load-inertia",)

@@ -204,7 +204,14 @@ def test_every_driver_measures_through_a_gateway(driver):
 
 
 @pytest.mark.parametrize("driver", DRIVERS, ids=lambda driver: driver.scheme or "preset")
-@pytest.mark.parametrize("refused", [(READ_STB,), (CLEAR,), (READ_STB, CLEAR)], ids=str)
+@pytest.mark.parametrize(
+    "refused",
+    [
+        *(pytest.param(one, marks=pytest.mark.long) for one in ((READ_STB,), (CLEAR,))),
+        (READ_STB, CLEAR),
+    ],
+    ids=str,
+)
 def test_gateway_without_poll_or_clear_is_reported(store, driver, refused):
     """Error 8, operation not supported."""
     box = simulated(driver.scheme, LinearPlant(known_gain), ["truncated-block:point=9"])

@@ -27,6 +27,10 @@ KINDS = {
 }
 
 
+DAILY = [names[0] for names in KINDS.values() if names[0] not in ("adss", "irb")]
+"""One of each kind; the arm takes long."""
+
+
 def test_there_are_eight_units_of_six_kinds():
     assert sorted(name for names in KINDS.values() for name in names) == sorted(UNITS)
     assert len(UNITS) >= 8
@@ -52,7 +56,7 @@ def test_resonances_are_within_limits(name):
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(one, marks=[pytest.mark.long] * (one == "irb")) for one in PUBLISHED],
+    [pytest.param(one, marks=[pytest.mark.long] * (one not in DAILY)) for one in PUBLISHED],
 )
 def test_motion_agrees_with_independent_plant(name):
     """With its clock, counts, clips, play and friction, below ARF, between and above RF."""

@@ -68,7 +68,7 @@ def test_both_steps_follow_the_accepted_model(tmp_path, step):
     assert "0.31" not in text
 
 
-@pytest.mark.parametrize("step", [5, 6])
+@pytest.mark.parametrize("step", [pytest.param(5, marks=pytest.mark.long), 6])
 def test_tied_models_that_disagree_are_undecided(tmp_path, step):
     text = shown(tmp_path, step, ESTIMATE, DIAGNOSIS)
     assert "Undecided, adjust no stage yet: 23 to 70 %" in text

@@ -21,7 +21,7 @@ def planned(unit, minutes, start=100.0):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("size", [(80, 24), (140, 40)])
+@pytest.mark.parametrize("size", [(80, 24), pytest.param((140, 40), marks=pytest.mark.long)])
 def test_best_plan_fills_the_plan_dialog(tmp_path, size):
     asked, lines = [], []
 

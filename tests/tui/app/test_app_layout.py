@@ -117,7 +117,9 @@ def test_key_switches_text_and_plots_when_small(db):
     run(way)
 
 
-@pytest.mark.parametrize("theme", ["textual-dark", "textual-light"])
+@pytest.mark.parametrize(
+    "theme", ["textual-dark", pytest.param("textual-light", marks=pytest.mark.long)]
+)
 def test_every_word_can_be_read(db, theme):
     def faint(op):
         found = []

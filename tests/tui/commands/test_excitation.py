@@ -39,8 +39,15 @@ def response_to(words, stated=False):
     return replace(response, provenance=known_of_it)
 
 
-@pytest.mark.parametrize("words", SIGNALS)
-@pytest.mark.parametrize("kind", ["csv", "h5", "uff", "mat"])
+@pytest.mark.parametrize(
+    ("words", "kind"),
+    [
+        # Each signal and each format once; `make long` takes all combinations.
+        pytest.param(words, kind, marks=[pytest.mark.long] * (i != j % len(SIGNALS)))
+        for i, words in enumerate(SIGNALS)
+        for j, kind in enumerate(("csv", "h5", "uff", "mat"))
+    ],
+)
 def test_file_formats_preserve_refused_excitation(words, kind, tmp_path):
     path = tmp_path / f"r.{kind}"
     write_response(response_to(words), path)
@@ -49,7 +56,9 @@ def test_file_formats_preserve_refused_excitation(words, kind, tmp_path):
             answer(read_response(path), load_unit("adss"))
 
 
-@pytest.mark.parametrize("words", ["a periodic signal", "noise"])
+@pytest.mark.parametrize(
+    "words", ["a periodic signal", pytest.param("noise", marks=pytest.mark.long)]
+)
 @pytest.mark.parametrize("kind", ["csv", "h5", "uff", "mat"])
 def test_every_file_keeps_the_signal(words, kind, tmp_path):
     path, made = tmp_path / f"r.{kind}", response_to(words, stated=True)

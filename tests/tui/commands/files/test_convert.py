@@ -23,7 +23,13 @@ from tui.cli import main
 SUFFIXES = (".csv", ".h5", ".uff", ".mat")
 
 
-@pytest.mark.parametrize(("one", "other"), list(permutations(SUFFIXES, 2)))
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        pytest.param(*pair, marks=[pytest.mark.long] * (".csv" not in pair))
+        for pair in permutations(SUFFIXES, 2)
+    ],
+)
 def test_response_converts_between_all_formats(tmp_path, one, other):
     response = measured(flags=None)
     given, made = tmp_path / f"x{one}", tmp_path / f"y{other}"

@@ -181,7 +181,14 @@ def test_adaptive_adds_points_within_its_budget(run, db):
     assert len({p.requested_hz for p in points}) == len(points)
 
 
-@pytest.mark.parametrize("band", [(110, 175, 40), (115, 165, 26), (33, 47, 3), (100.1, 180.3, 7)])
+@pytest.mark.parametrize(
+    "band",
+    [
+        *(pytest.param(one, marks=pytest.mark.long) for one in ((110, 175, 40), (115, 165, 26))),
+        (33, 47, 3),
+        (100.1, 180.3, 7),
+    ],
+)
 @pytest.mark.parametrize("direction", ["up", "down"])
 def test_both_ends_of_band_are_measured(run, db, band, direction):
     start, stop, points = band

@@ -238,7 +238,10 @@ def test_watchdog_ends_without_an_analyser(tmp_path, monkeypatch, capsys):
             pass
 
 
-@pytest.mark.parametrize("driver", [driver.scheme for driver in DRIVERS])
+@pytest.mark.parametrize(
+    "driver",
+    ["", *(pytest.param(one.scheme, marks=pytest.mark.long) for one in DRIVERS if one.scheme)],
+)
 def test_next_start_finds_driving_source_without_watchdog(tmp_path, capsys, driver):
     db = tmp_path / "bench.db"
     box = simulated(driver, LinearPlant(known_gain))
