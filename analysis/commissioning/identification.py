@@ -48,6 +48,7 @@ def identify(
     coordinates: Coordinates,
     observation: Observation,
     *,
+    prior: Gaussian | None = None,
     seed: int = 0,
     executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
@@ -57,9 +58,11 @@ def identify(
     Parameters
     ----------
     coordinates
-        Which parameters, and their prior.
+        Which parameters.
     observation
         One or several sweeps; the channels (3, rows) may hold NaN.
+    prior
+        Of the coordinates; standard normal if not given.
     seed
         Of the drives that are drawn.
 
@@ -69,7 +72,7 @@ def identify(
         If a motion grew without bound.
     """
     rng = np.random.default_rng(seed)
-    prior = Gaussian(coordinates.nominal(), np.eye(len(coordinates)))
+    prior = prior or Gaussian(coordinates.nominal(), np.eye(len(coordinates)))
     at = proposal = prior
     measured = observation.values.ravel()
     fit = None

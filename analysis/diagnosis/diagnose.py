@@ -16,34 +16,32 @@ from pathlib import Path
 
 import numpy as np
 
+from analysis.commissioning.changes import find_changes
+from analysis.diagnosis.commissioned import answer_by_changes, corrected_by_changes
 from analysis.diagnosis.datasheet import learn_datasheet
 from analysis.diagnosis.experiment_design import NextMeasurement, propose_measurement
 from analysis.diagnosis.harmonics import compare_harmonics
-from analysis.diagnosis.refinement import refine_parameters
 from analysis.diagnosis.remaining_models import find_remaining_models
 from analysis.diagnosis.residuals import describe_residuals, find_residuals
 from analysis.diagnosis.result import Cause, Diagnosis, Size
+from analysis.diagnosis.search import search_catalogue
 from analysis.diagnosis.stages import Record
 from analysis.emulation.fitted_model import FittedModel
-from analysis.emulation.model_parameters import estimate_parameters, widen_if_open
 from analysis.emulation.parameter_posterior import ParameterPosterior
 from analysis.ensemble.datasheet_belief import HINT, believed_document, is_usually_off, trusts_much
 from analysis.estimate.backlash import ratio_of
 from analysis.execution.blas import on_one_core
 from analysis.execution.executor import Executor
-from analysis.execution.progress import Progress, part_of
+from analysis.execution.progress import Progress, part_of, remaining
 from analysis.inference.exclusion import ExclusionLimit
 from analysis.inference.posterior import Posterior, limits
-from analysis.inference.refine import refine
 from analysis.observation.excitation import refuse_signal
 from analysis.observation.joint import check_together, unit_doubts
 from analysis.observation.observation import Observation, observe
 from analysis.observation.rounding import settled
 from analysis.observation.stated_error import error_doubts
 from analysis.observation.thinning import thin_responses
-from analysis.selection.credible_set import require_credible_set
-from analysis.selection.datasheet_test import compare_with_datasheet
-from analysis.selection.verdict import Judged, Verdict, judge_candidates
+from analysis.selection.verdict import Verdict
 from daq.errors import AnalysisError
 from daq.frf import FrequencyResponse
 from sim.catalogue import CATALOGUE
@@ -54,6 +52,9 @@ __all__ = ["Cause", "Diagnosis", "Size", "diagnose_response"]
 
 _FEWEST, _FEW = 8, 20
 """Frequencies without which there is no diagnosis, and below which small causes hardly show."""
+
+_ASKED = 0.4
+"""Share of the work on a commissioned drive that asks what has changed."""
 
 _RIVALS = 3
 """How many rivals the next measurement is to tell from what is named."""
@@ -146,11 +147,6 @@ def _diagnose(
     executor: Executor | None,
     progress: Progress | None,
 ) -> Diagnosis:
-
-    def early(share: float, text: str) -> None:
-        if progress is not None:
-            progress(0.8 * share, text)
-
     posterior = Posterior.find(unit, cache, executor)
     if posterior is None:
         raise AnalysisError(
@@ -158,41 +154,33 @@ def _diagnose(
             "lashbench prepare --unit FILE"
         )
     record = Record()
-    with record.stage("refine"):
-        refined = refine(
-            posterior, observed, without=without, seed=seed, executor=executor, progress=early
+    changes = None
+    if unit.commissioning is not None:
+        with record.stage("changes"):
+            changes = find_changes(
+                unit, observed, without=without, seed=seed, executor=executor,
+                progress=part_of(progress, 0.0, _ASKED, "asking what has changed"),
+            )  # fmt: skip
+        progress = remaining(progress, _ASKED)
+    if changes is not None and changes.likeliest:
+        answer = answer_by_changes(changes, observed, unit, posterior, seed, executor, record)
+    else:
+        answer = search_catalogue(
+            observed, unit, posterior, without, seed, executor, progress, record
         )
-    candidates = refined.candidates
-    observation = candidates[0].surface.observation
-    rng = np.random.default_rng(seed)
-    with record.stage("judge"):
-        verdict = record.verdict = judge_candidates(candidates, observation, rng, refined.log_odds)
-        base = estimate_parameters(verdict.baseline.candidate, observation, rng)
-
-    def sharpened(one: Judged) -> ParameterPosterior:
-        late = part_of(progress, 0.8, 0.9, "sizing it")
-        return refine_parameters(unit, one.candidate, observation, rng, executor, late)
-
-    sharp = None
-    if verdict.word != "unexplained":
-        with record.stage("sharpen"):
-            sharp = sharpened(verdict.best)
-            held = compare_with_datasheet(verdict, sharp)
-            if held.best is not verdict.best and held.word != "unexplained":
-                sharp = sharpened(held.best)
-            record.verdict = held
-        with record.stage("criticise"):
-            # Last, as what shares its probability is no reason to name what is the datasheet's.
-            verdict = record.verdict = require_credible_set(held)
-        sharp = None if verdict.word == "unexplained" else sharp
+        if changes is not None and changes.likeliest == () and answer.verdict.word == "unexplained":
+            # The search may be too coarse for a drive that is known well.
+            answer = corrected_by_changes(answer, changes)
+    record.verdict = verdict = answer.verdict
+    candidates, observation, summary = answer.candidates, answer.observation, answer.summary
+    base, sharp, rng = answer.base, answer.sharp, answer.rng
     named = verdict.word in ("explained", "ambiguous")
-    base = widen_if_open(base, verdict.baseline.candidate, observation, rng)
     best = base if sharp is None else sharp
     departures = find_residuals(verdict.baseline.candidate, observation)
     left = find_residuals(verdict.best.candidate, observation)
     unseen: tuple[ExclusionLimit, ...] = ()
     if verdict.word != "unexplained":
-        unseen = limits(posterior, refined.summary, verdict.best.effects if named else (), without)
+        unseen = limits(posterior, summary, verdict.best.effects if named else (), without)
     with record.stage("next measurement"):
         proposal = _proposal(unit, verdict, observation, seed, executor, progress)
     with record.stage("models"):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-__all__ = ["Progress", "part_of"]
+__all__ = ["Progress", "part_of", "remaining"]
 
 Progress = Callable[[float, str], None]
 """Takes the share done, 0 to 1, and what is being done."""
@@ -20,3 +20,10 @@ def part_of(
     if progress is None:
         return None
     return lambda share: progress(low + (high - low) * share, text)
+
+
+def remaining(progress: Progress | None, done: float) -> Progress | None:
+    """What the steps tell that come when so large a share of the whole is done."""
+    if progress is None:
+        return None
+    return lambda share, text: progress(done + (1.0 - done) * share, text)

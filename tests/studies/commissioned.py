@@ -35,7 +35,7 @@ from sim.unit import load_unit, unit_from_mapping
 
 KINDS = ("adss", "walkman-b11", "edss", "r3-1", "feed-axis")
 TOLERANCE, CHANGE = 0.08, 0.10
-POINTS, SHARES, CYCLES = 16, (0.4, 0.8), (6, 8)
+POINTS, SHARES, CYCLES = 40, (0.3, 0.55, 0.8), (12, 12)
 VISIBLE = CHANGE / 3.0
 """Standard deviation, the other values known, up to which a change is asked for: three of it."""
 

@@ -1,0 +1,95 @@
+"""Which values of a commissioned drive have changed, by closed form and in simulated drives."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+from worlds.known_drive import commissioned, seen_again
+
+from analysis.commissioning.changes import Changes, find_changes
+from analysis.commissioning.coordinates import Coordinates
+from analysis.commissioning.regression import Gaussian
+from analysis.observation.observation import observe
+from sim.unit import load_unit
+
+NAMES = ("load-inertia", "motor-inertia", "shaft-stiffness")
+
+
+def of_linear_data(measured, noise):
+    """What is known of three values that are measured directly, each with some noise."""
+    coordinates = Coordinates(load_unit("r3-1"), ("J_L", "J_m", "k_s1"), (0.15, 0.15, 0.15))
+    common = np.array([[0.02, 0.01, 0.0], [0.01, 0.03, -0.01], [0.0, -0.01, 0.02]])
+    prior = Gaussian(np.zeros(3), common + np.eye(3))
+    information = np.linalg.inv(prior.covariance) + np.diag(1.0 / noise**2)
+    covariance = np.linalg.inv(information)
+    found = Gaussian(covariance @ (measured / noise**2), covariance)
+    directions = {(name,): way for name, way in zip(NAMES, np.eye(3), strict=True)}
+    return Changes(coordinates, prior, found, common, directions, 1.0, 0.5)
+
+
+def test_probabilities_are_those_of_normal_densities():
+    """Oracle: the density of the measured values under each prior."""
+    measured, noise = np.array([0.6, 0.1, -0.05]), np.array([0.1, 0.2, 0.15])
+    changes = of_linear_data(measured, noise)
+    sets = [((), 0.5), *(((n,), 0.35 / 3) for n in NAMES)]
+    sets += [(tuple(sorted(pair)), 0.1 / 3) for pair in combinations(NAMES, 2)]
+    expected = {}
+    for names, share in [*sets, (NAMES, 0.05)]:
+        free = np.diag([1.0 if name in names else 0.0 for name in NAMES])
+        spread = changes.common + free + np.diag(noise**2)
+        expected[names] = share * multivariate_normal(np.zeros(3), spread).pdf(measured)
+    total = sum(expected.values())
+    for names, _ in sets:
+        assert changes.probabilities[names] == pytest.approx(expected[names] / total, rel=1e-9)
+    assert changes.likeliest == ("load-inertia",)
+
+
+def test_a_change_has_its_conditional_size():
+    """Oracle: the normal distribution of one value, given three that are correlated."""
+    measured, noise = np.array([0.6, 0.1, -0.05]), np.array([0.1, 0.2, 0.15])
+    changes = of_linear_data(measured, noise)
+    found = changes.given(("load-inertia",))
+    prior = changes.common + np.diag([1.0, 0.0, 0.0])
+    gain = prior @ np.linalg.inv(prior + np.diag(noise**2))
+    assert found.changes[0] == pytest.approx(0.15 * (gain @ measured)[0])
+    assert found.covariance[1, 1] == pytest.approx(0.15**2 * (prior - gain @ prior)[0, 0])
+    assert found.ratio == 1.0
+
+
+def test_values_that_all_changed_are_no_cause():
+    changes = of_linear_data(np.array([2.0, -2.0, 2.0]), np.full(3, 0.05))
+    assert changes.likeliest is None
+
+
+def test_what_values_leave_is_no_cause():
+    known = of_linear_data(np.array([0.6, 0.0, 0.0]), np.full(3, 0.05))
+    parts = (known.coordinates, known.prior, known.found, known.common, known.directions)
+    assert Changes(*parts, 1.5, 1.0).likeliest is None
+
+
+@pytest.mark.parametrize(
+    ("changed", "cause", "seed"),
+    [
+        ({}, (), 2),
+        pytest.param({"J_m": 1.1}, ("motor-inertia",), 1, marks=pytest.mark.long),
+        pytest.param({"T_f_m": 0.9}, ("motor-coulomb-friction",), 3, marks=pytest.mark.long),
+        pytest.param({"k_s1": 0.9}, ("shaft-stiffness",), 4, marks=pytest.mark.long),
+    ],
+)
+def test_a_tenth_of_one_value_is_named(changed, cause, seed):
+    """The likeliest of some 90 sets, for the right reason: its size is within three errors."""
+    unit = commissioned("walkman-b11")
+    found = find_changes(unit, observe(seen_again(unit, seed, **changed)), seed=seed)
+    assert found.likeliest == cause
+    if cause:
+        told = found.given(cause)
+        (factor,) = changed.values()
+        off = told.changes[0] - np.log(factor)
+        assert abs(off) < 3.0 * np.sqrt(told.covariance[1, 1])
+
+
+def test_a_unit_that_was_not_commissioned_is_refused():
+    unit = load_unit("walkman-b11")
+    with pytest.raises(ValueError, match="was not commissioned"):
+        find_changes(unit, observe(seen_again(unit, 1)))
