@@ -1,7 +1,9 @@
 """The same measurement over every wire, and what becomes of it when its program is killed."""
 
 import json
+import os
 import random
+import signal
 import socket
 import time
 
@@ -248,7 +250,8 @@ def test_next_start_finds_driving_source_without_watchdog(tmp_path, capsys, driv
     with served(box, driver=driver) as url:
         process = start(url, db, 0, (130.0, 170.0, 400, 3, 4, 2.0))
         process.stdout.readline()
-        # Both at once, as when the machine dies: the child first, or it would act.
+        # Both at once, as when the machine dies: neither may see the other's end and act.
+        os.kill(process.pid, signal.SIGSTOP)
         children = _children(process.pid)
         for child in children:
             child.kill()
