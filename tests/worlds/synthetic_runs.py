@@ -7,7 +7,6 @@ from collections import Counter
 import numpy as np
 from worlds import synthetic
 
-from analysis.ensemble.datasheet_spread import spread_of
 from analysis.ensemble.model import Hypothesis
 
 ADSS = synthetic.ADSS
@@ -46,7 +45,7 @@ class World:
         self.count[effects] += 1
         values = [value for effect in machine.effects for value in effect.values.values()]
         place = Hypothesis(unit, effects).place(machine.ratio, values)
-        off = spread_of(unit).along(machine.deviations)
+        off = synthetic.SPREAD.along(machine.deviations)
         return read(effects, place, np.random.default_rng(machine.seed), off, self.scatter)
 
 

@@ -22,7 +22,7 @@ def scales():
 
 @pytest.fixture(scope="module")
 def batch(scales):
-    return simulate_batch(scales.prior, scales.marks, 5, 23)
+    return simulate_batch(scales.prior, scales.marks, 5, 7)
 
 
 def test_training_omits_band_in_half_of_examples(scales, batch):

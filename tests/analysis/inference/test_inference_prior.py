@@ -106,10 +106,10 @@ def test_drawn_plans_stay_within_limits(unit):
 
 
 def test_batch_depends_on_seed_and_number_alone(prior, marks, tmp_path):
-    first, again = (simulate_batch(prior, marks, 5, 27) for _ in range(2))
+    first, again = (simulate_batch(prior, marks, 5, 6) for _ in range(2))
     np.testing.assert_array_equal(first.mean, again.mean)
     assert first.plan == again.plan
-    assert first.plan != draw_plan(prior.unit, marks, np.random.default_rng([5, 28]))
+    assert first.plan != draw_plan(prior.unit, marks, np.random.default_rng([5, 7]))
     save_batch(tmp_path / "batch.npz", first)
     loaded = load_batch(tmp_path / "batch.npz")
     assert loaded.plan == first.plan
