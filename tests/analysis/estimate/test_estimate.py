@@ -22,9 +22,7 @@ from sim.response import simulate
 from sim.unit import load_unit
 
 PRACTICE = Path(__file__).parents[2] / "data" / "practice"
-SHORT = SweepPlan(
-    spaced_frequencies(115.0, 160.0, 19), (2.5,), settle_cycles=10, integrate_cycles=12
-)
+SHORT = SweepPlan(spaced_frequencies(115.0, 160.0, 19), (2.5,), settle_cycles=6, integrate_cycles=8)
 
 
 @pytest.fixture(scope="session")
@@ -96,7 +94,12 @@ def test_two_sweeps_are_estimated_together(seed, cache):
 def test_error_index_uses_first_of_several_sweeps():
     """From the same runs, read with the same noise, though the second holds the same level."""
     unit = load_unit("adss")
-    plan = replace(SHORT, frequencies_hz=spaced_frequencies(110.0, 170.0, 31))
+    plan = replace(
+        SHORT,
+        frequencies_hz=spaced_frequencies(110.0, 170.0, 31),
+        settle_cycles=10,
+        integrate_cycles=12,
+    )
     first, second = (
         on_a_bench(simulate(unit, 0.35, one, seed=n), seed=n)
         for n, one in enumerate((plan, replace(plan, levels_vpk=(2.5, 2.0), direction="down")))
@@ -167,8 +170,8 @@ def test_missing_phase_and_errors_widen_answer(cache):
         np.abs(measured.gain),
         phase_known=False,
         unit="ADSS",
-        settle_cycles=10,
-        integrate_cycles=12,
+        settle_cycles=6,
+        integrate_cycles=8,
     )
     full, less = (estimate_response(one, unit, cache=cache) for one in (measured, bare))
     assert within(less.contribution_ratio, 0.5, 4.0)

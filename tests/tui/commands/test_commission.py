@@ -15,7 +15,8 @@ def sweep(tmp_path_factory):
     """A drive that is 9 % off its datasheet in one value, swept at two levels."""
     path = tmp_path_factory.mktemp("sweep") / "good.csv"
     words = ["--unit", "adss", "--ratio", "0.3", "--level", "2", "--level", "4", "--start", "100"]
-    words += ["--stop", "180", "--points", "17", "--set", "J_L=0.0030", "--out", str(path)]
+    words += ["--stop", "180", "--points", "17", "--settle-cycles", "6", "--integrate-cycles", "10"]
+    words += ["--set", "J_L=0.0030", "--out", str(path)]
     assert cli.main(["simulate", *words]) == 0
     return path
 
