@@ -18,7 +18,7 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
+from scipy.special import ndtr, ndtri
 
 from analysis.commissioning.coordinates import RATIO, Coordinates
 from analysis.commissioning.identification import identify
@@ -39,6 +39,9 @@ _CHANGE = 0.15
 
 _READ = 0.001
 """A gain that is read again is known no better, as a share."""
+
+_NEAREST_END = 0.02
+"""A contribution ratio is taken to be no nearer to 0 or 1 than this where it was identified."""
 
 _PRIOR = (0.5, 0.35, 0.1)
 """Probability that no value has changed, that one has, and that two have; else all may have."""
@@ -103,11 +106,11 @@ class Changes:
 
     @property
     def likeliest(self) -> Causes | None:
-        """The likeliest set of causes, empty where nothing has changed.
+        """The likeliest set of causes, empty where no more than the ratio has changed.
 
         None where that holds values without a cause, or values leave more than they should.
         """
-        first = next(iter(self.probabilities))
+        first = tuple(name for name in next(iter(self.probabilities)) if name != RATIO)
         if any(name not in CATALOGUE for name in first):
             return None
         left = self.misfit_rank >= _UNLIKE and self.misfit > 1.0
@@ -123,9 +126,10 @@ class Changes:
         return found
 
     def given(self, causes: Causes) -> Changed:
-        """What the values are if these causes changed them."""
+        """What the values are if these causes changed them; the ratio may have changed, too."""
         ways = [self.directions[(name,)] for name in causes]
-        posterior = self._posterior([(name,) for name in causes])
+        free = [one for one in self.directions if one == (RATIO,)]
+        posterior = self._posterior([*free, *((name,) for name in causes)])
         before = self.prior.mean
         c = self.coordinates
         ratio = np.array([symbol == RATIO for symbol in c.symbols])
@@ -204,7 +208,7 @@ def find_changes(
     coordinates = _coordinates(unit, known)
     common = _common(coordinates, known)
     directions = _directions(unit, coordinates, without)
-    prior = Gaussian(coordinates.nominal(), common + np.diag(_changeable(coordinates)))
+    prior = Gaussian(_centre(coordinates, known), common + np.eye(len(coordinates)))
     found = identify(
         coordinates, observation, prior=prior, seed=seed, executor=executor, progress=progress
     )
@@ -215,36 +219,31 @@ def find_changes(
 
 def _coordinates(unit: Unit, known: Commissioning) -> Coordinates:
     values = unit.parameters
-    symbols = [s for s in known.order if s != RATIO and values.get(s, 0.0) > 0.0]
-    shares = [_CHANGE] * len(symbols)
-    if unit.stages == 2:
-        symbols.append(RATIO)
-        shares.append(float("nan"))
+    two = unit.stages == 2
+    symbols = [s for s in known.order if values.get(s, 0.0) > 0.0 or (s == RATIO and two)]
+    shares = [float("nan") if symbol == RATIO else _CHANGE for symbol in symbols]
     return Coordinates(unit, tuple(symbols), tuple(shares))
 
 
-def _changeable(coordinates: Coordinates) -> Vector:
-    return np.array([0.0 if symbol == RATIO else 1.0 for symbol in coordinates.symbols])
+def _centre(coordinates: Coordinates, known: Commissioning) -> Vector:
+    """Coordinates (d,) as they were identified."""
+    ratio = 0.5 if known.contribution_ratio is None else known.contribution_ratio
+    at = float(ndtri(np.clip(ratio, _NEAREST_END, 1.0 - _NEAREST_END)))
+    return np.array([at if symbol == RATIO else 0.0 for symbol in coordinates.symbols])
 
 
 def _common(coordinates: Coordinates, known: Commissioning) -> Vector:
     """Covariance (d, d) of the coordinates of a drive that has not changed.
 
-    The ratio is open: it is what wear moves first. A backlash that was not identified is exact, and
-    takes no part: with both open the regression tells neither.
+    A backlash that was not identified is exact, and takes no part: with that and the ratio open the
+    regression tells neither.
     """
     place = {symbol: i for i, symbol in enumerate(known.order)}
-    covariance = np.array(known.covariance)
-    found = np.zeros((len(coordinates), len(coordinates)))
-    held = [i for i, s in enumerate(coordinates.symbols) if s in place and s != RATIO]
-    rows = [place[coordinates.symbols[i]] for i in held]
-    shares = np.array([coordinates.shares[i] for i in held])
-    found[np.ix_(held, held)] = covariance[np.ix_(rows, rows)] / np.outer(shares, shares)
+    rows = [place[symbol] for symbol in coordinates.symbols]
+    slopes = coordinates.slopes(_centre(coordinates, known))
+    found = np.array(known.covariance)[np.ix_(rows, rows)] / np.outer(slopes, slopes)
     sizes, ways = np.linalg.eigh(0.5 * (found + found.T))
-    found = (ways * np.maximum(sizes, 0.0)) @ ways.T
-    shares = np.array(coordinates.shares)
-    read = (_READ / np.where(np.isfinite(shares), shares, np.inf)) ** 2
-    return found + np.diag(np.where(np.isfinite(shares), read, 1.0))
+    return (ways * np.maximum(sizes, 0.0)) @ ways.T + np.diag((_READ / slopes) ** 2)
 
 
 def _directions(
@@ -253,7 +252,7 @@ def _directions(
     """Standard deviation (d,) of the coordinates along what each cause changes.
 
     By the identifier of an effect that changes known values and nothing else; by its symbol of a
-    value that no effect changes.
+    value that no effect changes, and of the contribution ratio.
     """
     place = {symbol: i for i, symbol in enumerate(coordinates.symbols)}
     foreign = {*not_of_unit(unit), *without}
@@ -272,7 +271,7 @@ def _directions(
         # With a current controller only the product of k_a and k_t shows.
         told.add("k_t")
     for symbol in place:
-        if symbol not in told and symbol != RATIO:
+        if symbol not in told:
             found[(symbol,)] = _along(place, (symbol,))
     return found
 
