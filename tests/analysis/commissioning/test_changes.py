@@ -89,7 +89,7 @@ def test_a_tenth_of_one_value_is_named(changed, cause, seed):
         assert abs(off) < 3.0 * np.sqrt(told.covariance[1, 1])
 
 
-def test_a_unit_that_was_not_commissioned_is_refused():
+def test_unit_without_commissioning_is_refused():
     unit = load_unit("walkman-b11")
     with pytest.raises(ValueError, match="was not commissioned"):
         find_changes(unit, observe(seen_again(unit, 1)))
