@@ -23,8 +23,8 @@ sys.dont_write_bytecode = False
 gc.disable()  # until all tests are collected
 
 
-# Every day draws other examples: forty a day are many before long.
-settings.register_profile("side by side", deadline=None, max_examples=40)
+# Every day draws other examples: twenty a day are many before long.
+settings.register_profile("side by side", deadline=None, max_examples=20)
 settings.load_profile("side by side")
 
 

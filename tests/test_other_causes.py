@@ -16,7 +16,10 @@ from sim.unit import load_unit
 HZ = np.array([105.0, 150.0])
 
 
-@pytest.mark.parametrize("cause", CAUSES)
+@pytest.mark.parametrize(
+    "cause",
+    [pytest.param(one, marks=[pytest.mark.long] * (n % 3 > 0)) for n, one in enumerate(CAUSES)],
+)
 def test_every_other_cause_exceeds_the_noise(cause):
     unit = load_unit("adss")
     drawn = CAUSES[cause].draw(unit, np.random.default_rng(3))

@@ -96,13 +96,13 @@ def test_any_finite_response_is_read_or_refused(response):
     check_sane(response)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=20)
 @given(wild(80))
 def test_any_noisy_pair_is_read_plausibly(parameters):
     check_sane(noisy_pair(*parameters))
 
 
-@settings(deadline=None, max_examples=15)
+@settings(deadline=None, max_examples=8)
 @given(wild(60), st.floats(-5, 5))
 def test_gain_does_not_move_frequencies(parameters, log_factor):
     one = noisy_pair(*parameters)
@@ -118,7 +118,7 @@ def test_gain_does_not_move_frequencies(parameters, log_factor):
     same_features(extract(one), extract(other), gain_db=20 * log_factor)
 
 
-@settings(deadline=None, max_examples=15)
+@settings(deadline=None, max_examples=8)
 @given(wild(60), st.sampled_from([1e-3, 1 / 60, 2 * math.pi, 1e3]))
 def test_the_unit_of_frequency_does_not_matter(parameters, factor):
     one = noisy_pair(*parameters)
@@ -133,7 +133,7 @@ def test_the_unit_of_frequency_does_not_matter(parameters, factor):
     same_features(extract(one), extract(other), hz=factor)
 
 
-@settings(deadline=None, max_examples=15)
+@settings(deadline=None, max_examples=8)
 @given(wild(60), st.randoms(use_true_random=False))
 def test_row_order_does_not_matter(parameters, random):
     one = noisy_pair(*parameters)

@@ -89,6 +89,7 @@ def test_damaged_archive_makes_estimate_simulate(damage, name, tmp_path, monkeyp
     assert np.all(draws.mean == 1.0)
 
 
+@pytest.mark.parametrize("name", ["adss", pytest.param("edss", marks=pytest.mark.long)])
 def test_engine_reproduces_the_shipped_runs(name):
     """False once in 10,000: runs from other starts at the same places."""
     seed, p = again(name)

@@ -219,6 +219,7 @@ def test_unreadable_source_is_unknown_without_raising(driver):
     assert analyser.make_safe() is SourceState.UNKNOWN
 
 
+@pytest.mark.slow
 @every_driver
 def test_instrument_silent_for_ever_is_given_up(driver):
     """A session asks twice, its watchdog three times; all of it must take less than a minute."""
@@ -232,7 +233,7 @@ def test_instrument_silent_for_ever_is_given_up(driver):
 
 
 @every_driver
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(
     level=st.floats(),
     offset=st.floats(),

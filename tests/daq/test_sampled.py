@@ -38,7 +38,7 @@ def made(converter, blocks):
 # The sine
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(st.lists(st.integers(1, 700), min_size=20, max_size=60), st.floats(10.0, 5000.0))
 def test_sine_is_continuous_across_blocks(blocks, hz):
     converter = StreamConverter("test", RATE, 10.0, (1.0, 1.0))
@@ -83,7 +83,7 @@ def test_recording_starts_with_step_and_requested_length():
 # The lock-in
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(st.floats(5.0, 9000.0), st.floats(0.0, 400.0), st.floats(-3.1, 3.1), st.floats(0.01, 5.0))
 def test_amplitude_ignores_offset_and_harmonics(hz, first, phase, level):
     frames = np.arange(int(first + 6 * RATE / hz) + 2)

@@ -67,7 +67,13 @@ def beside(folder, *names):
 
 @pytest.mark.parametrize(
     ("command", "added"),
-    [(CONSOLE, None), (MODULE, None), (CONSOLE, "."), (CONSOLE, ":/nowhere"), (MODULE, "{cwd}")],
+    [
+        (CONSOLE, None),
+        (MODULE, "{cwd}"),
+        (CONSOLE, "."),
+        pytest.param(MODULE, None, marks=pytest.mark.long),
+        pytest.param(CONSOLE, ":/nowhere", marks=pytest.mark.long),
+    ],
 )
 def test_working_directory_module_is_not_run(tmp_path, command, added):
     beside(tmp_path, *NAMES)

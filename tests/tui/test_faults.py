@@ -51,6 +51,7 @@ def test_page_lists_outcomes_of_an_sr785(tmp_path_factory):
     assert {outcome.source for outcome in made.values()} == {"confirmed-off"}
 
 
+@pytest.mark.slow
 def test_every_outcome_is_a_documented_one(outcomes):
     """In the table of the page. One test: its outcomes take long."""
     assert rows(written_outcomes() | outcomes) == written_rows()

@@ -33,6 +33,8 @@ def test_wrong_time_base_is_stated_first(factor):
     assert float(found[1]) == pytest.approx(factor, abs=0.03)
 
 
-@pytest.mark.parametrize("name", ["practice-01", "practice-02"])
+@pytest.mark.parametrize(
+    "name", [pytest.param("practice-01", marks=pytest.mark.long), "practice-02"]
+)
 def test_hidden_cause_is_no_wrong_time_base(name):
     assert "frequencies are likely" not in first_warning(name)

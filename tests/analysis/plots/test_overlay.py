@@ -93,7 +93,7 @@ def test_phase_noise_near_half_turn_shifts_nothing():
     assert np.abs(np.diff(drawn)).max() <= 225.0
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(
     st.lists(st.floats(-179.0, 179.0), min_size=8, max_size=8),
     st.floats(-720.0, 720.0),

@@ -73,7 +73,7 @@ def test_default_number_depends_on_date_and_data(report):
     assert report(other)[1].data["certificate"]["number"] not in numbers
 
 
-@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.text(st.characters(codec="utf-8"), min_size=1, max_size=20))
 def test_number_cannot_leave_the_style_sheet(text):
     from analysis.report.certificate import page_style

@@ -98,7 +98,7 @@ def test_operator_text_is_not_markup(report):
     assert "<script>alert(1)</script>" in page.text
 
 
-@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.text(), st.text())
 def test_markup_cannot_be_broken(text, other):
     whole = element("p", text, element("b", other), class_=text) + data_block({text: other}, "d")

@@ -62,7 +62,7 @@ def test_file_document_restores_the_signal():
             np.testing.assert_allclose(kept.phasors(), signal.phasors(), atol=1e-4)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(
     st.dictionaries(
         st.sampled_from(["kind", "period_s", "lines", "amplitude", "phase_deg", "more"]),

@@ -120,7 +120,7 @@ def responses(draw):
 
 
 @given(original=responses())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_writing_and_reading_lose_nothing(original, tmp_path_factory):
     path = tmp_path_factory.mktemp("csv") / "response.csv"
     write_response(original, path)
@@ -285,7 +285,7 @@ def test_falling_frequencies_need_a_downward_sweep(tmp_path, sweep):
 
 
 @given(content=st.binary(max_size=300) | st.text(max_size=300).map(str.encode))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_any_bytes_raise_only_file_errors(content, tmp_path_factory):
     path = tmp_path_factory.mktemp("csv") / "any.csv"
     path.write_bytes(content)
@@ -297,7 +297,7 @@ cells = st.one_of(st.floats().map(repr), st.integers().map(str), st.text(max_siz
 
 
 @given(row=st.lists(cells, min_size=4, max_size=6))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=75, deadline=None)
 def test_row_is_refused_or_read_as_written(row, tmp_path_factory):
     path = tmp_path_factory.mktemp("csv") / "row.csv"
     path.write_bytes((GOOD + "200,1.5,-5,12,0.1\n" + ",".join(row) + "\n").encode())

@@ -65,7 +65,7 @@ def tables(draw):
 
 
 @given(tables(), st.sampled_from([".csv", ".txt"]))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 def test_any_table_layout_is_right_or_refused(tmp_path_factory, table, suffix):
     path = tmp_path_factory.mktemp("t") / f"t{suffix}"
     path.write_bytes(table[0])

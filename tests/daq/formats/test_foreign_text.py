@@ -260,7 +260,7 @@ SMALL = SMALL[: SMALL.rindex(b"\n") + 1]
 
 
 @given(st.integers(0, len(SMALL) - 1), st.integers(0, 40), st.binary(max_size=4))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_no_damage_halves_a_table(tmp_path_factory, start, length, put):
     path = tmp_path_factory.mktemp("d") / "d.csv"
     damaged = SMALL[:start] + put + SMALL[start + length :]

@@ -32,10 +32,11 @@ except LashbenchError as error:
     [
         (".csv", 0),
         (".h5", 8192),
-        (".mat", 8192),
-        (".uff", 8192),
         *(pytest.param(suffix, 0, marks=pytest.mark.long) for suffix in (".h5", ".mat", ".uff")),
-        pytest.param(".csv", 8192, marks=pytest.mark.long),
+        *(
+            pytest.param(suffix, 8192, marks=pytest.mark.long)
+            for suffix in (".csv", ".mat", ".uff")
+        ),
     ],
 )
 def test_full_disk_keeps_old_file_with_message(tmp_path, suffix, limit):

@@ -20,7 +20,7 @@ from daq.frf import FrequencyResponse, PointFlag
 SUFFIXES = [".h5", ".mat", ".uff"]
 every_format = pytest.mark.parametrize("suffix", SUFFIXES)
 often = settings(
-    max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 
 
@@ -46,7 +46,10 @@ def test_file_of_many_rows_is_read_back(tmp_path, suffix):
     same(read_response(tmp_path / f"many{suffix}"), response)
 
 
-@every_format
+@pytest.mark.parametrize(
+    "suffix",
+    [SUFFIXES[0], *(pytest.param(one, marks=pytest.mark.long) for one in SUFFIXES[1:])],
+)
 def test_chained_conversions_lose_nothing(tmp_path, suffix):
     response = measured()
     path = tmp_path / "first.h5"
@@ -174,7 +177,9 @@ def test_damaged_file_is_refused_or_unchanged(tmp_path, suffix, data):
 
 
 @every_format
-@pytest.mark.parametrize("part", [0.2, 0.5, 0.9, 0.99])
+@pytest.mark.parametrize(
+    "part", [0.2, 0.99, *(pytest.param(one, marks=pytest.mark.long) for one in (0.5, 0.9))]
+)
 def test_a_cut_file_is_refused(tmp_path, suffix, part):
     path = tmp_path / f"cut{suffix}"
     write_response(measured(), path)

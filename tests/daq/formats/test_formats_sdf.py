@@ -112,7 +112,7 @@ def test_other_sdf_files_are_refused(tmp_path, changes, fault):
 
 
 @settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(data=st.data())
 def test_damage_never_ends_the_program(tmp_path, data):

@@ -178,7 +178,7 @@ def test_invalid_refinement_is_refused(refinement):
         refinement()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(
     st.lists(st.floats(100.0, 180.0), max_size=4),
     st.integers(17, 80),

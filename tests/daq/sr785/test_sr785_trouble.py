@@ -219,6 +219,7 @@ def test_phase_is_output_relative_to_input():
         assert math.isclose(math.atan2(point.gain.imag, point.gain.real), -0.7, abs_tol=1e-5)
 
 
+@pytest.mark.slow
 def test_another_instrument_is_refused():
     analyser = SR785(Loopback(bench_server.simulated("", LinearPlant(known_gain))), timing=SHORT)
     with pytest.raises(LashbenchError):

@@ -199,7 +199,7 @@ def test_writer_may_close_while_another_opens(whole, tmp_path, monkeypatch):
 
 
 @settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(data=st.data())
 def test_damaged_file_is_refused_or_read_whole(whole, tmp_path, data):

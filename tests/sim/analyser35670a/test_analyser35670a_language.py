@@ -270,7 +270,7 @@ ARGUMENTS = [
 ]  # fmt: skip
 
 
-@settings(max_examples=150, deadline=2000)
+@settings(max_examples=40, deadline=2000)
 @given(st.data())
 def test_message_neither_crashes_nor_hangs_simulator(data):
     instrument = Analyser35670A(LinearPlant(lambda hz: 0.1), Choices())
@@ -305,7 +305,7 @@ def test_message_neither_crashes_nor_hangs_simulator(data):
         assert talk.data == b'+0,"No error"\n'
 
 
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(st.text(st.characters(codec="ascii", exclude_characters="\n"), max_size=60))
 def test_every_refusal_has_listed_number(text):
     instrument = Analyser35670A(LinearPlant(lambda hz: 0.1), Choices())

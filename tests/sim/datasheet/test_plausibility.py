@@ -121,7 +121,7 @@ def scaled(size, template="two-stage"):
     return unit_from_mapping(document, source="here")
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(
     size=st.floats(0.2, 5.0),
     template=st.sampled_from(["one-stage", "two-stage"]),
@@ -148,7 +148,7 @@ SLIPS = [
 ]
 
 
-@settings(max_examples=60)
+@settings(max_examples=20)
 @given(size=st.floats(0.5, 2.0), slip=st.sampled_from(SLIPS))
 @example(size=1.0, slip=("J_L", 1e7))
 def test_unit_slip_is_refused_naming_its_value(size, slip):

@@ -170,7 +170,7 @@ def test_incomplete_effect_is_refused_with_its_line(line):
 
 
 @given(st.text(max_size=200))
-@settings(max_examples=60)
+@settings(max_examples=20)
 def test_any_text_is_effect_or_one_line(text):
     with pytest.raises(ConfigurationError) as refusal:
         # Behind a name that does not exist, so that no text does anything.

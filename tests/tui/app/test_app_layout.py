@@ -50,7 +50,8 @@ def judged():
 
 
 @pytest.mark.parametrize(
-    "size", [(80, 24), (140, 40), pytest.param((200, 60), marks=pytest.mark.long)]
+    "size",
+    [(80, 24), *(pytest.param(one, marks=pytest.mark.long) for one in ((140, 40), (200, 60)))],
 )
 def test_the_history_shows_every_answer_whole(db, size):
     async def way():

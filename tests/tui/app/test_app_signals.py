@@ -189,7 +189,9 @@ def driving(db, within_s=40.0):
         time.sleep(0.05)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, pytest.param(signal.SIGHUP, marks=pytest.mark.long)]
+)
 def test_signal_ends_screen_with_source_off(tmp_path, on_terminal, number):
     db = tmp_path / "bench.db"
     terminal = on_terminal(str(db), "sim:?ratio=0.3&seed=1")
@@ -264,6 +266,7 @@ def test_lost_terminal_with_source_on_exits_1(tmp_path, on_terminal):
     assert begun(db).source_state is SourceState.UNKNOWN
 
 
+@pytest.mark.slow
 def test_blocked_terminal_delays_no_signal_and_redraws(tmp_path, on_terminal):
     db, crowd = tmp_path / "bench.db", tmp_path / "bench.db-crowd"
     terminal = on_terminal(str(db), SLOW, program=CROWDED)
@@ -283,6 +286,7 @@ def test_blocked_terminal_delays_no_signal_and_redraws(tmp_path, on_terminal):
     assert begun(db).source_state is SourceState.CONFIRMED_OFF
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", ["ctrl+x", pytest.param("SIGTERM", marks=pytest.mark.long)])
 def test_source_stops_whatever_the_event_loop_does(tmp_path, on_terminal, way):
     db, stuck = tmp_path / "bench.db", tmp_path / "bench.db-stuck"

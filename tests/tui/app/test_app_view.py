@@ -233,7 +233,7 @@ def test_screen_is_complete_without_colour(tmp_path, monkeypatch):
     run(way)
 
 
-@pytest.mark.parametrize("size", [(60, 18), (80, 24)])
+@pytest.mark.parametrize("size", [(60, 18), pytest.param((80, 24), marks=pytest.mark.long)])
 def test_small_terminals_keep_banner_hint_and_keys(tmp_path, size):
     async def way():
         async with operated(tmp_path / "bench.db", size) as op:

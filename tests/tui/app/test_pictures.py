@@ -68,6 +68,7 @@ def test_pictures_match_result_and_diagnosis_screens(pictured):
     run(look)
 
 
+@pytest.mark.slow
 def test_the_sweep_is_pictured_with_todays_words(tmp_path):
     async def look():
         async with operated(tmp_path / "bench.db", SIZE) as op:

@@ -60,7 +60,7 @@ def shown(steps, size=(90, 30), **options):
     st.floats(-1e4, 1e4), st.floats(1e-4, 1e4), st.integers(4, 120),
     st.sampled_from([linear_scale, degree_scale, frequency_scale]),
 )  # fmt: skip
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_scale_covers_range_with_even_ticks(low, span, cells, scale):
     if scale is frequency_scale:
         low = abs(low) + 0.01
@@ -240,7 +240,7 @@ def test_band_ends_on_eighths_below_the_data():
     st.lists(st.floats(allow_nan=True, allow_infinity=True), min_size=2, max_size=8),
     st.booleans(),
 )
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_no_number_breaks_a_drawing(values, dashed):
     x, y = linear_scale(0.0, 10.0, 20), linear_scale(-1.0, 1.0, 6)
     canvas = Canvas(x, y, "#000000")

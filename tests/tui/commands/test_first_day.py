@@ -39,6 +39,7 @@ def test_all_checks_run_on_simulated_instruments(tmp_path, capsys, driver):
     assert first_day(url, tmp_path / "one") == 2
 
 
+@pytest.mark.slow
 def test_difference_names_the_setting_to_change(tmp_path, capsys):
     box = simulated("sr785", LinearPlant(known_gain), noise_v=1e-4)
     # An instrument whose displays lose their data when another quantity is chosen.

@@ -209,6 +209,7 @@ def test_unanswered_question_switches_source_off(monkeypatch, scheme, asks):
     assert box.driven_v == 0
 
 
+@pytest.mark.slow
 def test_pulled_cable_ends_with_clear_error(tmp_path):
     """Exit code 3; the report tells what is known of the source."""
     box = simulated("sr785", LinearPlant(known_gain))

@@ -79,7 +79,7 @@ def test_closed_input_writes_nothing():
         ask_for_values(template("two-stage"), lambda text: None, lambda: "")
 
 
-@settings(max_examples=30)
+@settings(max_examples=20)
 @given(st.lists(st.text(st.characters(exclude_characters="\n"), max_size=12), max_size=12))
 def test_any_input_gives_a_valid_unit_file(answers):
     assert unit_of(asked(answers)[0]).stages == 2

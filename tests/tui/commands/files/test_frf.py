@@ -287,7 +287,7 @@ def test_uneven_times_are_refused_unless_rounded(tmp_path):
         read_record(path, "a", "b", time_column="t")
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=20)
 @example(seed=194061, size=64, kind="sine")  # at half the sampling rate
 @given(
     st.integers(0, 2**31), st.integers(64, 3000),

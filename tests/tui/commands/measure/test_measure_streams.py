@@ -71,7 +71,7 @@ def test_blocked_terminal_delays_neither_session_nor_signal(tmp_path, stalled):
         assert store.measurement(document["id"]).source_state is SourceState.CONFIRMED_OFF
 
 
-@pytest.mark.parametrize("words", [(), ("--json",)])
+@pytest.mark.parametrize("words", [pytest.param((), marks=pytest.mark.long), ("--json",)])
 def test_closed_stdout_does_not_hide_error(tmp_path, words):
     reading, writing = os.pipe()
     os.close(reading)

@@ -209,6 +209,7 @@ def test_returning_adapter_is_found_again(tmp_path, capsys, wire):
         assert measure(db, url, "--resume", "1") == 0
 
 
+@pytest.mark.slow
 def test_later_proof_of_watchdog_is_reported(tmp_path, capsys):
     """The gateway is away for longer than the session waits."""
     db, away = tmp_path / "bench.db", "link-away:point=3,seconds=11"

@@ -129,7 +129,7 @@ def test_wrong_file_is_refused_before_driving(run, limits, tmp_path):
         assert (code, err.count("\n"), db.exists()) == (2, 1, False)
 
 
-@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.dictionaries(
     st.sampled_from(["r", "b1_deg", "arf_hz", "coverage_factor", "causes_not_tolerated", "x"]),
     st.one_of(st.floats(), st.text("ab'", max_size=3), st.booleans(),
