@@ -13,6 +13,7 @@ from analysis.inference.exclusion import list_unseen
 from daq.errors import AnalysisError
 from daq.plan import SweepPlan
 from sim.catalogue import CATALOGUE
+from sim.engine.effort import counting
 from sim.unit import load_unit
 
 LOAD, STIFF, GAIN = ("load-inertia",), ("shaft-stiffness",), ("amplifier-gain",)
@@ -256,12 +257,12 @@ def test_too_few_points_are_refused(frequencies, told):
         module._refuse_few(seen)
 
 
-def test_one_point_is_refused_before_simulation(monkeypatch):
-    monkeypatch.setattr(module, "refine", lambda *_, **__: pytest.fail("simulated"))
+def test_one_point_is_refused_before_simulation():
     response = makings.response()
     one = response.take(response.frequency_hz == response.frequency_hz[0])
-    with pytest.raises(AnalysisError, match="1 usable frequency"):
+    with counting() as effort, pytest.raises(AnalysisError, match="1 usable frequency"):
         module.diagnose_response(one, load_unit("adss"))
+    assert effort.simulated_s == 0.0
 
 
 @pytest.mark.parametrize(("frequencies", "warned"), [(8, True), (19, True), (20, False)])

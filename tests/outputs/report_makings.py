@@ -8,6 +8,7 @@ from worlds import synthetic
 from worlds.untrained import Untrained
 
 import analysis.diagnosis.diagnose as diagnosis_module
+import analysis.diagnosis.search as search_module
 from analysis.emulation.likelihood import TEMPERATURE
 from analysis.emulation.parameter_posterior import ParameterPosterior
 from analysis.inference.refine import Refined
@@ -100,7 +101,7 @@ def diagnosis(
     refined = Refined(candidates, posterior.summary(seen, {}), log_prior, log_odds)
     monkeypatch.setattr(diagnosis_module, "observe", lambda response: seen)
     monkeypatch.setattr(diagnosis_module, "Posterior", SimpleNamespace(find=lambda *_: posterior))
-    monkeypatch.setattr(diagnosis_module, "refine", lambda *_, **__: refined)
+    monkeypatch.setattr(search_module, "refine", lambda *_, **__: refined)
     monkeypatch.setattr(diagnosis_module, "propose_measurement", lambda *_, **__: None)
-    monkeypatch.setattr(diagnosis_module, "refine_parameters", sharpened)
+    monkeypatch.setattr(search_module, "refine_parameters", sharpened)
     return diagnosis_module.diagnose_response(response(), ADSS)
