@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from rules.own_names import found_in, patches, private_names
 
-LEFT = {patches: 35, private_names: 15}
+LEFT = {patches: 34, private_names: 15}
 """Of 174 and 69 once. Lower the number with every one that goes; put none in its place."""
 
 
