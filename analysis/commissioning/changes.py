@@ -108,10 +108,11 @@ class Changes:
     def likeliest(self) -> Causes | None:
         """The likeliest set of causes, empty where no more than the ratio has changed.
 
-        None where that holds values without a cause, or values leave more than they should.
+        None where that holds values without a cause, or more than one, as a cause that no value
+        stands for is likelier than two changes at once; and where values leave too much.
         """
         first = tuple(name for name in next(iter(self.probabilities)) if name != RATIO)
-        if any(name not in CATALOGUE for name in first):
+        if len(first) > 1 or any(name not in CATALOGUE for name in first):
             return None
         left = self.misfit_rank >= _UNLIKE and self.misfit > 1.0
         return None if left else first

@@ -62,6 +62,13 @@ def test_values_that_all_changed_are_no_cause():
     assert changes.likeliest is None
 
 
+def test_two_changes_at_once_are_no_cause():
+    """A cause that is no value is likelier, and left to the search."""
+    changes = of_linear_data(np.array([2.0, -2.0, 0.0]), np.full(3, 0.05))
+    assert next(iter(changes.probabilities)) == ("load-inertia", "motor-inertia")
+    assert changes.likeliest is None
+
+
 def test_what_values_leave_is_no_cause():
     known = of_linear_data(np.array([0.6, 0.0, 0.0]), np.full(3, 0.05))
     parts = (known.coordinates, known.prior, known.found, known.common, known.directions)
