@@ -32,7 +32,7 @@ from sim.unit import Unit
 Vector = NDArray[np.float64]
 Causes = tuple[str, ...]
 
-__all__ = ["Changed", "Changes", "find_changes"]
+__all__ = ["Changed", "Changes", "find_changes", "was_commissioned"]
 
 _CHANGE = 0.15
 """Standard deviation of the logarithm of a value that has changed."""
@@ -118,11 +118,15 @@ class Changes:
         return None if left else first
 
     def named(self) -> dict[Causes, float]:
-        """Probabilities of sets of causes of the catalogue; what has no name there adds nothing."""
+        """Probabilities of sets of causes of the catalogue, whatever the ratio is.
+
+        A value without a cause that changed as well is counted with them; one that changed alone is
+        left out.
+        """
         found: dict[Causes, float] = {}
         for names, probability in self.probabilities.items():
-            if names != _ALL:
-                key = tuple(name for name in names if name in CATALOGUE)
+            key = tuple(name for name in names if name in CATALOGUE)
+            if key or set(names) <= {RATIO}:
                 found[key] = found.get(key, 0.0) + probability
         return found
 
@@ -176,6 +180,14 @@ class Changes:
         return Gaussian(self.prior.mean + left @ pull, left)
 
 
+def was_commissioned(unit: Unit) -> bool:
+    """Whether a unit's file tells of its values, and of the ratio of two stages, all together."""
+    known = unit.commissioning
+    if known is None or (unit.stages == 2 and RATIO not in known.order):
+        return False
+    return bool(_coordinates(unit, known).symbols)
+
+
 def find_changes(
     unit: Unit,
     observation: Observation,
@@ -204,7 +216,7 @@ def find_changes(
         If the unit was not commissioned.
     """
     known = unit.commissioning
-    if known is None:
+    if known is None or not was_commissioned(unit):
         raise ValueError(f"unit {unit.name} was not commissioned")
     coordinates = _coordinates(unit, known)
     common = _common(coordinates, known)

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.commissioning.changes import find_changes
+from analysis.commissioning.changes import find_changes, was_commissioned
 from analysis.diagnosis.commissioned import answer_by_changes, corrected_by_changes
 from analysis.diagnosis.datasheet import learn_datasheet
 from analysis.diagnosis.experiment_design import NextMeasurement, propose_measurement
@@ -155,7 +155,7 @@ def _diagnose(
         )
     record = Record()
     changes = None
-    if unit.commissioning is not None:
+    if was_commissioned(unit):
         with record.stage("changes"):
             changes = find_changes(
                 unit, observed, without=without, seed=seed, executor=executor,

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import multivariate_normal
 from worlds.known_drive import commissioned, seen_again
 
-from analysis.commissioning.changes import Changes, find_changes
+from analysis.commissioning.changes import Changes, find_changes, was_commissioned
 from analysis.commissioning.coordinates import Coordinates
 from analysis.commissioning.regression import Gaussian
 from analysis.observation.observation import observe
@@ -57,6 +57,20 @@ def test_a_change_has_its_conditional_size():
     assert found.ratio == 1.0
 
 
+def test_values_without_a_cause_count_for_none():
+    """Probability of what the catalogue cannot name is no probability that nothing has changed."""
+    known = of_linear_data(np.array([0.6, 0.1, -0.05]), np.array([0.1, 0.2, 0.15]))
+    names = (("load-inertia",), ("J_s1",), ("contribution_ratio",))
+    directions = dict(zip(names, known.directions.values(), strict=True))
+    parts = (known.coordinates, known.prior, known.found, known.common)
+    changes = Changes(*parts, directions, 1.0, 0.5)
+    whole, named = changes.probabilities, changes.named()
+    assert named[()] == pytest.approx(whole[()] + whole[("contribution_ratio",)])
+    with_others = [p for names, p in whole.items() if "load-inertia" in names]
+    assert named[("load-inertia",)] == pytest.approx(sum(with_others))
+    assert set(named) == {(), ("load-inertia",)}
+
+
 def test_values_that_all_changed_are_no_cause():
     changes = of_linear_data(np.array([2.0, -2.0, 2.0]), np.full(3, 0.05))
     assert changes.likeliest is None
@@ -96,7 +110,24 @@ def test_a_tenth_of_one_value_is_named(changed, cause, seed):
         assert abs(off) < 3.0 * np.sqrt(told.covariance[1, 1])
 
 
-def test_unit_without_commissioning_is_refused():
+@pytest.mark.parametrize("order", [None, (), ("contribution_ratio",), ("nonsense",)])
+def test_unit_without_commissioned_values_is_refused(order):
     unit = load_unit("walkman-b11")
+    if order is not None:
+        known = commissioned("walkman-b11").commissioning
+        square = tuple(tuple(row) for row in np.eye(len(order)).tolist())
+        record = known.model_copy(update={"order": order, "covariance": square})
+        unit = unit.model_copy(update={"commissioning": record})
     with pytest.raises(ValueError, match="was not commissioned"):
         find_changes(unit, observe(seen_again(unit, 1)))
+
+
+def test_two_stages_need_their_ratio():
+    known = commissioned("adss")
+    assert not was_commissioned(known)
+    order = (*known.commissioning.order, "contribution_ratio")
+    square = tuple(tuple(row) for row in (1e-4 * np.eye(len(order))).tolist())
+    record = known.commissioning.model_copy(
+        update={"order": order, "covariance": square, "contribution_ratio": 0.5}
+    )
+    assert was_commissioned(known.model_copy(update={"commissioning": record}))
