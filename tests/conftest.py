@@ -10,6 +10,7 @@ import os
 import signal
 import subprocess
 import sys
+from itertools import islice
 
 import pytest
 from hypothesis import settings
@@ -34,10 +35,23 @@ def pytest_configure():
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+@pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items):
-    """Files with slow tests go first: at the end a core would wait for one of them alone."""
-    slow = {item.path for item in items if item.get_closest_marker("slow")}
-    items.sort(key=lambda item: item.path not in slow)
+    """Half of the workers begin with files of slow tests, which mostly wait; the others compute.
+
+    Each worker gets as many tests, in their order, and takes some of others over at the end, where
+    a core would wait for a slow one alone. The first ones get the tests of the analysis.
+    """
+    workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+    waiting = list(dict.fromkeys(i.path for i in items if i.get_closest_marker("slow")))
+    rest = iter([item for item in items if item.path not in waiting])
+    half, size = workers // 2, -(-len(items) // workers)
+    ordered = []
+    for worker in range(workers):
+        first = set(waiting[worker - half :: workers - half]) if worker >= half else set()
+        block = [item for item in items if item.path in first]
+        ordered += [*block, *islice(rest, max(size - len(block), 0))]
+    items[:] = [*ordered, *rest]
 
 
 def pytest_collection_finish():
