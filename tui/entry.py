@@ -7,7 +7,6 @@ none of another distribution in place of ours. It knows no verb.
 
 from __future__ import annotations
 
-import gc
 import os
 import sys
 
@@ -17,16 +16,12 @@ __all__ = ["main"]
 
 _REFUSED = 2
 _PACKAGES = ("daq", "sim", "analysis", "tui")
-_RARELY = 50_000
-"""Objects made between two searches for garbage; by Python's own 700 they take a tenth of a start,
-for what is loaded stays."""
 _MARK = b'__distribution__ = "lashbench"'
 """In the first lines of each of our packages."""
 
 
 def main() -> int:
     """Run the command line; its exit code."""
-    gc.set_threshold(_RARELY)
     _stand_in_for_closed_streams()
     fault = _keep_to_own_code()
     if fault is not None:

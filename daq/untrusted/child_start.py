@@ -6,7 +6,6 @@ folders of our packages and libraries are searched last. It refuses a module fro
 
 from __future__ import annotations
 
-import gc
 import os
 import sys
 from importlib.machinery import PathFinder
@@ -15,10 +14,6 @@ from pathlib import Path
 from runpy import run_module
 
 __all__ = ["main"]
-
-_RARELY = 50_000
-"""Objects made between two searches for garbage; by Python's own 700 they take a tenth of a start,
-for what is loaded stays."""
 
 
 def main(words: list[str]) -> None:
@@ -29,7 +24,6 @@ def main(words: list[str]) -> None:
     words
         Folders of libraries, with the system's separator; the module; the words for it.
     """
-    gc.set_threshold(_RARELY)
     root = Path(__file__).resolve().parents[2]
     places, *words = words
     for place in (str(root), *places.split(os.pathsep)):
