@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from analysis.commissioning.coordinates import RATIO, Coordinates
-from analysis.commissioning.identification import identify
-from analysis.commissioning.regression import Gaussian
+from analysis.commissioning.identification import Identified, identify
+from analysis.commissioning.regression import LEAST_STD, Gaussian
 from analysis.execution.executor import Executor
 from analysis.observation.observation import Observation
 from sim.catalogue import CATALOGUE, not_of_unit
@@ -37,9 +37,6 @@ __all__ = ["Changed", "Changes", "find_changes", "was_commissioned"]
 _CHANGE = 0.15
 """Standard deviation of the logarithm of a value that has changed."""
 
-_READ = 0.001
-"""A gain that is read again is known no better, as a share."""
-
 _NEAREST_END = 0.02
 """A contribution ratio is taken to be no nearer to 0 or 1 than this where it was identified."""
 
@@ -47,18 +44,14 @@ _PRIOR = (0.5, 0.35, 0.1)
 """Probability that no value has changed, that one has, and that two have; else all may have."""
 
 _ALL = ("all values",)
-_UNLIKE = 0.999
-"""Share of simulated drives that the values describe better than the one that was swept, from which
-on more than values has changed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Changed:
     """What is known if some causes, and no others, have changed values since commissioning.
 
-    `ratio`, `ratio_std`: contribution ratio. `changes`: of each cause, the logarithm of its value
-    over the commissioned one, with its standard deviation. `covariance` (1 + causes, square) of the
-    ratio and these logarithms.
+    `ratio`: contribution ratio. `changes` (causes,): the logarithm of each one's value over the
+    commissioned one. `covariance` (1 + causes, square) of the ratio and these logarithms.
     """
 
     ratio: float
@@ -70,18 +63,15 @@ class Changed:
 class Changes:
     """The posterior of all values, and what follows of each set of changes.
 
-    `prior`: of the coordinates, all changes allowed; `found`: their posterior. `common` (d, d):
-    covariance where nothing has changed. `misfit`, `misfit_rank`: see
-    `analysis.commissioning.identification.Identified`.
+    `prior`: of the coordinates, all changes allowed; `identified`: their posterior. `common`
+    (d, d): covariance where nothing has changed. `directions` (d,): see `_directions`.
     """
 
     coordinates: Coordinates
     prior: Gaussian
-    found: Gaussian
+    identified: Identified
     common: Vector
     directions: Mapping[Causes, Vector]
-    misfit: float
-    misfit_rank: float
 
     @cached_property
     def probabilities(self) -> dict[Causes, float]:
@@ -111,23 +101,24 @@ class Changes:
         None where that holds values without a cause, or more than one, as a cause that no value
         stands for is likelier than two changes at once; and where values leave too much.
         """
-        first = tuple(name for name in next(iter(self.probabilities)) if name != RATIO)
-        if len(first) > 1 or any(name not in CATALOGUE for name in first):
+        first = max(self._by_cause, key=self._by_cause.__getitem__)
+        if len(first) > 1 or first not in self.named() or self.identified.unlike:
             return None
-        left = self.misfit_rank >= _UNLIKE and self.misfit > 1.0
-        return None if left else first
+        return first
 
     def named(self) -> dict[Causes, float]:
-        """Probabilities of sets of causes of the catalogue, whatever the ratio is.
+        """Probabilities of sets of causes of the catalogue, whatever the ratio is."""
+        known = CATALOGUE.keys()
+        return {names: p for names, p in self._by_cause.items() if set(names) <= known}
 
-        A value without a cause that changed as well is counted with them; one that changed alone is
-        left out.
-        """
+    @cached_property
+    def _by_cause(self) -> dict[Causes, float]:
+        """The same whatever the ratio is, and whatever value without a cause changed as well."""
         found: dict[Causes, float] = {}
         for names, probability in self.probabilities.items():
-            key = tuple(name for name in names if name in CATALOGUE)
-            if key or set(names) <= {RATIO}:
-                found[key] = found.get(key, 0.0) + probability
+            causes = tuple(name for name in names if name in CATALOGUE)
+            key = causes or tuple(name for name in names if name != RATIO)
+            found[key] = found.get(key, 0.0) + probability
         return found
 
     def given(self, causes: Causes) -> Changed:
@@ -158,26 +149,27 @@ class Changes:
     @cached_property
     def _told(self) -> tuple[Vector, Vector]:
         """Information (d, d) of the data alone, and it times their mean (d,) from the prior's."""
-        posterior, prior = (np.linalg.inv(g.covariance) for g in (self.found, self.prior))
+        found = self.identified.posterior
+        posterior, prior = (np.linalg.inv(g.covariance) for g in (found, self.prior))
         sizes, ways = np.linalg.eigh(posterior - prior)
         information = (ways * np.maximum(sizes, 0.0)) @ ways.T
-        return information, posterior @ (self.found.mean - self.prior.mean)
+        return information, posterior @ (found.mean - self.prior.mean)
+
+    def _narrowed(self, covariance: Vector) -> tuple[Vector, float]:
+        """What the data leave of a prior's covariance (d, d), and half of what its volume loses."""
+        # (C^-1 + I)^-1 = C (1 + I C)^-1, which needs no inverse of a prior that is nearly exact.
+        inside = np.eye(len(covariance)) + self._told[0] @ covariance
+        left = covariance @ np.linalg.inv(inside)
+        return 0.5 * (left + left.T), 0.5 * float(np.linalg.slogdet(inside)[1])
 
     def _log_evidence(self, covariance: Vector) -> float:
         """Of a prior with this covariance (d, d), but for what all have in common."""
-        information, pull = self._told
-        # (C^-1 + I)^-1 = C (1 + I C)^-1, which needs no inverse of a prior that is nearly exact.
-        inside = np.eye(len(pull)) + information @ covariance
-        _, volume = np.linalg.slogdet(inside)
-        return float(0.5 * pull @ covariance @ np.linalg.solve(inside, pull) - 0.5 * volume)
+        pull, (left, lost) = self._told[1], self._narrowed(covariance)
+        return float(0.5 * pull @ left @ pull - lost)
 
     def _posterior(self, changed: Collection[Causes]) -> Gaussian:
-        information, pull = self._told
-        covariance = self._prior_of(changed)
-        inside = np.eye(len(pull)) + information @ covariance
-        left = covariance @ np.linalg.inv(inside)
-        left = 0.5 * (left + left.T)
-        return Gaussian(self.prior.mean + left @ pull, left)
+        left, _ = self._narrowed(self._prior_of(changed))
+        return Gaussian(self.prior.mean + left @ self._told[1], left)
 
 
 def was_commissioned(unit: Unit) -> bool:
@@ -225,9 +217,7 @@ def find_changes(
     found = identify(
         coordinates, observation, prior=prior, seed=seed, executor=executor, progress=progress
     )
-    return Changes(
-        coordinates, prior, found.posterior, common, directions, found.misfit, found.misfit_rank
-    )
+    return Changes(coordinates, prior, found, common, directions)
 
 
 def _coordinates(unit: Unit, known: Commissioning) -> Coordinates:
@@ -256,7 +246,7 @@ def _common(coordinates: Coordinates, known: Commissioning) -> Vector:
     slopes = coordinates.slopes(_centre(coordinates, known))
     found = np.array(known.covariance)[np.ix_(rows, rows)] / np.outer(slopes, slopes)
     sizes, ways = np.linalg.eigh(0.5 * (found + found.T))
-    return (ways * np.maximum(sizes, 0.0)) @ ways.T + np.diag((_READ / slopes) ** 2)
+    return (ways * np.maximum(sizes, 0.0)) @ ways.T + np.diag((LEAST_STD / slopes) ** 2)
 
 
 def _directions(

@@ -34,10 +34,6 @@ __all__ = ["Commissioned", "Parameter", "commission_drive", "sweep_identity"]
 DETERMINED = 0.7
 """A parameter counts as determined where its posterior is so much narrower than its prior."""
 
-_UNLIKE = 0.999
-"""Share of simulated drives that the parameters describe better than the one that was swept, from
-which on it is not the drive of the datasheet."""
-
 _FEWEST = 15
 """Frequencies without which parameters are fitted to noise."""
 
@@ -186,7 +182,7 @@ def commission_drive(
             progress=None if progress is None
             else lambda share: progress(share, "simulating drives like this one"),
         )  # fmt: skip
-    if found.misfit_rank >= _UNLIKE and found.misfit > 1.0:
+    if found.unlike:
         raise AnalysisError(
             f"no values within tolerance explain these sweeps: what is left is {found.misfit:.2g} "
             f"times that of simulated {unit.name} drives; diagnose the drive first, or give a "

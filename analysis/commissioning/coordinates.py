@@ -22,16 +22,16 @@ from sim.unit import Unit
 
 Vector = NDArray[np.float64]
 
-__all__ = ["BACKLASH", "RATIO", "Coordinates"]
+__all__ = ["RATIO", "Coordinates"]
 
 RATIO = "contribution_ratio"
 """Name of the contribution ratio among the coordinates."""
 
-BACKLASH = "b_t_deg"
+_BACKLASH = "b_t_deg"
 _BACKLASH_SPREAD = 0.5
 """Standard deviation of the logarithm of a total backlash that is unknown."""
 
-_FREE = ("T_f_m", "T_f_L", BACKLASH, RATIO)
+_FREE = ("T_f_m", "T_f_L", _BACKLASH, RATIO)
 """Parameters that leave the linear part alone: drives that differ in them are stepped together."""
 
 
@@ -60,12 +60,12 @@ class Coordinates:
         known = unit.parameters
         held = {s: share for s, share in unit.tolerances.items() if share > 0.0 < known[s]}
         if total_backlash_unknown:
-            if known[BACKLASH] == 0.0:
+            if known[_BACKLASH] == 0.0:
                 raise InputError(
                     f"unit {unit.name}: backlash.b_t_deg is 0, and a multiple of it would be 0, "
                     "too; write about how much it is to identify the total backlash"
                 )
-            held[BACKLASH] = _BACKLASH_SPREAD
+            held[_BACKLASH] = _BACKLASH_SPREAD
         if unit.stages == 2:
             held[RATIO] = float("nan")
         return cls(unit, tuple(held), tuple(held.values()))
@@ -105,8 +105,8 @@ class Coordinates:
         factors = dict(zip(self.symbols, self.factors(z).tolist(), strict=True))
         ratio = factors.pop(RATIO, 1.0)
         b_t_deg = None
-        if BACKLASH in factors:
-            b_t_deg = self.unit.backlash.b_t_deg * factors.pop(BACKLASH)
+        if _BACKLASH in factors:
+            b_t_deg = self.unit.backlash.b_t_deg * factors.pop(_BACKLASH)
         deviations = tuple((symbol, factor - 1.0) for symbol, factor in factors.items())
         return Machine(ratio, seed, b_t_deg, deviations)
 

@@ -26,6 +26,10 @@ _ROUNDS, _PER_COORDINATE, _LEAST = 6, 3, 12
 """Rounds, and families of each for every coordinate, at least so many; the last one, which settles
 the covariance, has twice as many."""
 
+_UNLIKE = 0.999
+"""Share of simulated drives that the values describe better than the one that was swept, from which
+on it is not such a drive."""
+
 _LANES = 5
 """Drives of a family: they share their linear part, so that five cost hardly more than one."""
 
@@ -42,6 +46,11 @@ class Identified:
     posterior: Gaussian
     misfit: float
     misfit_rank: float
+
+    @property
+    def unlike(self) -> bool:
+        """Whether what was swept is no such drive, whatever its values are."""
+        return self.misfit_rank >= _UNLIKE and self.misfit > 1.0
 
 
 def identify(

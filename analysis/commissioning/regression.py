@@ -18,7 +18,7 @@ from scipy.linalg import cho_factor, cho_solve, cholesky, eigh
 
 Vector = NDArray[np.float64]
 
-__all__ = ["Gaussian", "Regressed", "Round", "expected_std", "regress"]
+__all__ = ["LEAST_STD", "Gaussian", "Regressed", "Round", "expected_std", "regress"]
 
 _WIDER, _NARROWEST = 1.5, 0.35
 """Drives are drawn so much wider than the last round's posterior, as a regression says nothing
@@ -26,7 +26,7 @@ beyond the drives that it has seen; and in no direction narrower than this share
 as a response bends far from where it was linearised."""
 
 _FOLDS = 5
-_LEAST_STD = 1e-3
+LEAST_STD = 1e-3
 """Least residual of the logarithm of gain, and rad of phase: that of an analyser's own accuracy."""
 
 
@@ -178,7 +178,7 @@ class _ResponseModel:
         coefficients = np.linalg.lstsq(basis, y, rcond=None)[0]
         left = y - basis @ coefficients
         spare = max(len(x) - basis.shape[1], 1)
-        std = np.maximum(np.sqrt(np.sum(left**2, axis=0) / spare), _LEAST_STD)
+        std = np.maximum(np.sqrt(np.sum(left**2, axis=0) / spare), LEAST_STD)
         slopes: Vector = np.asarray(coefficients[1:], dtype=float)
         precision = (slopes / std**2) @ slopes.T
         return cls(coefficients[0], slopes, np.asarray(std), np.asarray(precision))

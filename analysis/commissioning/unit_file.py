@@ -15,15 +15,13 @@ from tomlkit.items import Table
 
 from analysis.commissioning.commission import Commissioned
 from analysis.commissioning.coordinates import RATIO
+from analysis.commissioning.regression import LEAST_STD
 from daq.untrusted.bounded_text import parse_toml
 from sim.drive.unit import NO_PHYSICS
 from sim.tolerance import DEFAULT, MOST
 from sim.unit import unit_from_mapping
 
 __all__ = ["commissioned_unit_text"]
-
-_LEAST_SHARE = 0.001
-"""Least tolerance that is written: an analyser's own gain is known no better."""
 
 _DIGITS = 6
 
@@ -65,7 +63,7 @@ def commissioned_unit_text(datasheet: str, found: Commissioned, name: str, today
         *((s, p.conditional) for s, p in identified.items() if s != "b_t_deg"),
     ]:
         if symbol not in exact:
-            kept = 0.0 if symbol == DEFAULT else min(max(share, _LEAST_SHARE), MOST)
+            kept = 0.0 if symbol == DEFAULT else min(max(share, LEAST_STD), MOST)
             tolerance.add(symbol, _rounded(kept))
     document.pop("tolerance", None)
     document.pop("commissioning", None)

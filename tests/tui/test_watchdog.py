@@ -7,17 +7,16 @@ which lives here.
 import os
 import shutil
 import signal
-import socket
 import subprocess
 import sys
-import threading
 import time
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from instruments.bench_server import linear_analyser, served, simulated, wires_of
 from instruments.fake_analyser import known_gain
+from instruments.single_gateway import one_at_a_time
 from worlds.frozen_files import can_be_held, started
 
 from daq.analyser import SourceState
@@ -211,52 +210,6 @@ def test_stopped_session_on_only_wire_is_ended(db):
         wait_for(lambda: notes(db, "watchdog"))
     assert "kept process" in notes(db, "watchdog")[0]
     assert source(db) is SourceState.CONFIRMED_OFF
-
-
-@contextmanager
-def one_at_a_time(url):
-    """A gateway that serves one connection, and refuses others while that one lasts."""
-    _, host, port, _ = url.split("::")
-    over = threading.Event()
-
-    def pump(one, other):
-        with suppress(OSError):
-            while data := one.recv(4096):
-                other.sendall(data)
-        for end in (one, other):
-            with suppress(OSError):
-                end.shutdown(socket.SHUT_RDWR)
-
-    def carry(client):
-        with client, socket.create_connection((host, int(port))) as behind:
-            back = threading.Thread(target=pump, args=(behind, client))
-            back.start()
-            pump(client, behind)
-            back.join()
-
-    def serve(gate):
-        busy = None
-        while not over.is_set():
-            with suppress(TimeoutError):
-                client, _ = gate.accept()
-                if busy is not None and busy.is_alive():
-                    client.close()
-                    continue
-                client.settimeout(None)
-                busy = threading.Thread(target=carry, args=(client,))
-                busy.start()
-        if busy is not None:
-            busy.join()
-
-    with socket.create_server(("127.0.0.1", 0)) as gate:
-        gate.settimeout(0.1)
-        thread = threading.Thread(target=serve, args=(gate,))
-        thread.start()
-        try:
-            yield f"TCPIP::127.0.0.1::{gate.getsockname()[1]}::SOCKET"
-        finally:
-            over.set()
-            thread.join()
 
 
 @needs_holding

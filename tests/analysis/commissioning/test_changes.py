@@ -1,5 +1,6 @@
 """Which values of a commissioned drive have changed, by closed form and in simulated drives."""
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -9,6 +10,7 @@ from worlds.known_drive import commissioned, seen_again
 
 from analysis.commissioning.changes import Changes, find_changes, was_commissioned
 from analysis.commissioning.coordinates import Coordinates
+from analysis.commissioning.identification import Identified
 from analysis.commissioning.regression import Gaussian
 from analysis.observation.observation import observe
 from sim.unit import load_unit
@@ -25,7 +27,7 @@ def of_linear_data(measured, noise):
     covariance = np.linalg.inv(information)
     found = Gaussian(covariance @ (measured / noise**2), covariance)
     directions = {(name,): way for name, way in zip(NAMES, np.eye(3), strict=True)}
-    return Changes(coordinates, prior, found, common, directions, 1.0, 0.5)
+    return Changes(coordinates, prior, Identified(found, 1.0, 0.5), common, directions)
 
 
 def test_probabilities_are_those_of_normal_densities():
@@ -62,13 +64,13 @@ def test_values_without_a_cause_count_for_none():
     known = of_linear_data(np.array([0.6, 0.1, -0.05]), np.array([0.1, 0.2, 0.15]))
     names = (("load-inertia",), ("J_s1",), ("contribution_ratio",))
     directions = dict(zip(names, known.directions.values(), strict=True))
-    parts = (known.coordinates, known.prior, known.found, known.common)
-    changes = Changes(*parts, directions, 1.0, 0.5)
+    changes = replace(known, directions=directions)
     whole, named = changes.probabilities, changes.named()
     assert named[()] == pytest.approx(whole[()] + whole[("contribution_ratio",)])
     with_others = [p for names, p in whole.items() if "load-inertia" in names]
     assert named[("load-inertia",)] == pytest.approx(sum(with_others))
     assert set(named) == {(), ("load-inertia",)}
+    assert changes.likeliest == max(named, key=named.get)
 
 
 def test_values_that_all_changed_are_no_cause():
@@ -85,8 +87,9 @@ def test_two_changes_at_once_are_no_cause():
 
 def test_what_values_leave_is_no_cause():
     known = of_linear_data(np.array([0.6, 0.0, 0.0]), np.full(3, 0.05))
-    parts = (known.coordinates, known.prior, known.found, known.common, known.directions)
-    assert Changes(*parts, 1.5, 1.0).likeliest is None
+    assert known.likeliest == ("load-inertia",)
+    found = Identified(known.identified.posterior, 1.5, 1.0)
+    assert replace(known, identified=found).likeliest is None
 
 
 @pytest.mark.parametrize(
