@@ -8,7 +8,7 @@ simulates nothing.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -22,16 +22,21 @@ from sim.unit import Unit
 
 Vector = NDArray[np.float64]
 
-__all__ = ["RATIO", "Coordinates"]
+__all__ = ["BACKLASH", "NOISE", "RATIO", "Coordinates"]
 
 RATIO = "contribution_ratio"
 """Name of the contribution ratio among the coordinates."""
 
-_BACKLASH = "b_t_deg"
+BACKLASH = "b_t_deg"
+"""Name of the total backlash."""
+
+NOISE = "reading_noise"
+"""Name of the reading noise among the coordinates: of the bench, not of the drive."""
+
 _BACKLASH_SPREAD = 0.5
 """Standard deviation of the logarithm of a total backlash that is unknown."""
 
-_FREE = ("T_f_m", "T_f_L", _BACKLASH, RATIO)
+_FREE = ("T_f_m", "T_f_L", BACKLASH, RATIO, NOISE)
 """Parameters that leave the linear part alone: drives that differ in them are stepped together."""
 
 
@@ -60,15 +65,19 @@ class Coordinates:
         known = unit.parameters
         held = {s: share for s, share in unit.tolerances.items() if share > 0.0 < known[s]}
         if total_backlash_unknown:
-            if known[_BACKLASH] == 0.0:
+            if known[BACKLASH] == 0.0:
                 raise InputError(
                     f"unit {unit.name}: backlash.b_t_deg is 0, and a multiple of it would be 0, "
                     "too; write about how much it is to identify the total backlash"
                 )
-            held[_BACKLASH] = _BACKLASH_SPREAD
+            held[BACKLASH] = _BACKLASH_SPREAD
         if unit.stages == 2:
             held[RATIO] = float("nan")
         return cls(unit, tuple(held), tuple(held.values()))
+
+    def with_noise(self, spread: float) -> Self:
+        """The same and the reading noise, last: a multiple exp(spread * z) of the observation's."""
+        return replace(self, symbols=(*self.symbols, NOISE), shares=(*self.shares, spread))
 
     def __len__(self) -> int:
         return len(self.symbols)
@@ -104,9 +113,10 @@ class Coordinates:
         """The machine at coordinates (d,)."""
         factors = dict(zip(self.symbols, self.factors(z).tolist(), strict=True))
         ratio = factors.pop(RATIO, 1.0)
+        factors.pop(NOISE, None)
         b_t_deg = None
-        if _BACKLASH in factors:
-            b_t_deg = self.unit.backlash.b_t_deg * factors.pop(_BACKLASH)
+        if BACKLASH in factors:
+            b_t_deg = self.unit.backlash.b_t_deg * factors.pop(BACKLASH)
         deviations = tuple((symbol, factor - 1.0) for symbol, factor in factors.items())
         return Machine(ratio, seed, b_t_deg, deviations)
 

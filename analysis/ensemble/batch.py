@@ -31,12 +31,14 @@ Readings = tuple[NDArray[np.complex128], NDArray[np.float64]]
 class Family:
     """Machines that share their linear part, and so fill the lanes of one call.
 
-    `rows` are where each plan's points stand among the rows of the readings.
+    `rows` are where each plan's points stand among the rows of the readings. `components`: see
+    `analysis.observation.observation.readings_of_cycles`.
     """
 
     unit: Unit
     machines: tuple[Machine, ...]
     plans: tuple[tuple[SweepPlan, NDArray[np.int64]], ...]
+    components: int = 2
 
 
 def read_family(family: Family) -> Readings:
@@ -61,7 +63,7 @@ def read_families(
     Parameters
     ----------
     families
-        All of them go through the same plans.
+        All of them go through the same plans, and are read alike.
     executor
         Where they are simulated; this machine's cores if not given.
     progress
@@ -98,6 +100,6 @@ def _read_together(families: Sequence[Family]) -> list[Readings]:
     for plan, rows in plans:
         for i, cycles in enumerate(safe_cycles(list(chain(*servos)), plan, workers=1)):
             first = cycles[..., 1].reshape(len(rows), -1)
-            mean[i, rows], variance[i, rows] = readings_of_cycles(first)
+            mean[i, rows], variance[i, rows] = readings_of_cycles(first, families[0].components)
     ends = np.cumsum([len(some) for some in servos])[:-1]
     return list(zip(np.split(mean, ends), np.split(variance, ends), strict=True))

@@ -68,7 +68,8 @@ class Observation:
     can be no more. `floor` (rows,): gain below which a point that drowned says nothing, 0
     elsewhere. `plans`: the sweep that a simulation must take, one for each
     set of levels that share their frequencies, with their rows. `quietest`: what the quietest
-    points show, as a share of the noise.
+    points show, as a share of the noise. `components`: 1 where all scatter was stated along the
+    gain alone; the channel counts both either way.
     """
 
     values: NDArray[np.float64]
@@ -80,6 +81,7 @@ class Observation:
     floor: NDArray[np.float64]
     plans: tuple[tuple[SweepPlan, NDArray[np.int64]], ...]
     quietest: float = 1.0
+    components: int = 2
 
     @property
     def blocks(self) -> tuple[slice, ...]:
@@ -191,6 +193,7 @@ def observe(*responses: FrequencyResponse) -> Observation:
         floor=floor,
         plans=plans,
         quietest=shown_noise(scatter * volts) / noise_v,
+        components=max(one.components for one in swept),
     )
 
 
@@ -222,6 +225,7 @@ class _Level:
     source_vpk: float
     readings: FrequencyResponse
     scatter: NDArray[np.float64]
+    components: int
 
 
 def _levels(number: int, response: FrequencyResponse) -> Iterator[_Level]:
@@ -250,7 +254,8 @@ def _levels(number: int, response: FrequencyResponse) -> Iterator[_Level]:
             scatter = readings.gain_std_db / DB_PER_NEPER * np.sqrt(2.0 / stated.components)
         least = least_v / (np.abs(readings.gain) * readings.source_vpk)
         scatter = np.where(scatter > 0, np.maximum(scatter, least), scatter)
-        yield _Level(number, float(source_vpk), readings, scatter)
+        counted = stated.components or 1
+        yield _Level(number, float(source_vpk), readings, scatter, counted)
 
 
 def _refuse_repeated(frequency_hz: NDArray[np.float64], source_vpk: float) -> None:
@@ -335,16 +340,22 @@ def _stretches(*columns: NDArray[np.float64]) -> tuple[slice, ...]:
 
 
 def readings_of_cycles(
-    coefficients: NDArray[np.complex128],
+    coefficients: NDArray[np.complex128], components: int = 2
 ) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
     """Mean (..., rows) of V_o/V_i over the cycles (..., rows, cycles), and its relative variance.
 
-    The variance is of the mean, over both components, and free of reading noise.
+    The variance is of the mean, over both components, and free of reading noise. With one of the
+    `components`, both are taken for as large as that along the gain.
     """
     cycles = coefficients.shape[-1]
     mean = coefficients.mean(axis=-1)
     mean = np.where(np.abs(mean) > 1e-30, mean, 1e-30)
-    spread = np.abs(coefficients - mean[..., None]) ** 2
+    apart = coefficients - mean[..., None]
+    if components == 1:
+        along = np.real(apart * np.conj(mean / np.abs(mean))[..., None])
+        spread = 2.0 * along**2
+    else:
+        spread = np.abs(apart) ** 2
     return mean, spread.sum(axis=-1) / max(cycles - 1, 1) / cycles / np.abs(mean) ** 2
 
 

@@ -45,6 +45,16 @@ def test_gain_only_error_is_half_the_scatter():
     )
 
 
+@pytest.mark.parametrize("components", [(1, 1), (1, 2), (2, 2)])
+def test_scatter_is_of_what_all_sweeps_state(components):
+    """Along the gain only where every sweep states it so."""
+    sweeps = [
+        response(levels=(level,), provenance={GAIN_STD_COMPONENTS: count})
+        for level, count in zip((1.5, 2.5), components, strict=True)
+    ]
+    assert observe(*sweeps).components == max(components)
+
+
 def test_rows_are_sorted_by_level_and_frequency():
     one = response()
     order = np.array([4, 1, 5, 0, 3, 2])
@@ -281,3 +291,16 @@ def test_simulated_channels_show_mean_scatter_and_noise():
     np.testing.assert_allclose(channels[1], np.angle(truth), atol=0.02)
     expected = np.sqrt(2 * 0.3**2 / cycles + 2 * noise**2)
     np.testing.assert_allclose(np.exp(channels[2]), expected, rtol=0.02)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4, 0.5 * np.pi])
+def test_scatter_along_the_gain_is_apart(angle):
+    """Oracle: cycles that lie on a line at an angle to the mean."""
+    gain, steps = 0.2 * np.exp(0.7j), np.array([-1.0, 0.0, 1.0, -2.0, 2.0])
+    cycles = gain * (1.0 + 0.01 * np.exp(1j * angle) * steps)[None]
+    of_mean = np.var(0.01 * steps, ddof=1) / len(steps)
+    mean, both = readings_of_cycles(cycles)
+    assert mean[0] == pytest.approx(gain)
+    assert both[0] == pytest.approx(of_mean)
+    _, along = readings_of_cycles(cycles, 1)
+    assert along[0] == pytest.approx(2.0 * of_mean * np.cos(angle) ** 2, abs=1e-18)
