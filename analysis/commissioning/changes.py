@@ -1,12 +1,12 @@
-"""Which values of a commissioned drive have changed since.
+"""Which values of a drive are other than commissioning, or its datasheet, says.
 
-Owns the comparison of changes of single values and of pairs, given what commissioning identified of
-all values together. It knows values alone: causes that no datasheet has a value of are the
-diagnosis's. It passes no verdict.
+Owns the comparison of changes of single values and of pairs, given what is believed of all values
+together. It knows values alone: causes that no datasheet has a value of are the diagnosis's. It
+passes no verdict.
 
 Method: the likelihood of all values is Gaussian where the regression of a commissioning ends. The
-evidence of each set of changes is then a closed form, with the prior as commissioning left it,
-widened along what has changed.
+evidence of each set of changes is then a closed form, with the belief as prior, widened along what
+has changed.
 """
 
 from __future__ import annotations
@@ -18,40 +18,37 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtr
 
-from analysis.commissioning.coordinates import RATIO, Coordinates
+from analysis.commissioning.belief import Belief
+from analysis.commissioning.coordinates import RATIO
 from analysis.commissioning.identification import Identified, identify
-from analysis.commissioning.regression import LEAST_STD, Gaussian
+from analysis.commissioning.regression import Gaussian
 from analysis.execution.executor import Executor
 from analysis.observation.observation import Observation
-from sim.catalogue import CATALOGUE, not_of_unit
-from sim.commissioning import Commissioning
+from sim.catalogue import CATALOGUE, EffectParameter, not_of_unit
 from sim.unit import Unit
 
 Vector = NDArray[np.float64]
 Causes = tuple[str, ...]
 
-__all__ = ["Changed", "Changes", "find_changes", "was_commissioned"]
-
-_CHANGE = 0.15
-"""Standard deviation of the logarithm of a value that has changed."""
-
-_NEAREST_END = 0.02
-"""A contribution ratio is taken to be no nearer to 0 or 1 than this where it was identified."""
+__all__ = ["Changed", "Changes", "find_changes"]
 
 _PRIOR = (0.5, 0.35, 0.1)
 """Probability that no value has changed, that one has, and that two have; else all may have."""
+
+_FREQUENCIES = 60
+"""Frequencies of each level that are simulated, or up to twice as many."""
 
 _ALL = ("all values",)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Changed:
-    """What is known if some causes, and no others, have changed values since commissioning.
+    """What is known if some causes, and no others, have changed values.
 
     `ratio`: contribution ratio. `changes` (causes,): the logarithm of each one's value over the
-    commissioned one. `covariance` (1 + causes, square) of the ratio and these logarithms.
+    believed one. `covariance` (1 + causes, square) of the ratio and these logarithms.
     """
 
     ratio: float
@@ -63,14 +60,13 @@ class Changed:
 class Changes:
     """The posterior of all values, and what follows of each set of changes.
 
-    `prior`: of the coordinates, all changes allowed; `identified`: their posterior. `common`
-    (d, d): covariance where nothing has changed. `directions` (d,): see `_directions`.
+    `prior`: of the coordinates, all changes allowed; `identified`: their posterior. `directions`
+    (d,): see `_directions`.
     """
 
-    coordinates: Coordinates
+    belief: Belief
     prior: Gaussian
     identified: Identified
-    common: Vector
     directions: Mapping[Causes, Vector]
 
     @cached_property
@@ -121,27 +117,36 @@ class Changes:
             found[key] = found.get(key, 0.0) + probability
         return found
 
+    @property
+    def shares(self) -> Vector:
+        """Change (d,) of the logarithm of each value by its coordinate; 0 of the ratio."""
+        return np.nan_to_num(np.array(self.belief.coordinates.shares))
+
+    def posterior(self, causes: Causes) -> Gaussian:
+        """Of all coordinates if these causes, and perhaps the ratio, changed."""
+        free = [one for one in self.directions if one == (RATIO,)]
+        left, _ = self._narrowed(self._prior_of([*free, *((name,) for name in causes)]))
+        return Gaussian(self.prior.mean + left @ self._told[1], left)
+
     def given(self, causes: Causes) -> Changed:
         """What the values are if these causes changed them; the ratio may have changed, too."""
         ways = [self.directions[(name,)] for name in causes]
-        free = [one for one in self.directions if one == (RATIO,)]
-        posterior = self._posterior([*free, *((name,) for name in causes)])
+        posterior = self.posterior(causes)
         before = self.prior.mean
-        c = self.coordinates
+        c = self.belief.coordinates
         ratio = np.array([symbol == RATIO for symbol in c.symbols])
-        shares = np.nan_to_num(np.array(c.shares))
         # Logarithm of each cause's value, as the mean over the values that it changes.
         rows = np.zeros((1 + len(ways), len(c)))
         rows[0] = np.where(ratio, c.slopes(posterior.mean), 0.0)
         for row, way in zip(rows[1:], ways, strict=True):
-            row[:] = way * shares / np.count_nonzero(way)
+            row[:] = (way != 0.0) * self.shares / np.count_nonzero(way)
         at = float(ndtr(posterior.mean[ratio][0])) if ratio.any() else 1.0
         return Changed(
             at, rows[1:] @ (posterior.mean - before), rows @ posterior.covariance @ rows.T
         )
 
     def _prior_of(self, changed: Collection[Causes]) -> Vector:
-        covariance = self.common.copy()
+        covariance = self.belief.common.copy()
         for one in changed:
             covariance += np.outer(self.directions[one], self.directions[one])
         return covariance
@@ -167,21 +172,9 @@ class Changes:
         pull, (left, lost) = self._told[1], self._narrowed(covariance)
         return float(0.5 * pull @ left @ pull - lost)
 
-    def _posterior(self, changed: Collection[Causes]) -> Gaussian:
-        left, _ = self._narrowed(self._prior_of(changed))
-        return Gaussian(self.prior.mean + left @ self._told[1], left)
-
-
-def was_commissioned(unit: Unit) -> bool:
-    """Whether a unit's file tells of its values, and of the ratio of two stages, all together."""
-    known = unit.commissioning
-    if known is None or (unit.stages == 2 and RATIO not in known.order):
-        return False
-    return bool(_coordinates(unit, known).symbols)
-
 
 def find_changes(
-    unit: Unit,
+    belief: Belief,
     observation: Observation,
     *,
     without: Collection[str] = (),
@@ -189,14 +182,14 @@ def find_changes(
     executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Changes:
-    """Compare changes of the values of a commissioned drive.
+    """Compare changes of the values of a drive.
 
     Parameters
     ----------
-    unit
-        As `analysis.commissioning` wrote it; its contribution ratio may be another one since.
+    belief
+        What is believed of its values if none has changed.
     observation
-        Later sweeps of it.
+        Sweeps of it.
     without
         Causes of the catalogue that are left out.
 
@@ -204,59 +197,28 @@ def find_changes(
     ------
     AnalysisError
         If a motion grew without bound.
-    ValueError
-        If the unit was not commissioned.
     """
-    known = unit.commissioning
-    if known is None or not was_commissioned(unit):
-        raise ValueError(f"unit {unit.name} was not commissioned")
-    coordinates = _coordinates(unit, known)
-    common = _common(coordinates, known)
-    directions = _directions(unit, coordinates, without)
-    prior = Gaussian(_centre(coordinates, known), common + np.eye(len(coordinates)))
+    directions = _directions(belief, without)
+    ratio = np.array([symbol == RATIO for symbol in belief.coordinates.symbols])
+    least = np.where(ratio, float(belief.ratio_known), 1.0)
+    widest = np.max([least, *(way**2 for way in directions.values())], axis=0)
+    prior = Gaussian(belief.centre, belief.common + np.diag(widest))
+    longest = max(block.stop - block.start for block in observation.blocks)
     found = identify(
-        coordinates, observation, prior=prior, seed=seed, executor=executor, progress=progress
-    )
-    return Changes(coordinates, prior, found, common, directions)
+        belief.coordinates, observation.thinned(max(longest // _FREQUENCIES, 1)),
+        prior=prior, seed=seed, executor=executor, progress=progress,
+    )  # fmt: skip
+    return Changes(belief, prior, found, directions)
 
 
-def _coordinates(unit: Unit, known: Commissioning) -> Coordinates:
-    values = unit.parameters
-    two = unit.stages == 2
-    symbols = [s for s in known.order if values.get(s, 0.0) > 0.0 or (s == RATIO and two)]
-    shares = [float("nan") if symbol == RATIO else _CHANGE for symbol in symbols]
-    return Coordinates(unit, tuple(symbols), tuple(shares))
-
-
-def _centre(coordinates: Coordinates, known: Commissioning) -> Vector:
-    """Coordinates (d,) as they were identified."""
-    ratio = 0.5 if known.contribution_ratio is None else known.contribution_ratio
-    at = float(ndtri(np.clip(ratio, _NEAREST_END, 1.0 - _NEAREST_END)))
-    return np.array([at if symbol == RATIO else 0.0 for symbol in coordinates.symbols])
-
-
-def _common(coordinates: Coordinates, known: Commissioning) -> Vector:
-    """Covariance (d, d) of the coordinates of a drive that has not changed.
-
-    A backlash that was not identified is exact, and takes no part: with that and the ratio open the
-    regression tells neither.
-    """
-    place = {symbol: i for i, symbol in enumerate(known.order)}
-    rows = [place[symbol] for symbol in coordinates.symbols]
-    slopes = coordinates.slopes(_centre(coordinates, known))
-    found = np.array(known.covariance)[np.ix_(rows, rows)] / np.outer(slopes, slopes)
-    sizes, ways = np.linalg.eigh(0.5 * (found + found.T))
-    return (ways * np.maximum(sizes, 0.0)) @ ways.T + np.diag((LEAST_STD / slopes) ** 2)
-
-
-def _directions(
-    unit: Unit, coordinates: Coordinates, without: Collection[str]
-) -> dict[Causes, Vector]:
+def _directions(belief: Belief, without: Collection[str]) -> dict[Causes, Vector]:
     """Standard deviation (d,) of the coordinates along what each cause changes.
 
     By the identifier of an effect that changes known values and nothing else; by its symbol of a
-    value that no effect changes, and of the contribution ratio.
+    value that no effect changes, and of a contribution ratio that was known.
     """
+    coordinates = belief.coordinates
+    unit = coordinates.unit
     place = {symbol: i for i, symbol in enumerate(coordinates.symbols)}
     foreign = {*not_of_unit(unit), *without}
     found: dict[Causes, Vector] = {}
@@ -269,14 +231,22 @@ def _directions(
         if not changed or not all(symbol in place for symbol in changed):
             continue
         told |= set(changed)
-        found[(effect.id,)] = _along(place, changed)
+        found[(effect.id,)] = _octaves(parameter, unit) * _along(place, changed)
     if unit.amplifier is not None:
         # With a current controller only the product of k_a and k_t shows.
         told.add("k_t")
+    if not belief.ratio_known:
+        told.add(RATIO)
     for symbol in place:
         if symbol not in told:
             found[(symbol,)] = _along(place, (symbol,))
     return found
+
+
+def _octaves(parameter: EffectParameter, unit: Unit) -> float:
+    """How many times a value may double within its plausible range: friction may more than mass."""
+    _, most = parameter.range(unit)
+    return max(float(np.log2(most / (parameter.nominal(unit) or 1.0))), 1.0)
 
 
 def _along(place: Mapping[str, int], symbols: Collection[str]) -> Vector:

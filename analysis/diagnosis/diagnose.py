@@ -16,8 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.commissioning.changes import find_changes, was_commissioned
-from analysis.diagnosis.commissioned import answer_by_changes, corrected_by_changes
+from analysis.commissioning.belief import (
+    Belief,
+    believed_by_datasheet,
+    believed_since_commissioning,
+)
+from analysis.commissioning.changes import find_changes
 from analysis.diagnosis.datasheet import learn_datasheet
 from analysis.diagnosis.experiment_design import NextMeasurement, propose_measurement
 from analysis.diagnosis.harmonics import compare_harmonics
@@ -26,6 +30,7 @@ from analysis.diagnosis.residuals import describe_residuals, find_residuals
 from analysis.diagnosis.result import Cause, Diagnosis, Size
 from analysis.diagnosis.search import search_catalogue
 from analysis.diagnosis.stages import Record
+from analysis.diagnosis.values import answer_by_values
 from analysis.emulation.fitted_model import FittedModel
 from analysis.emulation.parameter_posterior import ParameterPosterior
 from analysis.ensemble.datasheet_belief import HINT, believed_document, is_usually_off, trusts_much
@@ -54,7 +59,7 @@ _FEWEST, _FEW = 8, 20
 """Frequencies without which there is no diagnosis, and below which small causes hardly show."""
 
 _ASKED = 0.4
-"""Share of the work on a commissioned drive that asks what has changed."""
+"""Share of the work that asks which values are other than believed, where that is asked."""
 
 _RIVALS = 3
 """How many rivals the next measurement is to tell from what is named."""
@@ -154,23 +159,24 @@ def _diagnose(
             "lashbench prepare --unit FILE"
         )
     record = Record()
-    changes = None
-    if was_commissioned(unit):
+    changes, belief = None, _belief(unit, posterior)
+    if belief is not None:
         with record.stage("changes"):
             changes = find_changes(
-                unit, observed, without=without, seed=seed, executor=executor,
-                progress=part_of(progress, 0.0, _ASKED, "asking what has changed"),
+                belief, observed, without=without, seed=seed, executor=executor,
+                progress=part_of(progress, 0.0, _ASKED, "asking which values differ"),
             )  # fmt: skip
         progress = remaining(progress, _ASKED)
-    if changes is not None and changes.likeliest:
-        answer = answer_by_changes(changes, observed, unit, posterior, seed, executor, record)
-    else:
+    answer = None
+    if changes is None or not changes.likeliest:
         answer = search_catalogue(
             observed, unit, posterior, without, seed, executor, progress, record
         )
-        if changes is not None and changes.likeliest == () and answer.verdict.word == "unexplained":
-            # The search may be too coarse for a drive that is known well.
-            answer = corrected_by_changes(answer, changes)
+    if changes is not None and changes.likeliest is not None:
+        answer = answer_by_values(
+            changes, answer, observed, unit, posterior, seed, executor, record
+        )
+    assert answer is not None
     record.verdict = verdict = answer.verdict
     candidates, observation, summary = answer.candidates, answer.observation, answer.summary
     base, sharp, rng = answer.base, answer.sharp, answer.rng
@@ -191,6 +197,9 @@ def _diagnose(
     if progress is not None:
         progress(1.0, "done")
     accepted = verdict.word in ("consistent", "explained")
+    learned = answer.learned
+    if learned is None:
+        learned = learn_datasheet(verdict.best.candidate, best)
     return Diagnosis(
         unit=unit.name,
         verdict=verdict,
@@ -206,10 +215,20 @@ def _diagnose(
         unseen=unseen,
         models=models,
         believed=believed_document(unit),
-        datasheet=learn_datasheet(verdict.best.candidate, best) if accepted else (),
+        datasheet=learned if accepted else (),
         lent_by=posterior.lent_by,
         stages=tuple(record.stages),
     )
+
+
+def _belief(unit: Unit, posterior: Posterior) -> Belief | None:
+    """What is believed of the values, if these are asked first.
+
+    A posterior of the unit's own has learned what its values do; a borrowed one has not.
+    """
+    if unit.commissioning is not None:
+        return believed_since_commissioning(unit)
+    return believed_by_datasheet(unit) if posterior.lent_by else None
 
 
 def _causes(

@@ -17,6 +17,7 @@ from analysis.diagnosis.stages import Record
 from analysis.emulation.fitted_model import FittedModel
 from analysis.emulation.model_parameters import estimate_parameters, widen_if_open
 from analysis.emulation.parameter_posterior import ParameterPosterior
+from analysis.estimate.datasheet_posterior import DatasheetValue
 from analysis.execution.executor import Executor
 from analysis.execution.progress import Progress, part_of
 from analysis.inference.posterior import Posterior
@@ -36,7 +37,8 @@ class Answer:
 
     `base`, `sharp`: coordinates of the plain model and of the best set, None where that is no
     explanation. `summary` (1, hidden): what the network makes of the observation. `rng`: for what
-    is computed later.
+    is computed later. `learned`: what it says of the datasheet's values, None where that is to be
+    asked of the best set.
     """
 
     candidates: Sequence[FittedModel]
@@ -46,6 +48,7 @@ class Answer:
     base: ParameterPosterior
     sharp: ParameterPosterior | None
     rng: np.random.Generator
+    learned: tuple[DatasheetValue, ...] | None = None
 
 
 def search_catalogue(

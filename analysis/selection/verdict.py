@@ -27,6 +27,7 @@ __all__ = [
     "Judged",
     "Verdict",
     "Word",
+    "is_by_chance",
     "is_within_tolerance",
     "judge_candidates",
     "rank_behind",
@@ -157,7 +158,7 @@ def judge_candidates(
     judged = _ask(judged, rng)
     best = _simplest(judged)
     (baseline,) = (one for one in judged if not one.effects)
-    if best.effects and baseline.adequate and _may_be_chance(baseline, best, rng):
+    if best.effects and baseline.adequate and is_by_chance(baseline.candidate, best.candidate, rng):
         ahead = [one for one in judged if one.score > baseline.score]
         judged = rank_behind(judged, ahead, baseline, BY_CHANCE)
         best = baseline = next(one for one in judged if not one.effects)
@@ -175,12 +176,12 @@ def _simplest(judged: Sequence[Judged]) -> Judged:
     )
 
 
-def _may_be_chance(simpler: Judged, best: Judged, rng: np.random.Generator) -> bool:
+def is_by_chance(simpler: FittedModel, best: FittedModel, rng: np.random.Generator) -> bool:
     """Whether a set leads a simpler one as it does in runs of that one's own.
 
     These say nothing about an observation that is unlike them: the simpler one is adequate.
     """
-    return judge_chance(simpler.candidate, best.candidate, rng) > _BY_CHANCE
+    return judge_chance(simpler, best, rng) > _BY_CHANCE
 
 
 def _worth_judging(

@@ -32,7 +32,7 @@ def commissioned(name):
 
 
 def seen_again(unit, seed, effect=None, **factors):
-    """A later sweep of a drive of which some values are multiples of what they were.
+    """A sweep of a drive of which some values are multiples of what its unit says.
 
     `effect`: what it has besides, an identifier and its values.
     """

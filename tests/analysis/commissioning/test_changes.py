@@ -8,7 +8,12 @@ import pytest
 from scipy.stats import multivariate_normal
 from worlds.known_drive import commissioned, seen_again
 
-from analysis.commissioning.changes import Changes, find_changes, was_commissioned
+from analysis.commissioning.belief import (
+    Belief,
+    believed_by_datasheet,
+    believed_since_commissioning,
+)
+from analysis.commissioning.changes import Changes, find_changes
 from analysis.commissioning.coordinates import Coordinates
 from analysis.commissioning.identification import Identified
 from analysis.commissioning.regression import Gaussian
@@ -27,7 +32,8 @@ def of_linear_data(measured, noise):
     covariance = np.linalg.inv(information)
     found = Gaussian(covariance @ (measured / noise**2), covariance)
     directions = {(name,): way for name, way in zip(NAMES, np.eye(3), strict=True)}
-    return Changes(coordinates, prior, Identified(found, 1.0, 0.5), common, directions)
+    belief = Belief(coordinates, np.zeros(3), common, ratio_known=False)
+    return Changes(belief, prior, Identified(found, 1.0, 0.5), directions)
 
 
 def test_probabilities_are_those_of_normal_densities():
@@ -39,7 +45,7 @@ def test_probabilities_are_those_of_normal_densities():
     expected = {}
     for names, share in [*sets, (NAMES, 0.05)]:
         free = np.diag([1.0 if name in names else 0.0 for name in NAMES])
-        spread = changes.common + free + np.diag(noise**2)
+        spread = changes.belief.common + free + np.diag(noise**2)
         expected[names] = share * multivariate_normal(np.zeros(3), spread).pdf(measured)
     total = sum(expected.values())
     for names, _ in sets:
@@ -52,7 +58,7 @@ def test_a_change_has_its_conditional_size():
     measured, noise = np.array([0.6, 0.1, -0.05]), np.array([0.1, 0.2, 0.15])
     changes = of_linear_data(measured, noise)
     found = changes.given(("load-inertia",))
-    prior = changes.common + np.diag([1.0, 0.0, 0.0])
+    prior = changes.belief.common + np.diag([1.0, 0.0, 0.0])
     gain = prior @ np.linalg.inv(prior + np.diag(noise**2))
     assert found.changes[0] == pytest.approx(0.15 * (gain @ measured)[0])
     assert found.covariance[1, 1] == pytest.approx(0.15**2 * (prior - gain @ prior)[0, 0])
@@ -104,7 +110,8 @@ def test_what_values_leave_is_no_cause():
 def test_a_tenth_of_one_value_is_named(changed, cause, seed):
     """The likeliest of some 90 sets, for the right reason: its size is within three errors."""
     unit = commissioned("walkman-b11")
-    found = find_changes(unit, observe(seen_again(unit, seed, **changed)), seed=seed)
+    belief = believed_since_commissioning(unit)
+    found = find_changes(belief, observe(seen_again(unit, seed, **changed)), seed=seed)
     assert found.likeliest == cause
     if cause:
         told = found.given(cause)
@@ -113,24 +120,81 @@ def test_a_tenth_of_one_value_is_named(changed, cause, seed):
         assert abs(off) < 3.0 * np.sqrt(told.covariance[1, 1])
 
 
+OFF = {"J_m": 0.93, "J_L": 1.06, "k_s1": 1.07, "T_f_m": 1.08, "k_a": 0.95, "c_s1": 0.95}
+"""Values that are off their datasheet by one to one and a half standard deviations of 5 %."""
+
+
+@pytest.mark.parametrize(
+    ("changed", "cause", "seed"),
+    [
+        ({"b_t_deg": 2.0}, ("total-backlash",), 1),
+        pytest.param({}, (), 2, marks=pytest.mark.long),
+        pytest.param({"b_t_deg": 0.5}, ("total-backlash",), 3, marks=pytest.mark.long),
+        pytest.param({"J_L": 1.4}, ("load-inertia",), 4, marks=pytest.mark.long),
+        pytest.param({"T_f_m": 2.5}, ("motor-coulomb-friction",), 5, marks=pytest.mark.long),
+    ],
+)
+def test_a_value_beyond_its_tolerance_is_named(changed, cause, seed):
+    """Though all others are off, too: its size is within three errors, and of the right sign."""
+    unit = load_unit("walkman-b11").with_tolerance({"default": 0.05})
+    factors = OFF | {symbol: OFF.get(symbol, 1.0) * factor for symbol, factor in changed.items()}
+    found = find_changes(
+        believed_by_datasheet(unit), observe(seen_again(unit, seed, **factors)), seed=seed
+    )
+    assert found.likeliest == cause
+    if cause:
+        told = found.given(cause)
+        (symbol,) = changed
+        off = told.changes[0] - np.log(factors[symbol])
+        assert abs(off) < 3.0 * np.sqrt(told.covariance[1, 1])
+
+
+def test_datasheet_is_believed_by_its_tolerances():
+    """Each value by itself; the backlash of one stage is exact, and may have changed."""
+    unit = load_unit("r3-1").with_tolerance({"default": 0.0, "J_L": 0.06, "T_f_m": 0.3})
+    belief = believed_by_datasheet(unit)
+    shares = np.array(belief.coordinates.shares)
+    stds = dict(
+        zip(belief.coordinates.symbols, shares * np.sqrt(np.diag(belief.common)), strict=True)
+    )
+    assert stds == pytest.approx({"J_L": 0.06, "T_f_m": 0.3, "b_t_deg": 1e-3})
+    assert np.count_nonzero(belief.common) == len(stds)
+    assert not belief.centre.any()
+
+
+def test_two_stages_have_any_ratio():
+    belief = believed_by_datasheet(load_unit("adss").with_tolerance({"default": 0.05}))
+    assert belief.coordinates.symbols[-1] == "contribution_ratio"
+    assert belief.common[-1, -1] == pytest.approx(1.0)
+    assert not belief.ratio_known
+    assert "b_t_deg" not in belief.coordinates.symbols
+
+
+@pytest.mark.parametrize("name", ["adss", "r3-1"])
+def test_exact_datasheet_leaves_nothing_to_ask(name):
+    unit = load_unit(name).with_tolerance(dict.fromkeys(load_unit(name).tolerances, 0.0))
+    assert believed_by_datasheet(unit) is None
+
+
 @pytest.mark.parametrize("order", [None, (), ("contribution_ratio",), ("nonsense",)])
-def test_unit_without_commissioned_values_is_refused(order):
+def test_unit_without_commissioned_values_has_none(order):
     unit = load_unit("walkman-b11")
     if order is not None:
         known = commissioned("walkman-b11").commissioning
         square = tuple(tuple(row) for row in np.eye(len(order)).tolist())
         record = known.model_copy(update={"order": order, "covariance": square})
         unit = unit.model_copy(update={"commissioning": record})
-    with pytest.raises(ValueError, match="was not commissioned"):
-        find_changes(unit, observe(seen_again(unit, 1)))
+    assert believed_since_commissioning(unit) is None
 
 
 def test_two_stages_need_their_ratio():
     known = commissioned("adss")
-    assert not was_commissioned(known)
+    assert believed_since_commissioning(known) is None
     order = (*known.commissioning.order, "contribution_ratio")
     square = tuple(tuple(row) for row in (1e-4 * np.eye(len(order))).tolist())
     record = known.commissioning.model_copy(
         update={"order": order, "covariance": square, "contribution_ratio": 0.5}
     )
-    assert was_commissioned(known.model_copy(update={"commissioning": record}))
+    told = believed_since_commissioning(known.model_copy(update={"commissioning": record}))
+    assert told is not None
+    assert told.ratio_known

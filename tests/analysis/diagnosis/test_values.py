@@ -1,4 +1,4 @@
-"""Diagnoses of drives that were commissioned: what has changed since."""
+"""Diagnoses of drives that were commissioned, or are known by a datasheet with tolerances alone."""
 
 import json
 
@@ -6,6 +6,7 @@ import pytest
 from worlds.known_drive import commissioned, seen_again
 
 from analysis.diagnosis import diagnose_response
+from sim.unit import load_unit
 
 
 @pytest.mark.parametrize(
@@ -29,6 +30,42 @@ def test_diagnosis_names_the_changed_value(symbol, factor, effect):
     assert size["datasheet"] == unit.parameters[symbol]
     assert document["info"][0]["stage"] == "changes"
     assert any(effect in line for line in found.summary())
+
+
+OFF = {"J_m": 0.93, "J_L": 1.06, "k_s1": 1.07, "T_f_m": 1.08, "k_a": 0.95, "c_s1": 0.95}
+"""Values that are off their datasheet by one to one and a half standard deviations of 5 %."""
+
+
+@pytest.mark.parametrize(
+    ("factor", "seed"),
+    [(2.0, 1), pytest.param(0.5, 2, marks=pytest.mark.long)],
+)
+def test_backlash_is_named_on_any_datasheet(factor, seed):
+    """Alone, within three errors, though the other values are off as far as tolerances allow.
+
+    The answer tells of these values, too.
+    """
+    unit = load_unit("walkman-b11").with_tolerance({"default": 0.05})
+    found = diagnose_response(seen_again(unit, seed, b_t_deg=factor, **OFF), unit).to_json()
+    assert found["verdict"] == "explained"
+    (cause,) = found["causes"]
+    assert cause["effect"] == "total-backlash"
+    size = cause["parameters"]["b_t_deg"]
+    assert abs(size["value"] - factor * unit.backlash.b_t_deg) < 3.0 * size["std"]
+    told = found["datasheet"]
+    assert {"k_s1", "J_L"} <= {symbol for symbol, one in told.items() if one["determined"]}
+    for symbol, share in OFF.items():
+        true = share * unit.parameters[symbol]
+        assert abs(told[symbol]["value"] - true) < 3.5 * told[symbol]["std"]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [3, 4])
+def test_values_within_tolerance_are_no_cause(seed):
+    unit = load_unit("walkman-b11").with_tolerance({"default": 0.05})
+    found = diagnose_response(seen_again(unit, seed, **OFF), unit)
+    assert found.verdict.word == "consistent"
+    assert found.to_json()["datasheet"]["k_s1"]["determined"]
 
 
 @pytest.mark.long
