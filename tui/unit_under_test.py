@@ -18,7 +18,14 @@ if TYPE_CHECKING:
     from sim.unit import Unit
     from tui.text.output import Console
 
-__all__ = ["USUAL_MIN", "checked_minutes", "read_unit", "unit_title", "within_bench"]
+__all__ = [
+    "USUAL_MIN",
+    "checked_minutes",
+    "ratio_of_unit",
+    "read_unit",
+    "unit_title",
+    "within_bench",
+]
 
 USUAL_MIN = 5.0
 """Time at the bench, where none is given."""
@@ -39,6 +46,22 @@ def unit_title(out: Path, name: str | None) -> str:
     if not title.strip() or len(title) > _LONGEST_TITLE or not title.isprintable():
         raise InputError(f"unit name {title!r}: give 1 to {_LONGEST_TITLE} characters on one line")
     return title
+
+
+def ratio_of_unit(unit: Unit, ratio: float | None) -> float:
+    """The contribution ratio that a person gave, which a drive with one stage needs not.
+
+    Raises
+    ------
+    InputError
+        If a drive with two stages was given none.
+    """
+    if ratio is None and unit.stages == 2:
+        raise InputError(
+            f"--ratio is missing: unit {unit.name} has two stages; give the share of stage 1 in "
+            "the total backlash, 0 to 1"
+        )
+    return 1.0 if ratio is None else ratio
 
 
 def read_unit(

@@ -14,7 +14,7 @@ from cyclopts import Parameter
 from daq.errors import InputError
 from tui.options import Real, UnitName, Whole
 from tui.text.output import Injected
-from tui.unit_under_test import read_unit
+from tui.unit_under_test import ratio_of_unit, read_unit
 
 __all__ = ["serve"]
 
@@ -24,7 +24,7 @@ _PORTS = range(65536)
 def serve(
     *,
     unit: UnitName,
-    ratio: Real,
+    ratio: Real | None = None,
     effect: list[str] | None = None,
     tcp: Annotated[Whole | None, Parameter(help="The analyser's language on this port.")] = None,
     prologix_tcp: Annotated[Whole | None, Parameter(help="An adapter on this port.")] = None,
@@ -49,7 +49,7 @@ def serve(
     Parameters
     ----------
     ratio
-        Contribution ratio of stage 1 to the total backlash, 0 to 1.
+        Contribution ratio of stage 1 to the total backlash, 0 to 1; not needed with one stage.
     effect
         Extension of the model, ID:param=value[,param=value]; repeat it for several.
     tcp
@@ -108,7 +108,8 @@ def serve(
         raise InputError(f"--options {options}: model {kind.name} lists no options")
     faults = [kind.parse_fault(text) for text in fault or []]
     effects = tuple(parse_effect(text) for text in effect or [])
-    servo = SteppedServo(read_unit(unit, console), ratio, effects, seed=seed)
+    subject = read_unit(unit, console)
+    servo = SteppedServo(subject, ratio_of_unit(subject, ratio), effects, seed=seed)
     # The first dwell may compile the engine, for longer than a client waits for a reply.
     servo.dwell(1000.0, 1.0, 0.0, 0, 1)
     servo.rest()

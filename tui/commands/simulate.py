@@ -15,7 +15,7 @@ from cyclopts import Parameter
 from daq.errors import InputError
 from tui.options import Real, UnitName, Whole, parameter_settings
 from tui.text.output import Injected
-from tui.unit_under_test import read_unit
+from tui.unit_under_test import ratio_of_unit, read_unit
 
 __all__ = ["simulate"]
 
@@ -28,7 +28,7 @@ _LONGEST_S = 1e5
 def simulate(
     *,
     unit: UnitName,
-    ratio: Real,
+    ratio: Real | None = None,
     level: list[Real],
     start: Real,
     stop: Real,
@@ -53,7 +53,7 @@ def simulate(
     Parameters
     ----------
     ratio
-        Contribution ratio of stage 1 to the total backlash, 0 to 1.
+        Contribution ratio of stage 1 to the total backlash, 0 to 1; not needed with one stage.
     level
         Source level in V peak, of other signals that of a sine of the same rms; repeat it for
         several.
@@ -111,6 +111,7 @@ def simulate(
             f"{_MOST_CYCLES} cycles; give fewer"
         )
     subject = read_unit(unit, console, settings=parameter_settings(set_ or []))
+    contribution = ratio_of_unit(subject, ratio)
     plan = SweepPlan(
         frequencies_hz=spaced_frequencies(start, stop, points, spacing),
         levels_vpk=tuple(level),
@@ -138,7 +139,7 @@ def simulate(
     )
     began = time.perf_counter()
     response = simulated(
-        subject, ratio, plan, effects=effects, seed=seed, progress=console.progress
+        subject, contribution, plan, effects=effects, seed=seed, progress=console.progress
     )
     write_response(response, out)
     console.note(f"wrote {out} after {time.perf_counter() - began:.1f} s")

@@ -137,3 +137,19 @@ def test_dc_offset_acts_and_is_recorded(tmp_path):
     assert (plain.dc_offset_v, leaning.dc_offset_v) == (0.0, 1.5)
     # The mean of the output follows the motor's, which turns one way now.
     assert np.max(np.abs(leaning.gain - plain.gain)) > 0.01 * np.max(np.abs(plain.gain))
+
+
+def test_ratio_is_needed_of_two_stages(tmp_path, capsys):
+    """With one stage it can only be 1: the response is the same to the last bit."""
+    words = [*SWEEP.replace("--ratio 0.5 ", "").split(), "--level", "2"]
+    assert main([*words, "--out", str(tmp_path / "two.csv")]) == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert "--ratio" in line
+    assert "two stages" in line
+    assert not (tmp_path / "two.csv").exists()
+    words[words.index("adss")] = "r3-1"
+    gains = []
+    for name, ratio in (("a.csv", []), ("b.csv", ["--ratio", "1"])):
+        assert main([*words, *ratio, "--out", str(tmp_path / name)]) == 0
+        gains.append(read_response(tmp_path / name).gain)
+    np.testing.assert_array_equal(*gains)
