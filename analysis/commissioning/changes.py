@@ -37,6 +37,9 @@ __all__ = ["Changed", "Changes", "find_changes"]
 _PRIOR = (0.5, 0.35, 0.1)
 """Probability that no value has changed, that one has, and that two have; else all may have."""
 
+_NEAR = 0.5
+"""Share of a probability that differs from it by no more than two draws of simulated drives do."""
+
 _FREQUENCIES = 60
 """Frequencies of each level that are simulated, or up to twice as many."""
 
@@ -95,10 +98,15 @@ class Changes:
         """The likeliest set of causes, empty where no more than the ratio has changed.
 
         None where that holds values without a cause, or more than one, as a cause that no value
-        stands for is likelier than two changes at once; and where values leave too much.
+        stands for is likelier than two changes at once; and where values leave too much. Of two
+        that are hardly likelier than one of them it is that one.
         """
-        first = max(self._by_cause, key=self._by_cause.__getitem__)
-        if len(first) > 1 or first not in self.named() or self.identified.unlike:
+        believed, named = self._by_cause, self.named()
+        first = max(believed, key=believed.__getitem__)
+        near = [(one,) for one in first if believed.get((one,), 0.0) > _NEAR * believed[first]]
+        if len(first) > 1 and near:
+            first = max(near, key=believed.__getitem__)
+        if len(first) > 1 or first not in named or self.identified.unlike:
             return None
         return first
 

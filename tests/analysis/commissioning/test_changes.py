@@ -91,6 +91,15 @@ def test_two_changes_at_once_are_no_cause():
     assert changes.likeliest is None
 
 
+def test_a_change_beside_a_doubtful_one_counts():
+    """Two that are hardly likelier than one of them are no reason to name neither."""
+    changes = of_linear_data(np.array([2.0, -0.42, 0.0]), np.full(3, 0.05))
+    pair, single = ("load-inertia", "motor-inertia"), ("load-inertia",)
+    believed = changes.probabilities
+    assert believed[single] < believed[pair] < 2.0 * believed[single]
+    assert changes.likeliest == single
+
+
 def test_what_values_leave_is_no_cause():
     known = of_linear_data(np.array([0.6, 0.0, 0.0]), np.full(3, 0.05))
     assert known.likeliest == ("load-inertia",)
