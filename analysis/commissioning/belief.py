@@ -23,8 +23,7 @@ Vector = NDArray[np.float64]
 __all__ = ["CHANGE", "Belief", "believed_by_datasheet", "believed_since_commissioning"]
 
 CHANGE = 0.15
-"""Standard deviation of the logarithm of a value that has changed and may no more than double; one
-coordinate of a belief."""
+"""Standard deviation of the logarithm of a value that has changed; one coordinate of a belief."""
 
 _NEAREST_END = 0.02
 """A contribution ratio is taken to be no nearer to 0 or 1 than this where it was identified."""
@@ -34,14 +33,14 @@ _NEAREST_END = 0.02
 class Belief:
     """The normal distribution of the values of a drive of which nothing has changed.
 
-    `centre` (d,) and `common` (d, d): mean and covariance of the coordinates. `ratio_known`:
-    whether the contribution ratio is believed to be what it was.
+    `centre` (d,) and `common` (d, d): mean and covariance of the coordinates. `commissioned`:
+    whether a commissioning told them, and the contribution ratio of two stages, too.
     """
 
     coordinates: Coordinates
     centre: Vector
     common: Vector
-    ratio_known: bool
+    commissioned: bool
 
 
 def believed_since_commissioning(unit: Unit) -> Belief | None:
@@ -59,7 +58,7 @@ def believed_since_commissioning(unit: Unit) -> Belief | None:
         return None
     coordinates = _of_changes(unit, symbols)
     centre = _centre(coordinates, known)
-    return Belief(coordinates, centre, _covariance(coordinates, centre, known), two)
+    return Belief(coordinates, centre, _covariance(coordinates, centre, known), True)
 
 
 def believed_by_datasheet(unit: Unit) -> Belief | None:

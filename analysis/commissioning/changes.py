@@ -208,7 +208,7 @@ def find_changes(
     """
     directions = _directions(belief, without)
     ratio = np.array([symbol == RATIO for symbol in belief.coordinates.symbols])
-    least = np.where(ratio, float(belief.ratio_known), 1.0)
+    least = np.where(ratio, float(belief.commissioned), 1.0)
     widest = np.max([least, *(way**2 for way in directions.values())], axis=0)
     prior = Gaussian(belief.centre, belief.common + np.diag(widest))
     longest = max(block.stop - block.start for block in observation.blocks)
@@ -239,11 +239,12 @@ def _directions(belief: Belief, without: Collection[str]) -> dict[Causes, Vector
         if not changed or not all(symbol in place for symbol in changed):
             continue
         told |= set(changed)
-        found[(effect.id,)] = _octaves(parameter, unit) * _along(place, changed)
+        size = 1.0 if belief.commissioned else _octaves(parameter, unit)
+        found[(effect.id,)] = size * _along(place, changed)
     if unit.amplifier is not None:
         # With a current controller only the product of k_a and k_t shows.
         told.add("k_t")
-    if not belief.ratio_known:
+    if not belief.commissioned:
         told.add(RATIO)
     for symbol in place:
         if symbol not in told:
@@ -252,7 +253,10 @@ def _directions(belief: Belief, without: Collection[str]) -> dict[Causes, Vector
 
 
 def _octaves(parameter: EffectParameter, unit: Unit) -> float:
-    """How many times a value may double within its plausible range: friction may more than mass."""
+    """How many times a value may double within its plausible range: friction may more than mass.
+
+    By so much more a datasheet may be off. What changes after commissioning begins small.
+    """
     _, most = parameter.range(unit)
     return max(float(np.log2(most / (parameter.nominal(unit) or 1.0))), 1.0)
 

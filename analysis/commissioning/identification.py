@@ -27,11 +27,11 @@ _ROUNDS, _PER_COORDINATE, _LEAST = 6, 3, 12
 """Rounds, and families of each for every coordinate, at least so many; the last one, which settles
 the covariance, has twice as many."""
 
-_UNLIKE, _LARGE = 0.999, 2.0
+_UNLIKE, _LEAST_MISFIT, _LARGE = 0.999, 1.5, 2.0
 """Share of simulated drives that the values describe better than the one that was swept, from which
-on it is not such a drive; nor is it with a misfit this large. Of 50 drives whose values explain
-their sweep it is 1.2 at most, of one with a load that swings 4.5, which a few simulated drives that
-lie far out have, too."""
+on it is not such a drive if its misfit is at least this; nor is it with a misfit this large. Of 50
+drives whose values explain their sweep it is 1.2 at most, which widens the errors; of one with a
+load that swings 4.5, which a few simulated drives that lie far out have, too."""
 
 _LANES = 5
 """Drives of a family: they share their linear part, so that five cost hardly more than one."""
@@ -53,7 +53,7 @@ class Identified:
     @property
     def unlike(self) -> bool:
         """Whether what was swept is no such drive, whatever its values are."""
-        return self.misfit > (1.0 if self.misfit_rank >= _UNLIKE else _LARGE)
+        return self.misfit > (_LEAST_MISFIT if self.misfit_rank >= _UNLIKE else _LARGE)
 
 
 def identify(
