@@ -8,5 +8,5 @@ from __future__ import annotations
 
 __all__ = ["EDITION"]
 
-EDITION = "10"
+EDITION = "11"
 """Edition of estimate and diagnosis; histories before editions hold those of the first."""
