@@ -19,6 +19,7 @@ from analysis.checking.rejection import find_rejection
 from analysis.commissioning.changes import Causes, Changes
 from analysis.diagnosis.search import Answer
 from analysis.diagnosis.stages import Record
+from analysis.emulation.datasheet_range import range_about
 from analysis.emulation.fitted_model import FittedModel
 from analysis.emulation.likelihood import TEMPERATURE
 from analysis.emulation.parameter_posterior import ParameterPosterior
@@ -45,9 +46,6 @@ _WIDE, _LEAST_REACH = 2.0, 0.01
 
 _LEAST_RANK = 0.005
 """Of some hundred simulated drives; ranks of a misfit nearer to 0 or 1 are not told apart."""
-
-_FARTHEST = 2.5
-"""Standard deviations of the tolerance beyond which no run of a datasheet value is centred."""
 
 
 def answer_by_values(
@@ -194,10 +192,7 @@ def _range(causes: Causes, changes: Changes) -> DatasheetRange:
             back[place[symbol]] = changes.shares[place[symbol]] * row
     centre = back.T @ found.mean
     std = np.sqrt(np.einsum("ik,ij,jk->k", back, found.covariance, back))
-    return DatasheetRange(
-        np.clip(centre, -_FARTHEST * spread.sigmas, _FARTHEST * spread.sigmas),
-        np.clip(_WIDE * std, _LEAST_REACH * spread.sigmas, spread.sigmas),
-    )
+    return range_about(centre, np.maximum(std, _LEAST_REACH * spread.sigmas), spread.sigmas)
 
 
 def _judged(candidate: FittedModel, observation: Observation, probability: float) -> Judged:

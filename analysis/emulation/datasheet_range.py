@@ -8,12 +8,13 @@ It simulates nothing and judges nothing.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.emulation.fitted_model import FittedModel
 from analysis.emulation.likelihood import TEMPERATURE
 from analysis.ensemble.runs import DatasheetRange
 
-__all__ = ["datasheet_range"]
+__all__ = ["datasheet_range", "range_about"]
 
 _FARTHEST = 2.5
 """Standard deviations of the tolerance beyond which no range is centred."""
@@ -46,6 +47,16 @@ def datasheet_range(candidate: FittedModel) -> DatasheetRange:
     found = np.array([fit.deviations[: len(sigmas)] for fit in fits])
     across = share @ (found - share @ found) ** 2
     std = np.sqrt(np.diag(np.linalg.inv(precision)) + across)
-    centre = np.clip(best.deviations[: len(sigmas)], -_FARTHEST * sigmas, _FARTHEST * sigmas)
+    return range_about(best.deviations[: len(sigmas)], std, sigmas)
+
+
+def range_about(
+    centre: NDArray[np.float64], std: NDArray[np.float64], sigmas: NDArray[np.float64]
+) -> DatasheetRange:
+    """The range about departures (k,) along the ways of a unit that are known to `std` (k,).
+
+    `sigmas` (k,): the tolerance along each, which it is no wider than.
+    """
+    within = np.clip(centre, -_FARTHEST * sigmas, _FARTHEST * sigmas)
     reach = np.minimum(_WIDE * std, sigmas)
-    return DatasheetRange(*(np.round(v / sigmas, _DIGITS) * sigmas for v in (centre, reach)))
+    return DatasheetRange(*(np.round(v / sigmas, _DIGITS) * sigmas for v in (within, reach)))

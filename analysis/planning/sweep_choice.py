@@ -18,7 +18,7 @@ import numpy as np
 import tomlkit
 from numpy.typing import NDArray
 
-from analysis.commissioning.coordinates import RATIO, Coordinates
+from analysis.commissioning.coordinates import BACKLASH, RATIO, Coordinates
 from analysis.commissioning.identification import simulate_drives
 from analysis.commissioning.regression import Gaussian, expected_std
 from analysis.execution.blas import on_one_core
@@ -35,9 +35,6 @@ from sim.effect import shaft_at_load
 from sim.unit import Unit
 
 __all__ = ["Planned", "plan_sweep"]
-
-_TOTAL = "b_t_deg"
-"""Name of the total backlash, among coordinates and in documents."""
 
 _LOOKS = ((61, 20, 30), (41, 10, 15), (31, 6, 10), (21, 3, 6))
 """Frequencies of the ensemble's sweep, of which a shorter one takes some, and cycles that settle
@@ -113,12 +110,12 @@ class Planned:
 
     @property
     def _symbol(self) -> str:
-        return " deg" if self.quantity == _TOTAL else ""
+        return " deg" if self.quantity == BACKLASH else ""
 
     @property
     def _expected(self) -> str:
         """The quantity and its expected error, in words."""
-        name = "total backlash" if self.quantity == _TOTAL else "contribution ratio"
+        name = "total backlash" if self.quantity == BACKLASH else "contribution ratio"
         return f"{name} {self.expected_std:.2g}{self._symbol}"
 
     def to_json(self) -> dict[str, Any]:
@@ -196,7 +193,7 @@ def plan_sweep(
         If the time is too short for any sweep, or a total backlash of zero is to be planned for.
     """
     coordinates = Coordinates.of(unit, total_backlash_unknown=unit.stages == 1)
-    quantity, scale = (RATIO, 1.0) if unit.stages == 2 else (_TOTAL, unit.backlash.b_t_deg)
+    quantity, scale = (RATIO, 1.0) if unit.stages == 2 else (BACKLASH, unit.backlash.b_t_deg)
     wide, cut = _wide_plan(unit)
     observation = unread(wide, USUAL_NOISE_V)
     parts = list(_parts(wide, observation, 60.0 * minutes))
