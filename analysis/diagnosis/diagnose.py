@@ -25,11 +25,11 @@ from analysis.commissioning.changes import find_changes
 from analysis.diagnosis.datasheet import learn_datasheet
 from analysis.diagnosis.experiment_design import NextMeasurement, propose_measurement
 from analysis.diagnosis.harmonics import compare_harmonics
+from analysis.diagnosis.question import Question
 from analysis.diagnosis.remaining_models import find_remaining_models
 from analysis.diagnosis.residuals import describe_residuals, find_residuals
 from analysis.diagnosis.result import Cause, Diagnosis, Size
-from analysis.diagnosis.search import search_catalogue
-from analysis.diagnosis.stages import Record
+from analysis.diagnosis.search import Answer, search_catalogue
 from analysis.diagnosis.values import answer_by_values
 from analysis.emulation.fitted_model import FittedModel
 from analysis.emulation.parameter_posterior import ParameterPosterior
@@ -158,25 +158,9 @@ def _diagnose(
             f"no posterior for unit {unit.name} was trained, nor for one like it; run: "
             "lashbench prepare --unit FILE"
         )
-    record = Record()
-    changes, belief = None, _belief(unit, posterior)
-    if belief is not None:
-        with record.stage("changes"):
-            changes = find_changes(
-                belief, observed, without=without, seed=seed, executor=executor,
-                progress=part_of(progress, 0.0, _ASKED, "asking which values differ"),
-            )  # fmt: skip
-        progress = remaining(progress, _ASKED)
-    answer = None
-    if changes is None or not changes.likeliest:
-        answer = search_catalogue(
-            observed, unit, posterior, without, seed, executor, progress, record
-        )
-    if changes is not None and changes.likeliest is not None:
-        answer = answer_by_values(
-            changes, answer, observed, unit, posterior, seed, executor, record
-        )
-    assert answer is not None
+    question = Question(observed, unit, posterior, without, seed, executor)
+    answer = _answer(question, progress)
+    record = question.record
     record.verdict = verdict = answer.verdict
     candidates, observation, summary = answer.candidates, answer.observation, answer.summary
     base, sharp, rng = answer.base, answer.sharp, answer.rng
@@ -216,9 +200,28 @@ def _diagnose(
         models=models,
         believed=believed_document(unit),
         datasheet=learned if accepted else (),
-        lent_by=posterior.lent_by,
+        lent_by=posterior.lent_by if answer.searched else "",
         stages=tuple(record.stages),
     )
+
+
+def _answer(question: Question, progress: Progress | None) -> Answer:
+    """By the values of the drive where these are asked first, else by search of the catalogue."""
+    belief = _belief(question.unit, question.posterior)
+    if belief is None:
+        return search_catalogue(question, progress)
+    with question.record.stage("changes"):
+        changes = find_changes(
+            belief, question.observed, without=question.without, seed=question.seed,
+            executor=question.executor,
+            progress=part_of(progress, 0.0, _ASKED, "asking which values differ"),
+        )  # fmt: skip
+    searched = None
+    if not changes.likeliest:
+        searched = search_catalogue(question, remaining(progress, _ASKED))
+        if changes.likeliest is None:
+            return searched
+    return answer_by_values(question, changes, searched)
 
 
 def _belief(unit: Unit, posterior: Posterior) -> Belief | None:
@@ -278,7 +281,7 @@ def _proposal(
     else:
         return None
 
-    late = part_of(progress, 0.9, 1.0, "choosing the next measurement")
+    late = part_of(progress, 0.95, 1.0, "choosing the next measurement")
     return propose_measurement(
         unit, verdict.best.candidate, [one.candidate for one in rivals], observation,
         seed=seed, executor=executor, progress=late,

@@ -6,27 +6,24 @@ of it beside the verdict is put together elsewhere.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.diagnosis.question import Question
 from analysis.diagnosis.refinement import refine_parameters
-from analysis.diagnosis.stages import Record
 from analysis.emulation.fitted_model import FittedModel
 from analysis.emulation.model_parameters import estimate_parameters, widen_if_open
 from analysis.emulation.parameter_posterior import ParameterPosterior
 from analysis.estimate.datasheet_posterior import DatasheetValue
-from analysis.execution.executor import Executor
 from analysis.execution.progress import Progress, part_of
-from analysis.inference.posterior import Posterior
 from analysis.inference.refine import refine
 from analysis.observation.observation import Observation
 from analysis.selection.credible_set import require_credible_set
 from analysis.selection.datasheet_test import compare_with_datasheet
 from analysis.selection.verdict import Judged, Verdict, judge_candidates
-from sim.unit import Unit
 
 __all__ = ["Answer", "search_catalogue"]
 
@@ -37,8 +34,8 @@ class Answer:
 
     `base`, `sharp`: coordinates of the plain model and of the best set, None where that is no
     explanation. `summary` (1, hidden): what the network makes of the observation. `rng`: for what
-    is computed later. `learned`: what it says of the datasheet's values, None where that is to be
-    asked of the best set.
+    is computed later. `searched`: whether the catalogue was searched. `learned`: what it says of
+    the datasheet's values, None where that is to be asked of the best set.
     """
 
     candidates: Sequence[FittedModel]
@@ -48,19 +45,11 @@ class Answer:
     base: ParameterPosterior
     sharp: ParameterPosterior | None
     rng: np.random.Generator
+    searched: bool
     learned: tuple[DatasheetValue, ...] | None = None
 
 
-def search_catalogue(
-    observed: Observation,
-    unit: Unit,
-    posterior: Posterior,
-    without: Collection[str],
-    seed: int,
-    executor: Executor | None,
-    progress: Progress | None,
-    record: Record,
-) -> Answer:
+def search_catalogue(question: Question, progress: Progress | None) -> Answer:
     """What explains an observation.
 
     Raises
@@ -68,6 +57,7 @@ def search_catalogue(
     AnalysisError
         If a motion grew without bound.
     """
+    seed, executor, record = question.seed, question.executor, question.record
 
     def early(share: float, text: str) -> None:
         if progress is not None:
@@ -75,8 +65,9 @@ def search_catalogue(
 
     with record.stage("refine"):
         refined = refine(
-            posterior, observed, without=without, seed=seed, executor=executor, progress=early
-        )
+            question.posterior, question.observed, without=question.without, seed=seed,
+            executor=executor, progress=early,
+        )  # fmt: skip
     candidates = refined.candidates
     observation = candidates[0].surface.observation
     rng = np.random.default_rng(seed)
@@ -86,7 +77,7 @@ def search_catalogue(
 
     def sharpened(one: Judged) -> ParameterPosterior:
         late = part_of(progress, 0.8, 0.9, "sizing it")
-        return refine_parameters(unit, one.candidate, observation, rng, executor, late)
+        return refine_parameters(question.unit, one.candidate, observation, rng, executor, late)
 
     sharp = None
     if verdict.word != "unexplained":
@@ -101,4 +92,4 @@ def search_catalogue(
             verdict = record.verdict = require_credible_set(held)
         sharp = None if verdict.word == "unexplained" else sharp
     base = widen_if_open(base, verdict.baseline.candidate, observation, rng)
-    return Answer(candidates, observation, refined.summary, verdict, base, sharp, rng)
+    return Answer(candidates, observation, refined.summary, verdict, base, sharp, rng, True)

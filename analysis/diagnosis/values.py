@@ -17,8 +17,8 @@ from analysis.checking.cross_validation import hold_out
 from analysis.checking.goodness_of_fit import judge_adequacy
 from analysis.checking.rejection import find_rejection
 from analysis.commissioning.changes import Causes, Changes
+from analysis.diagnosis.question import Question
 from analysis.diagnosis.search import Answer
-from analysis.diagnosis.stages import Record
 from analysis.emulation.datasheet_range import range_about
 from analysis.emulation.fitted_model import FittedModel
 from analysis.emulation.likelihood import TEMPERATURE
@@ -29,7 +29,6 @@ from analysis.ensemble.runs import DatasheetRange
 from analysis.estimate.datasheet_posterior import DatasheetValue
 from analysis.execution.executor import Executor
 from analysis.inference.model_pool import ModelPool
-from analysis.inference.posterior import Posterior
 from analysis.observation.observation import Observation
 from analysis.selection.credible_set import require_credible_set
 from analysis.selection.verdict import Judged, Verdict, Word, is_by_chance
@@ -48,16 +47,7 @@ _LEAST_RANK = 0.005
 """Of some hundred simulated drives; ranks of a misfit nearer to 0 or 1 are not told apart."""
 
 
-def answer_by_values(
-    changes: Changes,
-    searched: Answer | None,
-    observed: Observation,
-    unit: Unit,
-    posterior: Posterior,
-    seed: int,
-    executor: Executor | None,
-    record: Record,
-) -> Answer:
+def answer_by_values(question: Question, changes: Changes, searched: Answer | None) -> Answer:
     """Which values are other than believed, or what was searched if that tells more.
 
     Parameters
@@ -70,19 +60,20 @@ def answer_by_values(
     AnalysisError
         If a motion grew without bound.
     """
-    rng = np.random.default_rng(seed)
-    observation = observed if searched is None else searched.observation
-    with record.stage("values"):
-        candidates = _changed_models(unit, observation, changes, rng, executor)
+    rng, unit = np.random.default_rng(question.seed), question.unit
+    observation = question.observed if searched is None else searched.observation
+    with question.record.stage("values"):
+        candidates = _changed_models(unit, observation, changes, rng, question.executor)
         verdict = _verdict(candidates, observation, changes)
         if searched and not _is_less(searched, verdict.baseline, changes, rng):
             return searched
-    summary = posterior.summary(observation, unit.tolerances)
+    summary = question.posterior.summary(observation, unit.tolerances)
     base, sharp = (
         _posterior(one.candidate.hypothesis, changes) for one in (verdict.baseline, verdict.best)
     )
     learned = _learned(changes, verdict.best.effects)
-    return Answer(candidates, observation, summary, verdict, base, sharp, rng, learned)
+    was = searched is not None
+    return Answer(candidates, observation, summary, verdict, base, sharp, rng, was, learned)
 
 
 def _is_less(searched: Answer, plain: Judged, changes: Changes, rng: np.random.Generator) -> bool:

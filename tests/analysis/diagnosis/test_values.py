@@ -29,6 +29,8 @@ def test_diagnosis_names_the_changed_value(symbol, factor, effect):
     assert abs(size["value"] - factor * unit.parameters[symbol]) < 3.0 * size["std"]
     assert size["datasheet"] == unit.parameters[symbol]
     assert document["info"][0]["stage"] == "changes"
+    # No network chose what was asked.
+    assert not any("posterior" in text for text in document["warnings"])
     assert any(effect in line for line in found.summary())
 
 
@@ -76,5 +78,6 @@ def test_what_no_value_explains_is_searched_for():
     found = diagnose_response(seen_again(unit, 6, effect=("payload-flexibility", payload)), unit)
     assert found.verdict.word != "consistent"
     assert [stage.name for stage in found.stages][:2] == ["changes", "refine"]
+    assert any("no posterior was trained" in text for text in found.warnings)
     causes = {cause.effect for cause in found.causes}
     assert not causes or "payload-flexibility" in causes
