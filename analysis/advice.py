@@ -154,7 +154,8 @@ def _most(answer: Answer, stage: int, unit: Unit | None) -> float | None:
     total = answer.models[0].get("b_t_deg")
     if total is None or unit is None:
         return None
-    return float(total["value"] * (unit.output_ratio if stage == 1 else 1.0))
+    shared = total["value"] - (0.0 if unit.stage3 is None else unit.stage3.b3_deg)
+    return float(max(shared, 0.0) * (unit.output_ratio if stage == 1 else unit.last_ratio))
 
 
 def _without_model(answer: Answer) -> str:
@@ -196,11 +197,13 @@ def _by_ratio(answer: Answer) -> str:
     spans = [span_of(ratio) for ratio in ratios]
     low, high = min(s[0] for s in spans), min(1.0, max(s[1] for s in spans))
     span = f"{100 * low:.0f} to {100 * high:.0f} %"
+    has_three = "b3_deg" in answer.models[0]
+    what = "the backlash of stages 1 and 2" if has_three else "the backlash"
     if len(ratios) == 1:
-        share = f"{100 * ratios[0]['value']:.0f} % of the backlash sits in stage 1 (95 %: {span})"
+        share = f"{100 * ratios[0]['value']:.0f} % of {what} sits in stage 1 (95 %: {span})"
         share += f", by the {_by(answer)}"
     else:
-        share = f"{span} of the backlash sits in stage 1 (95 %, over the {len(ratios)} models left)"
+        share = f"{span} of {what} sits in stage 1 (95 %, over the {len(ratios)} models left)"
     if low > _HALF:
         return f"Adjust stage 1 first: {share}."
     if high < _HALF:

@@ -26,7 +26,8 @@ Number = Mapping[str, Any]
 
 State = Literal["accepted", "not judged", "open", "refuted", "none"]
 
-QUANTITIES = ("contribution_ratio", "b1_deg", "b2_deg", "b_t_deg")
+QUANTITIES = ("contribution_ratio", "b1_deg", "b2_deg", "b_t_deg", "b3_deg")
+"""The last is told of a drive with three stages alone."""
 
 CALL_FOR_DIAGNOSIS = "run diagnose before trusting the ratio"
 """End of the warning by which an estimate says that the plain model does not fit."""
@@ -95,7 +96,10 @@ class Answer:
 
     @property
     def contribution_ratio(self) -> Number | None:
-        """Share of stage 1 in the backlash seen at the output; None where no model is in force."""
+        """Share of stage 1 in the backlash seen at the output, or in what a third stage leaves.
+
+        None where no model is in force.
+        """
         return self.numbers.get("contribution_ratio")
 
     @property
@@ -105,7 +109,7 @@ class Answer:
 
     @property
     def b2_deg(self) -> Number | None:
-        """Backlash of stage 2, degrees at the output; None where no model is in force."""
+        """Backlash of stage 2, degrees at its gear; None where no model is in force."""
         return self.numbers.get("b2_deg")
 
     @property

@@ -1,7 +1,8 @@
 """The geared servo of the paper, as an assembly of elements.
 
 Owns the topology, equations (1) to (20). ADSS and EDSS differ in numbers only,
-so does any other two-stage drive; a one-stage drive lacks the second mesh. The
+so does any other two-stage drive; a one-stage drive lacks the second mesh, and
+a three-stage one has a third behind it. The
 paper model is kept exactly, undamped; effects are added to it (`sim.effects`)
 and never folded into it.
 """
@@ -95,8 +96,8 @@ def paper_drivetrain(unit: Unit, ratio: float) -> Drivetrain:
 
     Angles: th_m motor, th_g1 gear 1, th_s1 middle of shaft 1, th_p2 pinion 2,
     th_L load. A drive with one gear stage is the same up to shaft 1, which
-    ends at the load: no pinion 2 and no mesh 2. With couplings th_c is pinion 1
-    and th_h the last gear.
+    ends at the load: no pinion 2 and no mesh 2. With three stages mesh 2 ends at
+    th_g2, gear 2 with pinion 3. With couplings th_c is pinion 1 and th_h the last gear.
 
     Raises
     ------
@@ -105,7 +106,8 @@ def paper_drivetrain(unit: Unit, ratio: float) -> Drivetrain:
     """
     motor, load, stage1 = unit.motor, unit.load, unit.stage1
     damping = unit.damping or Damping()
-    delta_1, delta_2 = unit.split(ratio).half_plays_rad
+    plays = unit.split(ratio)
+    delta_1, delta_2 = plays.half_plays_rad
     end = shaft_end(unit)
     elements: dict[str, Element] = {
         "tachometer": _sensor(unit),
@@ -130,8 +132,14 @@ def paper_drivetrain(unit: Unit, ratio: float) -> Drivetrain:
         ),
     }
     if unit.stage2 is not None:
-        twist = {"th_p2": 1.0 / unit.stage2.N, load_side(unit): -1.0}
+        gear_2 = load_side(unit) if unit.stage3 is None else "th_g2"
+        twist = {"th_p2": 1.0 / unit.stage2.N, gear_2: -1.0}
         elements["mesh2"] = Mesh("mesh2", twist, unit.stage2.k_2, delta_2, damping.c_2 or 0.0)
+    if (stage3 := unit.stage3) is not None:
+        twist = {"th_g2": 1.0 / stage3.N_3, load_side(unit): -1.0}
+        delta_3 = math.radians(plays.b3_deg) / 2.0
+        elements["gear2"] = Inertia("th_g2", stage3.J_g2)
+        elements["mesh3"] = Mesh("mesh3", twist, stage3.k_3, delta_3, damping.c_3 or 0.0)
     elements |= _frictions(unit)
     if damping.B_L is not None:
         elements["load_viscous"] = Damper({"th_L": 1.0}, damping.B_L)
@@ -142,7 +150,7 @@ def paper_drivetrain(unit: Unit, ratio: float) -> Drivetrain:
 
 def _frictions(unit: Unit) -> dict[str, Element]:
     """Dry friction of motor and load, and in each mesh that loses torque, on its pinion."""
-    pinion, stage1, stage2 = motor_side(unit), unit.stage1, unit.stage2
+    pinion, stage1, stage2, stage3 = motor_side(unit), unit.stage1, unit.stage2, unit.stage3
     found: dict[str, Element] = {
         "motor_friction": DryFriction("motor_friction", "th_m", unit.motor.T_f_m)
     }
@@ -151,6 +159,8 @@ def _frictions(unit: Unit) -> dict[str, Element]:
         found[name] = LoadedFriction(name, pinion, "mesh1", lost, T)
     if stage2 is not None and (lost := _lost(stage2.eta_2, stage2.N)):
         found["mesh2_loss"] = LoadedFriction("mesh2_loss", "th_p2", "mesh2", lost)
+    if stage3 is not None and (lost := _lost(stage3.eta_3, stage3.N_3)):
+        found["mesh3_loss"] = LoadedFriction("mesh3_loss", "th_g2", "mesh3", lost)
     return found | {"load_friction": DryFriction("load_friction", "th_L", unit.load.T_f_L)}
 
 

@@ -57,14 +57,16 @@ USUAL = 0.05
 
 _BY_KIND = {
     **dict.fromkeys(("R_m", "k_t", "k_b"), 0.08),
-    **dict.fromkeys(("L_a", "J_m", "J_g1", "J_s1", "J_p2", "J_cm", "J_cL", "bandwidth_hz"), 0.10),
-    **dict.fromkeys(("k_g1", "k_s1", "k_2", "k_cm", "k_cL"), 0.15),
-    **dict.fromkeys(("B_m", "T_f_m", "T_f_L", "B_L", "c_s1", "c_g1", "c_2", "c_cm", "c_cL"), 0.30),
+    **dict.fromkeys(("L_a", "J_m", "J_g1", "J_s1", "J_p2", "J_g2", "J_cm", "J_cL"), 0.10),
+    **dict.fromkeys(("bandwidth_hz", "b3_deg"), 0.10),
+    **dict.fromkeys(("k_g1", "k_s1", "k_2", "k_3", "k_cm", "k_cL"), 0.15),
+    **dict.fromkeys(("B_m", "T_f_m", "T_f_L", "B_L", "c_s1", "c_g1", "c_2", "c_3"), 0.30),
+    **dict.fromkeys(("c_cm", "c_cL"), 0.30),
 }
 """By kind: windings and magnets, inertias, stiffness, friction and damping. Gains and the load are
 known better."""
 
-_EXACT = ("filter_numerator", "N_1", "N", "delay_s", "K_p", "T_i_s", "K_v", "computing_s")
+_EXACT = ("filter_numerator", "N_1", "N", "N_3", "delay_s", "K_p", "T_i_s", "K_v", "computing_s")
 """Teeth are counted, the filter's gain is the tachometer's, a delay is so many samples, and a
 controller's gains are set: no tolerance if not by name."""
 
@@ -85,10 +87,11 @@ _TOLERATED = (
     "L_a", "R_m", "k_b", "k_t", "J_m", "B_m", "T_f_m", "k_a", "k_ts", "filter_numerator",
     "N_1", "k_g1", "J_g1", "k_s1", "J_s1", "J_p2", "N", "k_2", "J_L", "T_f_L", "B_L", "c_s1",
     "c_g1", "c_2", "bandwidth_hz", "delay_s", "k_cm", "c_cm", "J_cm", "k_cL", "c_cL", "J_cL",
-    "K_p", "T_i_s", "K_v", "computing_s", "low_pass_hz", "high_pass_hz",
+    "K_p", "T_i_s", "K_v", "computing_s", "low_pass_hz", "high_pass_hz", "J_g2", "N_3", "k_3",
+    "c_3", "b3_deg",
 )  # fmt: skip
-"""Table 1 but for the backlash, whose departure is the effect total-backlash; and what drives have
-that are not the paper's."""
+"""Table 1 but for the total backlash, whose departure is the effect total-backlash; and what drives
+have that are not the paper's."""
 
 
 def believed_shares(

@@ -32,8 +32,8 @@ Further answers: - takes the example, < goes back one question.
 _VALUE = re.compile(r"^(?P<symbol>\w+) = (?P<value>[\d.eE+-]+)(?P<gap> +)# (?P<comment>.*)$")
 _FILTER = ("filter_numerator", "filter_denominator")
 _SKIPPED = ("schema", *_FILTER, "default")
-_MAY_BE_ZERO = ("B_m", "T_f_m", "T_f_L", "b_t_deg", "source_offset_v", "c_cm", "c_cL", "delay_s",
-                "computing_s")  # fmt: skip
+_MAY_BE_ZERO = ("B_m", "T_f_m", "T_f_L", "b_t_deg", "b3_deg", "source_offset_v", "c_cm", "c_cL",
+                "delay_s", "computing_s")  # fmt: skip
 _CORNER, _DAMPING = "corner_hz", "damping"
 
 
@@ -53,12 +53,12 @@ Read = Callable[[], str]
 
 
 def ask_stages(say: Say, read: Read) -> int:
-    """How many gear stages the drive has, 1 or 2."""
+    """How many gear stages the drive has, 1 to 3."""
     while True:
-        answer = _line(say, read, "gear stages between motor and load [1 / 2]: ")
-        if answer in ("1", "2"):
+        answer = _line(say, read, "gear stages between motor and load [1 / 2 / 3]: ")
+        if answer in ("1", "2", "3"):
             return int(answer)
-        say(f"{answer!r} is neither 1 nor 2\n")
+        say(f"{answer!r} is neither 1, 2 nor 3\n")
 
 
 def ask_for_values(template: str, say: Say, read: Read) -> str:

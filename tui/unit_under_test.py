@@ -54,12 +54,13 @@ def ratio_of_unit(unit: Unit, ratio: float | None) -> float:
     Raises
     ------
     InputError
-        If a drive with two stages was given none.
+        If a drive with two stages or three was given none.
     """
-    if ratio is None and unit.stages == 2:
+    if ratio is None and unit.stages > 1:
+        shared = "the total backlash" if unit.stages == 2 else "the backlash of stages 1 and 2"
         raise InputError(
-            f"--ratio is missing: unit {unit.name} has two stages; give the share of stage 1 in "
-            "the total backlash, 0 to 1"
+            f"--ratio is missing: unit {unit.name} has {unit.stages} stages; give the share of "
+            f"stage 1 in {shared}, 0 to 1"
         )
     return 1.0 if ratio is None else ratio
 

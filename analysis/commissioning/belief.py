@@ -46,14 +46,15 @@ class Belief:
 def believed_since_commissioning(unit: Unit) -> Belief | None:
     """As commissioning left the values; None where that tells too little of them.
 
-    Of two stages it must tell the ratio as well. A backlash that was not identified is exact.
+    Of two stages or more it must tell the ratio as well. A backlash that was not identified is
+    exact.
     """
     known = unit.commissioning
-    two = unit.stages == 2
-    if known is None or (two and RATIO not in known.order):
+    shared = unit.stages > 1
+    if known is None or (shared and RATIO not in known.order):
         return None
     values = unit.parameters
-    symbols = [s for s in known.order if values.get(s, 0.0) > 0.0 or (s == RATIO and two)]
+    symbols = [s for s in known.order if values.get(s, 0.0) > 0.0 or (s == RATIO and shared)]
     if not symbols:
         return None
     coordinates = _of_changes(unit, symbols)
@@ -78,7 +79,7 @@ def believed_by_datasheet(unit: Unit) -> Belief | None:
 def _of_changes(unit: Unit, symbols: Sequence[str]) -> Coordinates:
     """These values and the total backlash of one stage.
 
-    Of two stages it takes no part: with that and the ratio open the regression tells neither.
+    Of more stages it takes no part: with that and the ratio open the regression tells neither.
     """
     open_too = unit.stages == 1 and unit.backlash.b_t_deg > 0.0 and BACKLASH not in symbols
     named = (*symbols, BACKLASH) if open_too else tuple(symbols)

@@ -36,7 +36,7 @@ NOISE = "reading_noise"
 _BACKLASH_SPREAD = 0.5
 """Standard deviation of the logarithm of a total backlash that is unknown."""
 
-_FREE = ("T_f_m", "T_f_L", BACKLASH, RATIO, NOISE)
+_FREE = ("T_f_m", "T_f_L", BACKLASH, "b3_deg", RATIO, NOISE)
 """Parameters that leave the linear part alone: drives that differ in them are stepped together."""
 
 
@@ -55,7 +55,7 @@ class Coordinates:
 
     @classmethod
     def of(cls, unit: Unit, *, total_backlash_unknown: bool = False) -> Self:
-        """All parameters that are not zero nor exact, and the ratio of two stages.
+        """All parameters that are not zero nor exact, and the ratio of two or three stages.
 
         Raises
         ------
@@ -71,7 +71,7 @@ class Coordinates:
                     "too; write about how much it is to identify the total backlash"
                 )
             held[BACKLASH] = _BACKLASH_SPREAD
-        if unit.stages == 2:
+        if unit.stages > 1:
             held[RATIO] = float("nan")
         return cls(unit, tuple(held), tuple(held.values()))
 

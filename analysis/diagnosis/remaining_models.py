@@ -93,7 +93,7 @@ def backlash_document(
     if accepted is not None:
         numbers = accepted.backlash.to_json()
         ratios["extended"] |= {"interval95": numbers["contribution_ratio"]["interval95"]}
-        stages = {name: numbers[name] for name in stages}
+        stages = {name: number for name, number in numbers.items() if name != "contribution_ratio"}
     return {
         "contribution_ratio": ratios,
         **stages,

@@ -37,6 +37,9 @@ runs is no better (`analysis.emulation.emulator`)."""
 _LEAST = 1e-4
 """Least tolerance that is computed with: what is exact is taken for known to that."""
 
+_PLAY = "b3_deg"
+"""A value that a linear response does not show: a way of its own."""
+
 _STEP = 0.01
 _POINTS, _BAND = 24, (0.25, 1.6)
 """Frequencies at which responses are compared, between these multiples of the load's on shaft 1."""
@@ -83,7 +86,8 @@ def spread_of(unit: Unit) -> Spread:
 
     Up to seven values with a tolerance are ways of their own. Of more, the ways are the principal
     directions of the linear response, friction as its describing function, in values each
-    measured by its tolerance; those along which it hardly changes are left out.
+    measured by its tolerance; those along which it hardly changes are left out. The play of a third
+    stage, which no linear response shows, is a way of its own.
     """
     return _spread_of(_Key(unit))
 
@@ -126,10 +130,11 @@ def _spread_of(key: _Key) -> Spread:
         every = np.eye(len(symbols))
         return Spread(tuple(symbols), every, every, tolerance, gain)
     _, effects, across = np.linalg.svd(_sensitivities(unit, symbols) * tolerance)
-    count = int(np.clip(np.count_nonzero(effects >= _LEAST_EFFECT), 1, _MOST))
+    own = np.eye(len(symbols))[[symbol == _PLAY for symbol in symbols]]
+    count = int(np.clip(np.count_nonzero(effects >= _LEAST_EFFECT), 1, _MOST - len(own)))
     # A direction has no sign of its own.
     turned = across[:count] * np.sign(across[:count].sum(axis=1))[:, None]
-    turned = np.round(turned, _DIGITS)
+    turned = np.vstack([np.round(turned, _DIGITS), own])
     sigmas = np.linalg.norm(turned * tolerance, axis=1)
     ways = turned * tolerance / sigmas[:, None]
     back = (turned / tolerance).T * sigmas

@@ -35,7 +35,7 @@ def linear_response(
     A. Gelb and W. E. Vander Velde, "Multiple-Input Describing Functions and Nonlinear System
     Design", 1968, ch. 2. That of one which a mesh loads is its first harmonic in the same way.
     """
-    system = drivetrain_with(unit, 0.5 if unit.stages == 2 else 1.0).system()
+    system = drivetrain_with(unit, 0.5 if unit.stages > 1 else 1.0).system()
     frictions = [law for law in system.nonlinearities if law.law in (Law.FRICTION, Law.LOADED)]
     s = 2.0 * np.pi * frequency_hz * (1j + _DAMPED)
     A, b, o, chain = parts_at(system, s)

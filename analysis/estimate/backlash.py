@@ -28,6 +28,9 @@ __all__ = [
 _REACH, _STEPS = 7.0, 211
 """Standard deviations on either side over which a normal distribution is laid out, and points."""
 
+_REACH_OF_STAGE_3, _STEPS_OF_STAGE_3 = 3.0, 15
+"""The same of what a unit says of its third stage."""
+
 
 @dataclass(frozen=True, slots=True)
 class Uncertain:
@@ -47,30 +50,37 @@ class Uncertain:
 
 @dataclass(frozen=True, slots=True)
 class Backlash:
-    """Contribution ratio, backlash of each stage (b1 at shaft 1, b2 at the output) and in all."""
+    """Contribution ratio, backlash of each stage (each at its gear) and in all (at the load).
+
+    `b3_deg`: as the unit says, of a third stage; None where there is none.
+    """
 
     contribution_ratio: Uncertain
     b1_deg: Uncertain
     b2_deg: Uncertain
     b_t_deg: Uncertain
+    b3_deg: Uncertain | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """The four numbers by the names that documents give them."""
-        return {
+        """The numbers by the names that documents give them."""
+        content = {
             "contribution_ratio": self.contribution_ratio.to_json(),
             "b1_deg": self.b1_deg.to_json(),
             "b2_deg": self.b2_deg.to_json(),
             "b_t_deg": self.b_t_deg.to_json(),
         }
+        return content if self.b3_deg is None else content | {"b3_deg": self.b3_deg.to_json()}
 
     def lines(self, indent: str) -> list[str]:
-        """The four numbers in words for a person, a line each."""
+        """The numbers in words for a person, a line each."""
         rows = [
             ("contribution ratio of stage 1", self.contribution_ratio, 3, ""),
             ("backlash of stage 1, b1", self.b1_deg, 4, "deg"),
             ("backlash of stage 2, b2", self.b2_deg, 4, "deg"),
             ("total backlash, b_t", self.b_t_deg, 4, "deg"),
         ]
+        if self.b3_deg is not None:
+            rows.insert(3, ("backlash of stage 3, b3, as told", self.b3_deg, 4, "deg"))
         lines = []
         for name, number, digits, unit in rows:
             line = (
@@ -98,12 +108,29 @@ def backlash_of_places(
     weight
         What is believed of each place, shape (n,), sum 1.
     """
+    third = None
+    if unit.stage3 is not None:
+        steps, density = _normal(unit.tolerances["b3_deg"])
+        weight = np.outer(weight, density).ravel()
+        ratios, total_deg = (np.repeat(one, len(steps)) for one in (ratios, total_deg))
+        third = np.minimum(unit.stage3.b3_deg * np.resize(steps, len(ratios)), total_deg)
+    shared = total_deg if third is None else total_deg - third
     return Backlash(
         contribution_ratio=summarise(ratios, weight),
-        b1_deg=summarise(ratios * total_deg * unit.output_ratio, weight),
-        b2_deg=summarise((1.0 - ratios) * total_deg, weight),
+        b1_deg=summarise(ratios * shared * unit.output_ratio, weight),
+        b2_deg=summarise((1.0 - ratios) * shared * unit.last_ratio, weight),
         b_t_deg=_known(summarise(total_deg, weight)),
+        b3_deg=None if third is None else _known(summarise(third, weight)),
     )
+
+
+def _normal(share: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Multiples (n,) of a value of that tolerance, and what is believed of each (n,)."""
+    if not share:
+        return np.ones(1), np.ones(1)
+    steps = np.linspace(-_REACH_OF_STAGE_3, _REACH_OF_STAGE_3, _STEPS_OF_STAGE_3)
+    density = np.exp(-0.5 * steps**2)
+    return np.maximum(1.0 + share * steps, 0.0), density / density.sum()
 
 
 def backlash_of_sizes(hypothesis: Hypothesis, found: ParameterPosterior) -> Backlash:
@@ -137,16 +164,17 @@ def backlash_of_sizes(hypothesis: Hypothesis, found: ParameterPosterior) -> Back
     free = backlash_of_places(unit, ratios, total, weight)
     cut = backlash_of_places(unit, np.clip(ratios, 0.0, 1.0), total, weight)
     return Backlash(
-        *(
-            replace(number, interval95=inside.interval95)
-            for number, inside in (
-                (free.contribution_ratio, cut.contribution_ratio),
-                (free.b1_deg, cut.b1_deg),
-                (free.b2_deg, cut.b2_deg),
-                (free.b_t_deg, cut.b_t_deg),
-            )
-        )
+        _within(free.contribution_ratio, cut.contribution_ratio),
+        _within(free.b1_deg, cut.b1_deg),
+        _within(free.b2_deg, cut.b2_deg),
+        _within(free.b_t_deg, cut.b_t_deg),
+        cut.b3_deg,
     )
+
+
+def _within(number: Uncertain, inside: Uncertain) -> Uncertain:
+    """A number with the interval of another."""
+    return replace(number, interval95=inside.interval95)
 
 
 def ratio_of(unit: Unit, found: ParameterPosterior) -> tuple[float, float]:

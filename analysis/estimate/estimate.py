@@ -69,15 +69,13 @@ class Estimate:
     refuted: bool = False
     believed: Mapping[str, Any] = field(default_factory=dict)
     datasheet: tuple[DatasheetValue, ...] = ()
+    b3_deg: Uncertain | None = None
 
     def to_json(self) -> dict[str, Any]:
         """The document of ``estimate --json``."""
         return {
             "unit": self.unit,
-            "contribution_ratio": self.contribution_ratio.to_json(),
-            "b1_deg": self.b1_deg.to_json(),
-            "b2_deg": self.b2_deg.to_json(),
-            "b_t_deg": self.b_t_deg.to_json(),
+            **self._backlash().to_json(),
             "error_index": None if self.curve is None else self.curve.to_json(),
             "sweeps": list(self.sweeps),
             **self.believed,
@@ -87,9 +85,13 @@ class Estimate:
             "simulated_s": self.simulated_s,
         }
 
+    def _backlash(self) -> Backlash:
+        numbers = self.contribution_ratio, self.b1_deg, self.b2_deg, self.b_t_deg
+        return Backlash(*numbers, self.b3_deg)
+
     def summary(self) -> list[str]:
         """Lines of text for a person."""
-        told = Backlash(self.contribution_ratio, self.b1_deg, self.b2_deg, self.b_t_deg)
+        told = self._backlash()
         head = ", by the plain model, which does not fit" if self.refuted else ""
         lines = [f"{self.unit}: backlash by stage{head}", *told.lines("  ")]
         lines += [f"  {text}" for text in sweep_lines(self.sweeps)]
@@ -289,4 +291,5 @@ def _assemble(
         warnings=warnings,
         simulated_s=simulated_s,
         believed=believed_document(unit),
+        b3_deg=found.b3_deg,
     )

@@ -118,7 +118,7 @@ def nominal_families(unit: Unit) -> tuple[tuple[Machine, ...], tuple[Machine, ..
 
 
 def _machines(unit: Unit) -> tuple[Machine, ...]:
-    ratios = np.linspace(*_ENDS, RUNS) if unit.stages == 2 else np.ones(RUNS)
+    ratios = np.linspace(*_ENDS, RUNS) if unit.stages > 1 else np.ones(RUNS)
     return tuple(Machine(float(ratio), _SEED + k) for k, ratio in enumerate(ratios))
 
 

@@ -191,6 +191,8 @@ class Family:
         felt = felt + critical * p["load_loss"] + at_load * p["cable"] / s
         if (coupling := self.unit.load_coupling) is not None:
             felt = _behind(coupling.k_cL + coupling.c_cL * s, felt, s) + coupling.J_cL * s
+        if (stage3 := self.unit.stage3) is not None:
+            felt = _behind(stage3.k_3 + 0.0 * s, felt, s) / stage3.N_3**2 + stage3.J_g2 * s
         if self.unit.stage2 is not None:
             felt = _behind(self.unit.stage2.k_2 + 0.0 * s, felt, s) / self.unit.stage2.N**2
             felt = felt + (stage1.J_p2 or 0.0) * s

@@ -193,7 +193,7 @@ def plan_sweep(
         If the time is too short for any sweep, or a total backlash of zero is to be planned for.
     """
     coordinates = Coordinates.of(unit, total_backlash_unknown=unit.stages == 1)
-    quantity, scale = (RATIO, 1.0) if unit.stages == 2 else (BACKLASH, unit.backlash.b_t_deg)
+    quantity, scale = (RATIO, 1.0) if unit.stages > 1 else (BACKLASH, unit.backlash.b_t_deg)
     wide, cut = _wide_plan(unit)
     observation = unread(wide, USUAL_NOISE_V)
     parts = list(_parts(wide, observation, 60.0 * minutes))

@@ -63,6 +63,8 @@ def inertias_at_motor(unit: Unit) -> dict[str, float]:
         parts["pinion 1"] = unit.motor_coupling.J_cm
     if stage1.J_p2 is not None:
         parts["pinion 2"] = stage1.J_p2 / first**2
+    if unit.stage2 is not None and unit.stage3 is not None:
+        parts["gear 2"] = unit.stage3.J_g2 / (first * unit.stage2.N) ** 2
     if unit.load_coupling is not None:
         parts["hub"] = unit.load_coupling.J_cL / whole**2
     return parts | {"load": unit.load.J_L / whole**2}
@@ -82,6 +84,10 @@ def describe_chain(unit: Unit) -> list[str]:
     if stage2 is not None:
         lines.append(f"  stage 2  {stage2.N:.5g} : 1, mesh k_2 {stage2.k_2:.4g} N.m/rad")
         lines += _efficiency(stage2.eta_2)
+    if (stage3 := unit.stage3) is not None:
+        lines.append(f"gear 2     J_g2 {stage3.J_g2:.4g} kg.m^2")
+        lines.append(f"  stage 3  {stage3.N_3:.5g} : 1, mesh k_3 {stage3.k_3:.4g} N.m/rad")
+        lines += _efficiency(stage3.eta_3)
     if (last := unit.load_coupling) is not None:
         lines.append(f"  coupling k_cL {last.k_cL:.4g} N.m/rad")
     lines.append(f"load       J_L {unit.load.J_L:.4g} kg.m^2")
@@ -94,6 +100,7 @@ def describe_chain(unit: Unit) -> list[str]:
         *(f"  {part:<9}{J:.3e} kg.m^2 {100.0 * J / total:5.1f} %" for part, J in parts.items()),
         f"  {'total':<9}{total:.3e} kg.m^2",
         f"total backlash: {play:.4g} deg at the load, {play * ratio:.4g} deg at the motor",
+        *([] if stage3 is None else [f"  of it {stage3.b3_deg:.4g} deg in stage 3"]),
         *_frequency_lines(unit),
         *([] if unit.loop is None else _loop_lines(unit)),
     ]

@@ -22,10 +22,11 @@ _SECTIONS = {
     "electronics": ("k_a", "k_ts", "filter_numerator", "filter_denominator"),
     "stage1": ("N_1", "k_g1", "J_g1", "k_s1", "J_s1", "J_p2", "eta_1"),
     "stage2": ("N", "k_2", "eta_2"),
+    "stage3": ("J_g2", "N_3", "k_3", "b3_deg", "eta_3"),
     "load": ("J_L", "T_f_L"),
     "backlash": ("b_t_deg",),
     "limits": ("source_vpk", "source_offset_v", "start_hz", "stop_hz"),
-    "damping": ("B_L", "c_s1", "c_g1", "c_2"),
+    "damping": ("B_L", "c_s1", "c_g1", "c_2", "c_3"),
     "amplifier": ("bandwidth_hz", "current_limit_a"),
     "sampling": ("rate_hz",),
     "sensor": ("counts", "delay_s", "radius_m", "low_pass_hz", "high_pass_hz"),
@@ -101,10 +102,13 @@ SINGLES = (
     _single("J_p2", (0.0, 1e5), (0.0, 1e9)),
     _single("N", *_STAGE, remedy=f"{_TURNED}; a drive with one stage has no [stage2]"),
     _single("k_2", *_STIFFNESS),
-    *(_single(symbol, (0.3, 1.0), (0.2, 1.0)) for symbol in ("eta_1", "eta_2")),
+    *(_single(symbol, (0.3, 1.0), (0.2, 1.0)) for symbol in ("eta_1", "eta_2", "eta_3")),
+    _single("J_g2", *_INERTIA),
+    _single("N_3", *_STAGE, remedy=_TURNED),
+    _single("k_3", *_STIFFNESS),
     _single("J_L", (1e-10, 1e7), (1e-16, 1e10)),
     _single("T_f_L", (0.0, 1e5), (0.0, 1e8)),
-    _single("b_t_deg", (0.0, 3.0), (0.0, 45.0)),
+    *(_single(symbol, (0.0, 3.0), (0.0, 45.0)) for symbol in ("b_t_deg", "b3_deg")),
     _single("source_vpk", (1e-3, 100.0), (1e-7, 1e5)),
     _single("source_offset_v", (0.0, 100.0), (0.0, 1e5)),
     _single("start_hz", (1e-4, 1e4), (1e-7, 1e7)),
@@ -129,13 +133,13 @@ SINGLES = (
     *(_single(symbol, *_INERTIA) for symbol in ("J_cm", "J_cL")),
     *(
         _single(symbol, (0.0, 1e5), (0.0, 1e9))
-        for symbol in ("B_L", "c_s1", "c_g1", "c_2", "c_cm", "c_cL")
+        for symbol in ("B_L", "c_s1", "c_g1", "c_2", "c_3", "c_cm", "c_cL")
     ),
 )
 
 
 def _total(v: Values) -> float:
-    return v["N_1"] * v.get("N", 1.0)
+    return v["N_1"] * v.get("N", 1.0) * v.get("N_3", 1.0)
 
 
 def _stall_torque(v: Values) -> float:
@@ -153,16 +157,22 @@ def _friction(v: Values) -> float:
     return (v["T_f_m"] + v["T_f_L"] / _total(v)) / _stall_torque(v)
 
 
-def _part_at_motor(symbol: str) -> Range:
+def _part_at_motor(symbol: str, *ratios: str) -> Range:
     return Range(
-        (symbol, "J_m", "N_1"), (0.0, 30.0), (0.0, 1e3),
-        lambda v: v[symbol] / v["N_1"] ** 2 / v["J_m"],
+        (symbol, "J_m", *ratios), (0.0, 30.0), (0.0, 1e3),
+        lambda v: v[symbol] / math.prod(v[ratio] for ratio in ratios) ** 2 / v["J_m"],
         f"{symbol} seen by the motor is {{value}} times J_m",
     )  # fmt: skip
 
 
 def _samples_a_cycle(v: Values) -> float:
     return v["rate_hz"] / v["stop_hz"]
+
+
+def _share_of_stage_3(v: Values) -> float:
+    if v["b_t_deg"] == 0.0:
+        return math.inf if v["b3_deg"] else 0.0
+    return v["b3_deg"] / v["b_t_deg"]
 
 
 _MOVED = ("J_m", "k_t", "k_a", "source_vpk", "source_offset_v")
@@ -208,9 +218,16 @@ COMBINED = (
         "the load seen by the motor is {value} times J_m",
         remedy="see whether the inertias and the ratios are right",
     ),
-    _part_at_motor("J_g1"),
-    _part_at_motor("J_s1"),
-    _part_at_motor("J_p2"),
+    _part_at_motor("J_g1", "N_1"),
+    _part_at_motor("J_s1", "N_1"),
+    _part_at_motor("J_p2", "N_1"),
+    _part_at_motor("J_g2", "N_1", "N"),
+    Range(
+        ("b3_deg", "b_t_deg"), (0.0, 0.98), (0.0, 1.0), _share_of_stage_3,
+        "stage 3 has {value} of the total backlash",
+        remedy="b3_deg is the play at the output with pinion 3 held, b_t_deg that with the motor "
+        "held",
+    ),
     Range(
         ("B_m", "J_m"), (0.0, 3e3), (0.0, 1e8), lambda v: v["B_m"] / v["J_m"],
         "B_m/J_m, the rate at which viscous friction stops the motor, is {value} 1/s", "1/s",

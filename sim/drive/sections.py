@@ -37,6 +37,7 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 OPTIONAL_SECTIONS = (
+    "stage3",
     "damping",
     "amplifier",
     "sampling",
@@ -63,6 +64,8 @@ class Section(BaseModel):
 class Damping(Section):
     """Damping that the datasheet knows of; the paper's units have none between motor and load."""
 
+    LATER = ("c_3",)
+
     B_L: Positive | None = None
     """Viscous friction of the load, N.m.s/rad."""
     c_s1: Positive | None = None
@@ -71,6 +74,8 @@ class Damping(Section):
     """Damping of mesh 1 while its teeth touch, N.m.s/rad."""
     c_2: Positive | None = None
     """Damping of mesh 2 while its teeth touch, N.m.s/rad."""
+    c_3: Positive | None = None
+    """Damping of mesh 3 while its teeth touch, N.m.s/rad."""
 
 
 class CurrentAmplifier(Section):
@@ -262,6 +267,8 @@ def find_contradiction(unit: Any) -> str:
         )
     if unit.damping is not None and unit.damping.c_2 is not None and unit.stage2 is None:
         return "damping.c_2 is that of stage 2, and there is none; leave it out"
+    if unit.damping is not None and unit.damping.c_3 is not None and unit.stage3 is None:
+        return "damping.c_3 is that of stage 3, and there is none; leave it out"
     filtered = (electronics.filter_numerator, electronics.filter_denominator)
     tachometer = sensor is None or sensor.kind == "tachometer"
     if None in filtered and (tachometer or filtered != (None, None)):

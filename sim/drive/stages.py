@@ -9,9 +9,9 @@ from typing import Annotated
 
 from pydantic import Field
 
-from sim.drive.sections import Positive, Section
+from sim.drive.sections import NonNegative, Positive, Section
 
-__all__ = ["Stage1", "Stage2"]
+__all__ = ["Stage1", "Stage2", "Stage3"]
 
 Efficiency = Annotated[float, Field(ge=0.2, le=1.0)]
 
@@ -48,3 +48,23 @@ class Stage2(Section):
     """Mesh stiffness at the output, N.m/rad (with shaft 2 in series where there is one)."""
     eta_2: Efficiency | None = None
     """Efficiency while pinion 2 drives; 1 where it is left out."""
+
+
+class Stage3(Section):
+    """Third gear stage, behind the two of the paper: gear 2, shaft 2 and the gear at the load.
+
+    The play of this stage is known; the contribution ratio shares out what it leaves of the total.
+    """
+
+    LATER = ("eta_3",)
+
+    J_g2: Positive
+    """Gear 2 with shaft 2 and pinion 3, kg.m^2; the shaft's stiffness is in series with k_2."""
+    N_3: Positive
+    """Revolution ratio seen by pinion 3."""
+    k_3: Positive
+    """Mesh stiffness at the output, N.m/rad."""
+    b3_deg: NonNegative
+    """Play at the output with pinion 3 held, degrees; all of the total where that is smaller."""
+    eta_3: Efficiency | None = None
+    """Efficiency while pinion 3 drives; 1 where it is left out."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Self
 
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
@@ -30,7 +30,7 @@ from sim.drive.sections import (
     Sensor,
     find_contradiction,
 )
-from sim.drive.stages import Stage1, Stage2
+from sim.drive.stages import Stage1, Stage2, Stage3
 from sim.own_effects.sources import EffectSource, OwnEffects, announce
 from sim.tolerance import Share, believed_shares, find_fault
 
@@ -118,6 +118,8 @@ class Unit(Section):
     load: Load
     backlash: Backlash
     limits: Limits
+    stage3: Stage3 | None = None
+    """Behind stage 2, of a drive with three gear stages."""
     damping: Damping | None = None
     amplifier: CurrentAmplifier | None = None
     sampling: Sampling | None = None
@@ -161,6 +163,8 @@ class Unit(Section):
             raise ValueError("stage1.J_p2 is required by [stage2]; a one-stage drive has neither")
         if self.stage2 is None and self.stage1.J_p2 is not None:
             raise ValueError("[stage2] is required by stage1.J_p2; a one-stage drive has neither")
+        if self.stage2 is None and self.stage3 is not None:
+            raise ValueError("[stage2] is required by [stage3], which is behind it")
         if self.stage2 is None and self.limits.b2_deg is not None:
             raise ValueError("limits.b2_deg limits stage 2, and there is none; leave it out")
         if self.stage2 is None and self.acceptance is not None and self.acceptance.b2_deg:
@@ -169,16 +173,21 @@ class Unit(Section):
 
     @property
     def stages(self) -> int:
-        """Number of gear stages, 1 or 2."""
-        return 1 if self.stage2 is None else 2
+        """Number of gear stages, 1 to 3."""
+        return 1 if self.stage2 is None else 2 if self.stage3 is None else 3
 
     @property
     def output_ratio(self) -> float:
-        """Ratio from shaft 1 to the load: that of stage 2, or 1 where there is none."""
-        return 1.0 if self.stage2 is None else self.stage2.N
+        """Ratio from shaft 1 to the load: that of the stages behind it, or 1 without any."""
+        return self.last_ratio * (1.0 if self.stage2 is None else self.stage2.N)
+
+    @property
+    def last_ratio(self) -> float:
+        """Ratio from gear 2 to the load: that of stage 3, or 1 where there is none."""
+        return 1.0 if self.stage3 is None else self.stage3.N_3
 
     def split(self, ratio: float) -> StageBacklash:
-        """The backlash of each stage at a contribution ratio.
+        """The backlash of each stage at a contribution ratio, that of stage 3 as it is known.
 
         Raises
         ------
@@ -190,7 +199,12 @@ class Unit(Section):
                 f"contribution ratio {ratio}: unit {self.name} has one gear stage, which holds "
                 "all of the backlash; give 1"
             )
-        return stage_backlash(ratio, self.backlash.b_t_deg, self.output_ratio)
+        b_t_deg = self.backlash.b_t_deg
+        if self.stage3 is None:
+            return stage_backlash(ratio, b_t_deg, self.output_ratio)
+        b3_deg = min(self.stage3.b3_deg, b_t_deg)
+        known = stage_backlash(ratio, b_t_deg - b3_deg, self.output_ratio)
+        return replace(known, b2_deg=known.b2_deg * self.last_ratio, b3_deg=b3_deg)
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -336,12 +350,14 @@ def _lists_as_tuples(value: Any) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class StageBacklash:
-    """Backlash of both stages, equations (15), (16) and (20)."""
+    """Backlash of each stage, equations (15), (16) and (20)."""
 
     b1_deg: float
     """Full play at gear 1 with the pinion held, degrees."""
     b2_deg: float
-    """Full play at the output gear, degrees."""
+    """Full play at gear 2 with pinion 2 held, degrees: at the output, but with three stages."""
+    b3_deg: float = 0.0
+    """Full play at the output of a third stage, degrees."""
 
     @property
     def half_plays_rad(self) -> tuple[float, float]:

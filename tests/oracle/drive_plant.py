@@ -70,6 +70,12 @@ class Plant(NamedTuple):
     high: float
     loss_1: float
     loss_2: float
+    N_3: float
+    k_3: float
+    c_3: float
+    J_g2: float
+    delta_3: float
+    loss_3: float
 
 
 class Bench(NamedTuple):
@@ -115,12 +121,12 @@ def plant_of(document: dict[str, Any], ratio: float, **changed: float) -> tuple[
     """Plant and bench of a parsed unit file at a contribution ratio; some numbers changed."""
     d = document
     m, e, s1, load = d["motor"], d["electronics"], d["stage1"], d["load"]
-    s2, amp = d.get("stage2"), d.get("amplifier")
+    s2, s3, amp = d.get("stage2"), d.get("stage3", {}), d.get("amplifier")
     mc, lc = d.get("motor_coupling", {}), d.get("load_coupling", {})
     clock, sensor = d.get("sampling", {}), d.get("sensor", {"kind": "tachometer"})
-    N = s2["N"] if s2 else 1.0
-    b_t = d["backlash"]["b_t_deg"]
-    b1, b2 = (ratio * b_t * N, (1.0 - ratio) * b_t) if s2 else (b_t, 0.0)
+    N, N_3 = s2["N"] if s2 else 1.0, s3.get("N_3", 1.0)
+    b_t, b3 = d["backlash"]["b_t_deg"], s3.get("b3_deg", 0.0)
+    b1, b2 = (ratio * (b_t - b3) * N * N_3, (1.0 - ratio) * (b_t - b3) * N_3) if s2 else (b_t, 0.0)
     den = e.get("filter_denominator", [1.0, 1.0, 1.0])
     numbers = {
         "current": amp is not None,
@@ -159,6 +165,12 @@ def plant_of(document: dict[str, Any], ratio: float, **changed: float) -> tuple[
         "low": 2.0 * math.pi * sensor.get("low_pass_hz", 0.0),
         "loss_1": 1.0 / s1.get("eta_1", 1.0) - 1.0,
         "loss_2": 1.0 / s2.get("eta_2", 1.0) - 1.0 if s2 else 0.0,
+        "N_3": N_3,
+        "k_3": s3.get("k_3", 0.0),
+        "c_3": d.get("damping", {}).get("c_3", 0.0),
+        "J_g2": s3.get("J_g2", 1.0),
+        "delta_3": math.radians(b3) / 2.0,
+        "loss_3": 1.0 / s3.get("eta_3", 1.0) - 1.0,
         "high": 2.0 * math.pi * sensor.get("high_pass_hz", 0.0),
     }
     numbers.update(changed)
@@ -176,9 +188,9 @@ def plant_of(document: dict[str, Any], ratio: float, **changed: float) -> tuple[
     return Plant(**numbers), bench
 
 
-_N = 20
+_N = 22
 # i, th_m, w_m, th_c, w_c, g1, wg1, s1, ws1, p2, wp2, h, wh, L, wL, V_o, dV_o, integral of
-# the error, low-pass, high-pass
+# the error, low-pass, high-pass, g2, wg2
 
 
 @njit(cache=True)
@@ -218,11 +230,18 @@ def _slopes(m, u, fed, y, dy):
     Ta = 2.0 * (m.k_s1 * (y[5] - y[7]) + m.c_s1 * (y[6] - y[8]))
     dy[5], dy[6] = y[6], (T1 - Ta) / m.J_g1
     last, wlast = (y[11], y[12]) if m.k_cL > 0.0 else (y[13], y[14])
+    dy[20], dy[21] = 0.0, 0.0
     if m.two:
         Tb = 2.0 * (m.k_s1 * (y[7] - y[9]) + m.c_s1 * (y[8] - y[10]))
-        T2 = _dead(m.k_2, m.c_2, y[9] / m.N - last, y[10] / m.N - wlast, m.delta_2)
+        g2, wg2 = (y[20], y[21]) if m.k_3 > 0.0 else (last, wlast)
+        T2 = _dead(m.k_2, m.c_2, y[9] / m.N - g2, y[10] / m.N - wg2, m.delta_2)
         dy[9], dy[10] = y[10], (Tb - T2 / m.N - m.loss_2 * abs(T2) / m.N * _sgn(y[10])) / m.J_p2
         arrives = T2
+        if m.k_3 > 0.0:
+            T3 = _dead(m.k_3, m.c_3, g2 / m.N_3 - last, wg2 / m.N_3 - wlast, m.delta_3)
+            lost = m.loss_3 * abs(T3) / m.N_3 * _sgn(wg2)
+            dy[20], dy[21] = wg2, (T2 - T3 / m.N_3 - lost) / m.J_g2
+            arrives = T3
     else:
         Tb = 2.0 * (m.k_s1 * (y[7] - last) + m.c_s1 * (y[8] - wlast))
         dy[9], dy[10] = 0.0, 0.0

@@ -50,6 +50,8 @@ def measured(name, ratio, points, seed, changed, shares=(0.3, 0.5, 0.8), cycles=
     document = tomllib.loads(config_path("units", name).read_text(encoding="utf-8"))
     changed = dict(changed)
     document["backlash"]["b_t_deg"] = changed.pop("b_t_deg", unit.backlash.b_t_deg)
+    if "b3_deg" in changed:
+        document["stage3"]["b3_deg"] = changed.pop("b3_deg")
     modes = natural_frequencies(unit)
     hertz = np.geomspace(0.6 * modes.anti_resonances_hz[0], 1.3 * modes.resonances_hz[0], points)
     levels = [share * unit.limits.source_vpk for share in shares]

@@ -60,6 +60,10 @@ DRIVES = {
     "current": {"amplifier": CURRENT, "electronics": {"k_a": 1.0}, "sampling": SAMPLED},
     "couplings": COUPLINGS,
     "damped": {"damping": {"B_L": 0.02, "c_s1": 3e-3, "c_g1": 0.02, "c_2": 0.3}},
+    "three stages": {
+        "stage3": {"J_g2": 3e-5, "N_3": 2.0, "k_3": 5e4, "b3_deg": 0.02},
+        "damping": {"c_3": 0.3, "c_2": 0.1, "c_s1": 3e-3},
+    },
 }
 """Sections to add by what they are; ``filter`` None takes the filter away."""
 

@@ -17,7 +17,7 @@ from tui.unit_under_test import unit_title
 
 __all__ = ["new_unit"]
 
-_TEMPLATES = {1: "one-stage", 2: "two-stage"}
+_TEMPLATES = {1: "one-stage", 2: "two-stage", 3: "three-stage"}
 _PARTS = "parts"
 
 
@@ -25,7 +25,7 @@ def new_unit(
     *,
     out: Path | None = None,
     name: str | None = None,
-    stages: Literal[1, 2] | None = None,
+    stages: Literal[1, 2, 3] | None = None,
     ask: bool = False,
     check: Path | None = None,
     console: Injected,

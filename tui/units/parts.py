@@ -90,7 +90,7 @@ def with_parts(template: str, parts: str, names: Collection[str]) -> str:
     if "command" in wanted:
         sections["loop"] = sections["loop"].replace('"reference"  ', '"command"    ')
     if "efficiency" in wanted:
-        template = re.sub(r"(?m)^# (eta_[12] = \S+)", r"\1  ", template)
+        template = re.sub(r"(?m)^# (eta_[123] = \S+)", r"\1  ", template)
     useless: tuple[str, ...] = ()
     if "amplifier" in wanted:
         useless += _OF_VOLTAGE

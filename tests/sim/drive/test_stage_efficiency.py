@@ -51,6 +51,10 @@ CASES = {
     "both stages": (losing(0.7, 0.8), "adss"),
     "worm": (losing(0.45), "adss"),
     "behind a coupling": (losing(0.6, 0.9, **drives.COUPLINGS), "adss"),
+    "three stages": (
+        losing(0.8, 0.9, stage3=drives.DRIVES["three stages"]["stage3"] | {"eta_3": 0.8}),
+        "adss",
+    ),
     "one stage": ({"stage1": {"eta_1": 0.7}}, "one-stage"),
 }
 
@@ -67,7 +71,10 @@ def test_efficiency_agrees_with_independent_plant(name):
     scatter = ours.std(axis=0) / np.abs(ours.mean(axis=0))
     # Its sign() chatters where it should stick: at 1 us that of a locking stage is 3 % off.
     assert np.all(off < 5.5 * scatter + 0.04), (off, scatter)
-    lossless = drives.unit({k: v for k, v in sections.items() if "stage" not in k}, base)
+    kept = {
+        name: {k: v for k, v in one.items() if "eta" not in k} for name, one in sections.items()
+    }
+    lossless = drives.unit(kept, base)
     assert np.abs(simulate(lossless, ratio, swept).gain / theirs - 1.0).max() > 0.05
 
 

@@ -57,7 +57,7 @@ def test_the_commands_in_the_file_run(tmp_path, monkeypatch):
     import shlex
 
     monkeypatch.chdir(tmp_path)
-    for stages in ("1", "2"):
+    for stages in ("1", "2", "3"):
         out = tmp_path / f"my {stages}.toml"
         assert cli.main(["new-unit", "--out", str(out), "--stages", stages]) == 0
         lines = [line.lstrip("# ") for line in out.read_text().splitlines()]
@@ -72,7 +72,7 @@ def test_the_commands_in_the_file_run(tmp_path, monkeypatch):
     [
         (["--out", "there.toml"], "is there already"),
         (["--out", "no/x.toml"], "no directory"),
-        (["--out", "x.toml", "--stages", "3"], "stages"),
+        (["--out", "x.toml", "--stages", "4"], "stages"),
         (["--out", "x.toml", "--name", "a\nb"], "on one line"),
         (["--out", "x.toml", "--name", " "], "1 to 64"),
         (["--out", "x.toml", "--name", "n" * 65], "1 to 64"),

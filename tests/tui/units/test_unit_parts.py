@@ -41,7 +41,7 @@ def test_each_part_is_asked_until_valid():
         ask_parts(lambda text: None, lambda: "")
 
 
-@pytest.mark.parametrize("stages", ["one-stage", "two-stage"])
+@pytest.mark.parametrize("stages", ["one-stage", "two-stage", "three-stage"])
 def test_every_choice_of_parts_makes_a_unit(stages):
     for count in range(len(NAMES) + 1):
         for names in itertools.combinations(NAMES, count):
@@ -55,7 +55,7 @@ def test_every_choice_of_parts_makes_a_unit(stages):
                 assert unit.sampling.holds_command == bool({"sampling", "loop"} & set(names))
 
 
-@pytest.mark.parametrize("stages", ["one-stage", "two-stage"])
+@pytest.mark.parametrize("stages", ["one-stage", "two-stage", "three-stage"])
 def test_every_kind_of_loop_makes_a_unit(stages):
     for more in ((), ("position",), ("command",), ("position", "command")):
         for beside in ((), ("sampling",), ("amplifier", "sampling")):
@@ -127,7 +127,7 @@ def test_one_sensor_is_asked_for():
     assert "motor's current" not in asked(["y", "yes", "no"])[1]
 
 
-@pytest.mark.parametrize("stages", ["1", "2"])
+@pytest.mark.parametrize("stages", ["1", "2", "3"])
 def test_commented_parts_of_new_file_work(stages, tmp_path, capsys):
     path = tmp_path / "own.toml"
     assert cli.main(["new-unit", "--out", str(path), "--stages", stages]) == 0
@@ -142,7 +142,7 @@ def test_commented_parts_of_new_file_work(stages, tmp_path, capsys):
     assert "encoder at the motor" in told
 
 
-@pytest.mark.parametrize("stages", ["one-stage", "two-stage"])
+@pytest.mark.parametrize("stages", ["one-stage", "two-stage", "three-stage"])
 def test_efficiency_is_asked_in_per_cent(stages):
     text = with_parts(template(stages), template("parts"), ("efficiency",))
     said = []

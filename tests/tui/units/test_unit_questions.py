@@ -35,7 +35,7 @@ def unit_of(text):
     return unit_from_mapping(tomllib.loads(text), source="here")
 
 
-@pytest.mark.parametrize("stages", ["one-stage", "two-stage"])
+@pytest.mark.parametrize("stages", ["one-stage", "two-stage", "three-stage"])
 def test_examples_alone_give_the_template(stages):
     assert asked([], stages)[0] == template(stages)
 
@@ -101,7 +101,7 @@ def test_at_a_terminal(tmp_path):
     out, text = tmp_path / "my drive.toml", ""
     command = [sys.executable, "-m", "tui.cli", "new-unit", "--ask", "--out", str(out)]
     answers = iter(
-        [b"3", b"1", b"perhaps", b"no", b"0.85 mH", b"\xb5", b"4.1"]
+        [b"4", b"1", b"perhaps", b"no", b"0.85 mH", b"\xb5", b"4.1"]
     )  # a micro sign that is no UTF-8
     with subprocess.Popen(command, stdin=theirs, stdout=theirs, stderr=theirs) as program:
         os.close(theirs)
@@ -121,7 +121,7 @@ def test_at_a_terminal(tmp_path):
     assert program.returncode == 0, text
     unit = load_unit(str(out))
     assert (unit.name, unit.stages, unit.motor.L_a, unit.motor.R_m) == ("MY DRIVE", 1, 8.5e-4, 4.1)
-    assert "neither 1 nor 2" in text
+    assert "neither 1, 2 nor 3" in text
     assert "'perhaps' is neither yes nor no" in text
     assert "new-unit --check" in text
 
