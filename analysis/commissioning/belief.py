@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from analysis.commissioning.coordinates import BACKLASH, RATIO, Coordinates
-from analysis.commissioning.regression import LEAST_STD
+from analysis.commissioning.response_model import LEAST_STD
 from sim.commissioning import Commissioning
 from sim.unit import Unit
 

@@ -33,6 +33,9 @@ on it is not such a drive if its misfit is at least this; nor is it with a misfi
 drives whose values explain their sweep it is 1.2 at most, which widens the errors; of one with a
 load that swings 4.5, which a few simulated drives that lie far out have, too."""
 
+_EARLIER = 2
+"""Rounds before, whose drives tell slopes as well. They were drawn wider, where slopes differ."""
+
 _LANES = 5
 """Drives of a family: they share their linear part, so that five cost hardly more than one."""
 
@@ -90,7 +93,7 @@ def identify(
     coordinates, observation = coordinates.with_noise(spread), observation.with_noise(noise_v)
     at = proposal = prior
     measured = observation.values.ravel()
-    fit = None
+    fit, earlier = None, list[Round]()
     families = max(_PER_COORDINATE * len(coordinates), _LEAST)
     for number in range(_ROUNDS):
         last = number == _ROUNDS - 1
@@ -98,8 +101,9 @@ def identify(
         drawn = simulate_drives(
             coordinates, observation, proposal, (1 + last) * families, rng, executor
         )
-        fit = regress(drawn, measured, proposal, prior, last=last)
+        fit = regress(drawn, measured, proposal, prior, earlier=earlier[-_EARLIER:], last=last)
         at = fit.posterior
+        earlier.append(drawn)
         if progress is not None:
             progress((number + 1) / _ROUNDS)
     assert fit is not None
@@ -147,7 +151,12 @@ def simulate_drives(
     told = np.exp(observation.scatter_sampling * rng.standard_normal(mean.shape))
     y = channels_of_readings(disturbed, variance * told**2, noise * told, observation.floor)
     angles = np.repeat([name == "phase" for name in CHANNELS], y.shape[-1])
-    return Round(z, np.repeat(np.arange(families), _LANES), y.reshape(len(z), -1), angles)
+    sweeps = np.concatenate(
+        [np.full(b.stop - b.start, place) for place, b in enumerate(observation.blocks)]
+    )
+    series = np.concatenate([sweeps + len(sweeps) * channel for channel in range(len(CHANNELS))])
+    owners = np.repeat(np.arange(families), _LANES)
+    return Round(z, owners, y.reshape(len(z), -1), angles, series)
 
 
 def _with_another(prior: Gaussian) -> Gaussian:

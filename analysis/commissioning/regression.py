@@ -1,7 +1,7 @@
 """Posterior of coordinates by linear regression on what simulated drives show.
 
-Owns the summary of a sweep, the regression of coordinates on it, and the correction from the draw
-to the prior. It simulates nothing.
+Owns the regression of coordinates on summaries of a sweep, and the correction from the draw to the
+prior. It simulates nothing.
 
 Method: semi-automatic summary statistics (Fearnhead and Prangle 2012), linear regression
 adjustment (Beaumont, Zhang and Balding 2002), and the correction for a Gaussian proposal of
@@ -10,15 +10,18 @@ Papamakarios and Murray 2016.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, cholesky, eigh
 
+from analysis.commissioning.response_model import ResponseModel
+
 Vector = NDArray[np.float64]
 
-__all__ = ["LEAST_STD", "Gaussian", "Regressed", "Round", "expected_std", "regress"]
+__all__ = ["Gaussian", "Regressed", "Round", "expected_std", "regress"]
 
 _WIDER, _NARROWEST = 1.5, 0.35
 """Drives are drawn so much wider than the last round's posterior, as a regression says nothing
@@ -26,8 +29,6 @@ beyond the drives that it has seen; and in no direction narrower than this share
 as a response bends far from where it was linearised."""
 
 _FOLDS = 5
-LEAST_STD = 1e-3
-"""Least residual of the logarithm of gain, and rad of phase: that of an analyser's own accuracy."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,12 +64,18 @@ class Round:
     """Simulated drives: coordinates `z` (n, d), `families` (n,) and channels `y` (n, rows).
 
     `angles` (rows,): which channels are angles, rad, known but for whole turns; None is none.
+    `series` (rows,): see `ResponseModel.fit`.
     """
 
     z: Vector
     families: NDArray[np.int64]
     y: Vector
     angles: NDArray[np.bool_] | None = None
+    series: NDArray[np.int64] | None = None
+
+    def series_of(self, columns: NDArray[np.bool_]) -> NDArray[np.int64] | None:
+        """The series of some of the rows."""
+        return None if self.series is None else self.series[columns]
 
     def near(self, values: Vector) -> Vector:
         """Channels (..., rows) with angles within half a turn of the mean of the drives."""
@@ -96,24 +103,36 @@ class Regressed:
 
 
 def regress(
-    drawn: Round, measured: Vector, proposal: Gaussian, prior: Gaussian, *, last: bool = True
+    drawn: Round,
+    measured: Vector,
+    proposal: Gaussian,
+    prior: Gaussian,
+    *,
+    earlier: Sequence[Round] = (),
+    last: bool = True,
 ) -> Regressed:
     """The posterior given the measurement, by what the drives of one round show.
 
-    Only that of the `last` round is widened where the measurement fits worse than the drives do:
-    before, the drives are not where it is.
+    Those of `earlier` rounds add to what is known of the slopes. Only the posterior of the `last`
+    round is widened where the measurement fits worse than the drives do: before, the drives are not
+    where it is.
     """
     seen = np.isfinite(measured) & np.all(np.isfinite(drawn.y), axis=0)
     y, x = drawn.near(drawn.y)[:, seen], (drawn.z - proposal.mean) / proposal.std
+    others = [
+        ((one.z - proposal.mean) / proposal.std, drawn.near(one.y)[:, seen]) for one in earlier
+    ]
+    others = [(a, b) for a, b in others if np.all(np.isfinite(b))]
+    series = drawn.series_of(seen)
     target = drawn.near(measured)[seen]
     folds = drawn.families % _FOLDS
     summaries, left = np.empty_like(x), np.empty_like(y)
     for fold in range(_FOLDS):
         out = folds == fold
-        model = _ResponseModel.fit(x[~out], y[~out])
+        model = ResponseModel.fit(x[~out], y[~out], series, others)
         summaries[out] = model.estimate(y[out])
         left[out] = model.remainder(y[out])
-    model = _ResponseModel.fit(x, y)
+    model = ResponseModel.fit(x, y, series, others)
     summary, remainder = model.estimate(target[None])[0], model.remainder(target[None])[0]
     # Parameters are regressed on the estimates of drives that the model has not seen.
     basis = np.column_stack([np.ones(len(x)), summaries])
@@ -153,45 +172,11 @@ def expected_std(
     folds, left = drawn.families % _FOLDS, np.empty(len(x))
     for fold in range(_FOLDS):
         out = folds == fold
-        model = _ResponseModel.fit(x[~out], y[~out])
+        model = ResponseModel.fit(x[~out], y[~out], drawn.series_of(known))
         basis = [np.column_stack([np.ones(k.sum()), model.estimate(y[k])]) for k in (~out, out)]
         coefficients = np.linalg.lstsq(basis[0], quantity[~out], rcond=None)[0]
         left[out] = quantity[out] - basis[1] @ coefficients
     return float(np.sqrt(np.mean(left**2)))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _ResponseModel:
-    """Channels as a linear function of coordinates: `centre` (rows,), `slopes` (d, rows).
-
-    `std` (rows,) of what is left; `precision` (d, d) of the coordinates by these channels.
-    """
-
-    centre: Vector
-    slopes: Vector
-    std: Vector
-    precision: Vector
-
-    @classmethod
-    def fit(cls, x: Vector, y: Vector) -> _ResponseModel:
-        basis = np.column_stack([np.ones(len(x)), x])
-        coefficients = np.linalg.lstsq(basis, y, rcond=None)[0]
-        left = y - basis @ coefficients
-        spare = max(len(x) - basis.shape[1], 1)
-        std = np.maximum(np.sqrt(np.sum(left**2, axis=0) / spare), LEAST_STD)
-        slopes: Vector = np.asarray(coefficients[1:], dtype=float)
-        precision = (slopes / std**2) @ slopes.T
-        return cls(coefficients[0], slopes, np.asarray(std), np.asarray(precision))
-
-    def estimate(self, y: Vector) -> Vector:
-        """Least-squares estimates (n, d) of the coordinates, drawn a little to the middle."""
-        right = ((y - self.centre) / self.std**2) @ self.slopes.T
-        solved = np.linalg.solve(self.precision + np.eye(len(self.precision)), right.T)
-        return np.asarray(solved.T, dtype=float)
-
-    def remainder(self, y: Vector) -> Vector:
-        """What the best coordinates leave (n, rows), over its standard deviation."""
-        return np.asarray((y - self.centre - self.estimate(y) @ self.slopes) / self.std)
 
 
 def _standardised(one: Gaussian, by: Gaussian | None = None) -> Gaussian:

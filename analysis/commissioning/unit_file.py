@@ -15,7 +15,7 @@ from tomlkit.items import Table
 
 from analysis.commissioning.commission import Commissioned
 from analysis.commissioning.coordinates import RATIO
-from analysis.commissioning.regression import LEAST_STD
+from analysis.commissioning.response_model import LEAST_STD
 from daq.untrusted.bounded_text import parse_toml
 from sim.drive.unit import NO_PHYSICS
 from sim.tolerance import DEFAULT, MOST
