@@ -8,5 +8,5 @@ from __future__ import annotations
 
 __all__ = ["EDITION"]
 
-EDITION = "11"
+EDITION = "12"
 """Edition of estimate and diagnosis; histories before editions hold those of the first."""

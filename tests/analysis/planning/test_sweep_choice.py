@@ -36,12 +36,12 @@ def shorter(family):
 
 @pytest.fixture(scope="module")
 def planned():
-    return plan_sweep(load_unit("adss"), 0.5, executor=FewCycles())
+    return plan_sweep(load_unit("adss"), 2.0, executor=FewCycles())
 
 
 def test_plan_is_within_limits_and_time(planned):
     unit, plan = load_unit("adss"), planned.plan
-    assert plan.duration_s <= 30.0
+    assert plan.duration_s <= 120.0
     assert planned.minutes == pytest.approx(plan.duration_s / 60.0)
     assert max(plan.levels_vpk) <= unit.limits.source_vpk
     assert unit.limits.start_hz <= plan.frequencies_hz[0]
