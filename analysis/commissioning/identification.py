@@ -36,6 +36,9 @@ load that swings 4.5, which a few simulated drives that lie far out have, too.""
 _EARLIER = 2
 """Rounds before, whose drives tell slopes as well. They were drawn wider, where slopes differ."""
 
+_USUAL = 0.95
+"""Share of simulated drives below which a misfit tells of nothing but values."""
+
 _LANES = 5
 """Drives of a family: they share their linear part, so that five cost hardly more than one."""
 
@@ -57,6 +60,11 @@ class Identified:
     def unlike(self) -> bool:
         """Whether what was swept is no such drive, whatever its values are."""
         return self.misfit > (_LEAST_MISFIT if self.misfit_rank >= _UNLIKE else _LARGE)
+
+    @property
+    def usual(self) -> bool:
+        """Whether values leave no more of what was swept than they do of such drives."""
+        return self.misfit_rank < _USUAL
 
 
 def identify(

@@ -206,7 +206,11 @@ def _diagnose(
 
 
 def _answer(question: Question, progress: Progress | None) -> Answer:
-    """By the values of the drive where these are asked first, else by search of the catalogue."""
+    """By the values of the drive where these are asked first, else by search of the catalogue.
+
+    What no value explains is searched for, and so is a drive without a changed value of which
+    values leave more than usual.
+    """
     belief = _belief(question.unit, question.posterior)
     if belief is None:
         return search_catalogue(question, progress)
@@ -217,7 +221,7 @@ def _answer(question: Question, progress: Progress | None) -> Answer:
             progress=part_of(progress, 0.0, _ASKED, "asking which values differ"),
         )  # fmt: skip
     searched = None
-    if not changes.likeliest:
+    if not changes.likeliest and (changes.likeliest is None or not changes.identified.usual):
         searched = search_catalogue(question, remaining(progress, _ASKED))
         if changes.likeliest is None:
             return searched
