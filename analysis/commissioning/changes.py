@@ -37,6 +37,8 @@ __all__ = ["Changed", "Changes", "find_changes"]
 _PRIOR = (0.5, 0.35, 0.1)
 """Probability that no value has changed, that one has, and that two have; else all may have."""
 
+_ALL_PRIOR = 1.0 - sum(_PRIOR)
+
 _NEAR = 0.5
 """Share of a probability that differs from it by no more than two draws of simulated drives do."""
 
@@ -81,7 +83,7 @@ class Changes:
         singles = list(self.directions)
         pairs = list(combinations(singles, 2))
         sets: list[list[tuple[Causes, ...]]] = [[()], [(one,) for one in singles], [*pairs]]
-        everything = np.log(1.0 - sum(_PRIOR)) + self._log_evidence(self.prior.covariance)
+        everything = np.log(_ALL_PRIOR) + self._log_evidence(self.prior.covariance)
         scores: dict[Causes, float] = {_ALL: everything}
         for share, some in zip(_PRIOR, sets, strict=True):
             for one in some:
@@ -98,8 +100,9 @@ class Changes:
         """The likeliest set of causes, empty where no more than the ratio has changed.
 
         None where that holds values without a cause, or more than one, as a cause that no value
-        stands for is likelier than two changes at once; and where values leave too much. Of two
-        that are hardly likelier than one of them it is that one.
+        stands for is likelier than two changes at once; where values leave too much; and where it
+        is as likely that they have changed all together. Of two that are hardly likelier than one
+        of them it is that one.
         """
         believed, named = self._by_cause, self.named()
         first = max(believed, key=believed.__getitem__)
@@ -108,7 +111,14 @@ class Changes:
             first = max(near, key=believed.__getitem__)
         if len(first) > 1 or first not in named or self.identified.unlike:
             return None
-        return first
+        # Values together imitate a cause that none of them stands for.
+        return None if first and believed[_ALL] > _NEAR * believed[first] else first
+
+    @property
+    def suffice(self) -> bool:
+        """Whether values leave nothing to be explained, without being off all together."""
+        strained = self.probabilities[_ALL] > _ALL_PRIOR
+        return self.likeliest is not None and self.identified.usual and not strained
 
     def named(self) -> dict[Causes, float]:
         """Probabilities of sets of causes of the catalogue, whatever the ratio is."""

@@ -208,8 +208,7 @@ def _diagnose(
 def _answer(question: Question, progress: Progress | None) -> Answer:
     """By the values of the drive where these are asked first, else by search of the catalogue.
 
-    What no value explains is searched for, and so is a drive without a changed value of which
-    values leave more than usual.
+    The catalogue is searched where values do not suffice.
     """
     belief = _belief(question.unit, question.posterior)
     if belief is None:
@@ -221,7 +220,7 @@ def _answer(question: Question, progress: Progress | None) -> Answer:
             progress=part_of(progress, 0.0, _ASKED, "asking which values differ"),
         )  # fmt: skip
     searched = None
-    if not changes.likeliest and (changes.likeliest is None or not changes.identified.usual):
+    if not changes.likeliest and not changes.suffice:
         searched = search_catalogue(question, remaining(progress, _ASKED))
         if changes.likeliest is None:
             return searched

@@ -91,6 +91,31 @@ def test_two_changes_at_once_are_no_cause():
     assert changes.likeliest is None
 
 
+def test_a_change_is_no_cause_if_all_are_as_likely():
+    """Values together imitate what none of them stands for: the search decides."""
+    changes = of_linear_data(np.array([2.0, 0.3, 0.25]), np.full(3, 0.05))
+    believed = changes.probabilities
+    assert next(iter(believed)) == ("load-inertia",)
+    assert believed[("all values",)] > 0.5 * believed[("load-inertia",)]
+    assert changes.likeliest is None
+
+
+@pytest.mark.parametrize(
+    ("measured", "rank", "suffice"),
+    [
+        ((0.0, 0.0, 0.0), 0.9, True),
+        ((0.0, 0.0, 0.0), 0.97, False),
+        ((0.28, -0.28, 0.42), 0.5, False),
+        ((2.0, 0.0, 0.0), 0.5, True),
+    ],
+)
+def test_values_suffice_where_they_leave_nothing(measured, rank, suffice):
+    """Neither in what no value changes, nor in that all of them are off."""
+    known = of_linear_data(np.array(measured), np.full(3, 0.05))
+    changes = replace(known, identified=replace(known.identified, misfit_rank=rank))
+    assert (changes.likeliest == (), changes.suffice) == (measured[0] < 1.0, suffice)
+
+
 def test_a_change_beside_a_doubtful_one_counts():
     """Two that are hardly likelier than one of them are no reason to name neither."""
     changes = of_linear_data(np.array([2.0, -0.42, 0.0]), np.full(3, 0.05))
