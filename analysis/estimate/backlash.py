@@ -80,7 +80,7 @@ class Backlash:
             ("total backlash, b_t", self.b_t_deg, 4, "deg"),
         ]
         if self.b3_deg is not None:
-            rows.insert(3, ("backlash of stage 3, b3, as told", self.b3_deg, 4, "deg"))
+            rows.insert(3, ("backlash of stage 3, b3, known", self.b3_deg, 4, "deg"))
         lines = []
         for name, number, digits, unit in rows:
             line = (

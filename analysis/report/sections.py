@@ -170,7 +170,7 @@ def _backlash_table(model: Data, several: bool) -> Markup:
         ("contribution_ratio", "contribution ratio r of stage 1", ""),
         ("b1_deg", "backlash of stage 1, b1", "deg"),
         ("b2_deg", "backlash of stage 2, b2", "deg"),
-        ("b3_deg", "backlash of stage 3, b3, as told", "deg"),
+        ("b3_deg", "backlash of stage 3, b3, known", "deg"),
         ("b_t_deg", "total backlash, b_t", "deg"),
     )
     rows = [(label, *_numbers(model[key], unit)) for key, label, unit in names if model.get(key)]
