@@ -5,8 +5,8 @@ no posterior and simulates nothing.
 
 Method: a channel of a chaotic drive scatters, and so do slopes that are regressed on some hundred
 drives; over a long sweep that is more than what the channels tell. Neighbouring frequencies have
-similar slopes: these are a Gaussian process along the sweep (Rasmussen and Williams 2006, 2.2), and
-its amplitude and length are those that make the regressed slopes likeliest (5.4).
+similar slopes: these are a Gaussian process along the sweep (Rasmussen and Williams 2006, 2.2). Its
+amplitude is what the slopes have beyond their errors, its length makes them likeliest (5.4).
 """
 
 from __future__ import annotations
