@@ -57,10 +57,12 @@ def ratio_of_unit(unit: Unit, ratio: float | None) -> float:
         If a drive with two stages or three was given none.
     """
     if ratio is None and unit.stages > 1:
-        shared = "the total backlash" if unit.stages == 2 else "the backlash of stages 1 and 2"
+        count, shared = "two", "the total backlash"
+        if unit.stages == 3:
+            count, shared = "three", "the backlash of stages 1 and 2"
         raise InputError(
-            f"--ratio is missing: unit {unit.name} has {unit.stages} stages; give the share of "
-            f"stage 1 in {shared}, 0 to 1"
+            f"--ratio is missing: unit {unit.name} has {count} stages; give the share of stage 1 "
+            f"in {shared}, 0 to 1"
         )
     return 1.0 if ratio is None else ratio
 

@@ -47,7 +47,7 @@ def diagnosed(verdict, *models):
             "baseline": baseline,
             "extended": first["contribution_ratio"] if first else baseline,
         },
-        **{name: accepted and accepted[name] for name in QUANTITIES[1:]},
+        **{name: accepted and accepted.get(name) for name in QUANTITIES[1:]},
         "models": list(models),
     }
 

@@ -91,7 +91,7 @@ def test_two_changes_at_once_are_no_cause():
     assert changes.likeliest is None
 
 
-def test_a_change_is_no_cause_if_all_are_as_likely():
+def test_change_is_no_cause_beside_all():
     """Values together imitate what none of them stands for: the search decides."""
     changes = of_linear_data(np.array([2.0, 0.3, 0.25]), np.full(3, 0.05))
     believed = changes.probabilities
